@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "fleet/night/night_command.hpp"
 #include "fleet/store/store_commands.hpp"
 #include "report/command.hpp"
 
@@ -23,6 +24,7 @@ void declare_fleet_command_line(CLI::App& app, std::string& store, cli::Action& 
       ->envname("THERMOCOMP_FLEET_STORE")
       ->capture_default_str();
   add_store_commands(app, store, action);
+  add_night_command(app, store, action);
 }
 
 }  // namespace thermocomp::fleet

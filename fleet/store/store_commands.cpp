@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <fcntl.h>
@@ -14,7 +15,12 @@
 #include <CLI/CLI.hpp>
 #include <sys/stat.h>
 
+#include "config/text/units.hpp"
+#include "config/toml/toml_reader.hpp"
+#include "daemon/history/format/history_time.hpp"
+#include "fleet/store/machine_rows.hpp"
 #include "fleet/store/store.hpp"
+#include "report/run_loader.hpp"
 
 namespace thermocomp::fleet {
 namespace {
@@ -113,6 +119,62 @@ int status(const std::string& conninfo) {
   return is_well ? cli::exit_success : cli::exit_no;
 }
 
+struct LoadOptions {
+  std::string machine;
+  std::string run;
+  std::string begin;
+  std::string model;
+};
+
+/// Means of 10 s of a run file; each displacement that stands there is a probing.
+MeansBatch batch_of(const RunFile& run, std::int64_t begin_ns) {
+  MeansBatch batch;
+  for (const std::string& column : run.columns)
+    if (column != "time_s" && !is_output(column)) batch.columns.push_back(column);
+  constexpr double ns_per_s = 1e9;
+  std::vector<int> counts;
+  for (std::size_t row = run.selected_begin; row < run.selected_end; ++row) {
+    const std::int64_t wall_ns = begin_ns + static_cast<std::int64_t>(ns_per_s * run.time_s()[row]);
+    const std::int64_t at_s = wall_ns / 1'000'000'000 / mean_s * mean_s;
+    if (batch.rows.empty() || batch.rows.back().at_s != at_s) {
+      batch.rows.push_back({at_s, std::vector<float>(batch.columns.size(), NAN)});
+      counts.assign(batch.columns.size(), 0);
+    }
+    for (std::size_t i = 0; i < batch.columns.size(); ++i) {
+      const auto value = static_cast<float>(run.column(batch.columns[i])[row]);
+      float& mean = batch.rows.back().mean[i];
+      if (std::isnan(value)) continue;
+      mean = counts[i]++ == 0 ? value : mean + (value - mean) / static_cast<float>(counts[i]);
+    }
+    for (const std::string& column : run.columns) {
+      const double value_um = is_output(column) ? run.column(column)[row] : not_a_number;
+      if (std::isnan(value_um)) continue;
+      batch.probings.push_back({.output = column,
+                                .wall_ns = wall_ns,
+                                .measured_um = value_um,
+                                .displacement_um = value_um,
+                                .source = "probe"});
+    }
+  }
+  return batch;
+}
+
+int load(const std::string& conninfo, const LoadOptions& options) {
+  const HistoryTime begin = parse_history_time(options.begin);
+  if (!begin.wall_ns) throw cli::Failure("--begin " + options.begin + ": must be a date and time");
+  MeansBatch batch = batch_of(cli::RunLoader("").load(options.run), *begin.wall_ns);
+  if (!options.model.empty()) batch.setup.model_text = read_text_file(options.model);
+  batch.program_version = "loaded";
+  pqxx::connection store = open_store(conninfo);
+  const Taken taken =
+      MachineRows(store, options.machine, fs::path(options.run).filename()).send(batch);
+  std::printf("%llu rows, %llu refused (time), %llu were there already; %zu probed values\n",
+              static_cast<unsigned long long>(taken.sent),
+              static_cast<unsigned long long>(taken.refused),
+              static_cast<unsigned long long>(taken.repeated), batch.probings.size());
+  return taken.refused > 0 ? cli::exit_no : cli::exit_success;
+}
+
 }  // namespace
 
 void add_store_commands(CLI::App& app, const std::string& store, cli::Action& action) {
@@ -142,6 +204,21 @@ void add_store_commands(CLI::App& app, const std::string& store, cli::Action& ac
       return add(store, *machine, *file);
     };
   });
+
+  auto loading = std::make_shared<LoadOptions>();
+  CLI::App* load_command = app.add_subcommand(
+      "load", "a run file as if an uplink had sent it: of a machine that has no network");
+  load_command->add_option("MACHINE", loading->machine, "its name in the store")->required();
+  load_command->add_option("RUN.csv", loading->run, "run file, as thermocomp export writes it")
+      ->required();
+  load_command
+      ->add_option("--begin", loading->begin, "time of its first second: 2026-03-01T08:30:00Z")
+      ->required();
+  load_command->add_option("--model", loading->model, "the model that was in use")
+      ->type_name("FILE");
+  load_command->footer("Exit status: 0 success, 1 rows were refused, 2 bad use or bad input.");
+  load_command->callback(
+      [&store, &action, loading] { action = [&store, loading] { return load(store, *loading); }; });
 
   CLI::App* status_command = app.add_subcommand(
       "status", "the machines: when they were heard last, and what their newest night found");

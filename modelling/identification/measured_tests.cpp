@@ -150,23 +150,32 @@ std::vector<std::string> usable_signals(const std::vector<RunFile>& runs,
 }
 
 TestRun make_run(const RunFile& run, const std::vector<std::string>& places,
-                 const std::vector<std::string>& outputs, const std::vector<std::string>& signals) {
+                 const std::vector<std::string>& outputs, const std::vector<std::string>& signals,
+                 bool between_probings) {
   std::vector<const std::vector<double>*> columns;
   columns.reserve(places.size() + outputs.size());
   for (const auto& name : places) columns.push_back(&run.column(name));
   for (const auto& name : outputs) columns.push_back(&run.column(name));
-  std::vector<const std::vector<double>*> needed = columns;
-  for (const auto& name : signals) needed.push_back(&run.column(name));
+  std::vector<const std::vector<double>*> seen(columns.begin(),
+                                               columns.end() - std::ssize(outputs));
+  for (const auto& name : signals) seen.push_back(&run.column(name));
+  const std::vector<const std::vector<double>*> probed(columns.end() - std::ssize(outputs),
+                                                       columns.end());
   std::vector<std::size_t> rows;
   std::size_t begin = 0;
+  std::size_t complete = 0;
   for (std::size_t row = 0; row < run.selected_end; ++row) {
-    if (!std::all_of(needed.begin(), needed.end(),
-                     [&](const auto* column) { return std::isfinite((*column)[row]); }))
-      continue;
-    if (row < run.selected_begin) ++begin;
+    const auto is_there = [row](const auto* column) { return std::isfinite((*column)[row]); };
+    if (!std::all_of(seen.begin(), seen.end(), is_there)) continue;
+    const bool is_complete = std::all_of(probed.begin(), probed.end(), is_there);
+    if (!is_complete && (rows.empty() || !between_probings)) continue;
+    if (row < run.selected_begin)
+      ++begin;
+    else if (is_complete)
+      ++complete;
     rows.push_back(row);
   }
-  if (rows.size() < begin + rows_min)
+  if (complete < rows_min)
     refuse(run.name, "", "has fewer than 3 selected rows in which no value is missing");
   TestRun test;
   test.name = run.name;
@@ -341,7 +350,8 @@ MeasuredTests measured_tests(const std::vector<RunFile>& given, const TestOption
   tests.outputs = options.outputs;
   if (options.signals) tests.signals = usable_signals(runs, tests.notes);
   for (const RunFile& run : runs)
-    tests.runs.push_back(make_run(run, tests.places, tests.outputs, tests.signals));
+    tests.runs.push_back(
+        make_run(run, tests.places, tests.outputs, tests.signals, options.between_probings));
   for (std::size_t i = 0; i < tests.signals.size(); ++i)
     if (stands_still(tests, i) || goes_one_way(tests, i)) tests.unmoved.push_back(tests.signals[i]);
   leave_out_still_places(tests);

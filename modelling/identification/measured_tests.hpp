@@ -59,6 +59,9 @@ struct TestOptions {
   std::vector<std::string> outputs;  ///< may be empty
   std::size_t folds_of_one_run{6};
   bool signals{false};  ///< operating signals too
+  /// Rows without an output stay, after the first that has them all: temperatures between two
+  /// probings, for low passes. Their outputs are NaN.
+  bool between_probings{false};
 };
 
 /// A place that no run has a value of, or that moves in none, is left out with a note.

@@ -174,6 +174,7 @@ Statistics statistics_of(const std::vector<RunFile>& runs, std::string machine,
   identification::TestOptions options;
   options.outputs = statistics.outputs;
   options.signals = true;
+  options.between_probings = true;
   const identification::MeasuredTests tests = measured_tests(runs, options);
   notes.insert(notes.end(), tests.notes.begin(), tests.notes.end());
   statistics.columns = {subjects_of(runs), taus_s};
@@ -187,12 +188,15 @@ Statistics statistics_of(const std::vector<RunFile>& runs, std::string machine,
   statistics.yy = Eigen::VectorXd::Zero(outputs_count);
   std::vector<RunRows> all;
   for (const identification::TestRun& run : tests.runs) {
-    const Eigen::Index rows = run.time_s.size() - run.begin;
+    std::vector<Eigen::Index> probed;
+    for (Eigen::Index row = run.begin; row < run.time_s.size(); ++row)
+      if (run.outputs_um.row(row).allFinite()) probed.push_back(row);
+    const auto rows = static_cast<Eigen::Index>(probed.size());
     RunRows& selected = all.emplace_back();
-    selected.x = bank_of(run, tests, bank).bottomRows(rows);
-    selected.y = run.outputs_um.bottomRows(rows);
+    selected.x = bank_of(run, tests, bank)(probed, Eigen::all);
+    selected.y = run.outputs_um(probed, Eigen::all);
     selected.seconds.resize(rows);
-    const Eigen::VectorXd time_s = run.time_s.tail(rows);
+    const Eigen::VectorXd time_s = run.time_s(probed);
     for (Eigen::Index i = 0; i < rows; ++i)
       selected.seconds[i] =
           std::min(row_s_max, i + 1 < rows ? time_s[i + 1] - time_s[i] : time_s[i] - time_s[i - 1]);

@@ -30,11 +30,11 @@ class Store:
         self.fleet("init")
 
     def fleet(self, *arguments, status=0):
-        """Standard output of thermocomp-fleet; of a failure what it said on standard error."""
+        """What thermocomp-fleet said."""
         done = subprocess.run([str(BIN / "thermocomp-fleet"), "--store", self.local, *map(str, arguments)],
                               stdin=subprocess.DEVNULL, capture_output=True, text=True, cwd=self.folder)
         assert done.returncode == status, done.stdout + done.stderr
-        return done.stdout if status == 0 else done.stderr
+        return done.stdout + done.stderr
 
     def ask(self, sql):
         return self.server.ask(sql, conninfo=self.local)

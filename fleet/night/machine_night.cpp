@@ -1,0 +1,395 @@
+#include "fleet/night/machine_night.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <fcntl.h>
+#include <fstream>
+#include <map>
+#include <optional>
+#include <pqxx/pqxx>
+#include <spawn.h>
+#include <stdexcept>
+
+#include <nlohmann/json.hpp>
+#include <sys/wait.h>
+#include <system_error>
+
+#include "config/text/printable_text.hpp"
+#include "config/toml/toml_reader.hpp"
+
+extern char** environ;
+
+namespace thermocomp::fleet {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int probings_min = 8;              ///< of a night; fewer say nothing of a machine
+constexpr std::size_t nights_of_series = 7;  ///< of each machine, before the night that is judged
+constexpr int machines_min = 3;              ///< besides the one that is judged
+constexpr std::size_t sisters_max = 3 + 60;  ///< words of the command; more show hardly more of S
+
+/// Of a machine: what it was given and did is no input of its displacement.
+bool is_column_of_run(const std::string& name) {
+  return !name.ends_with("_offset_um") && !name.ends_with("_applied_um");
+}
+
+constexpr const char* minutes_of_night =
+    "SELECT setup.columns::text, extract(epoch FROM at)::bigint, value::text FROM fleet.minute"
+    " JOIN fleet.setup ON setup.machine = minute.machine AND setup.number = minute.setup"
+    " WHERE minute.machine = $1 AND at >= $2::date AND at < $2::date + 1 ORDER BY at";
+constexpr const char* probings_of_night =
+    "SELECT extract(epoch FROM date_trunc('minute', at))::bigint, output, avg(displacement_um)"
+    " FROM fleet.probing WHERE machine = $1 AND at >= $2::date AND at < $2::date + 1 GROUP BY 1, 2";
+
+/// Of PostgreSQL: {a,NULL,"b c"}; our names need no quotes.
+std::vector<std::string> elements(const std::string& array) {
+  std::vector<std::string> all;
+  std::string element;
+  for (const char c : array.substr(1)) {
+    if (c == ',' || c == '}') {
+      all.push_back(element == "NULL" || element == "NaN" ? "" : element);
+      element.clear();
+    } else if (c != '"') {
+      element += c;
+    }
+  }
+  return all;
+}
+
+std::string last_line(const fs::path& file) {
+  std::ifstream in(file);
+  std::string line, last;
+  while (std::getline(in, line))
+    if (!line.empty()) last = line;
+  return printable_text(last);
+}
+
+void write_text(const fs::path& file, const std::string& text) {
+  std::ofstream(file) << text;
+}
+
+std::optional<std::string> series_of(pqxx::connection& store, const MachineNight& night,
+                                     const std::string& kind) {
+  pqxx::read_transaction work(store);
+  const pqxx::result found = work.exec_params(
+      "SELECT content FROM fleet.series WHERE type = $1 AND kind = $2 AND machine = $3"
+      " AND through < $4::date ORDER BY through DESC LIMIT 1",
+      night.type, kind, night.machine, night.night);
+  if (found.empty()) return std::nullopt;
+  return found[0][0].as<std::string>();
+}
+
+struct Verdict {
+  bool departs{false};
+  double probability{1.0};
+  nlohmann::json answer = nullptr;  ///< "departure" of `inspect`
+};
+
+Verdict compared(const WorkFolder& folder, const fs::path& run, const std::string& series) {
+  write_text(folder / "series.toml", series);
+  const int status = run_modelling({"inspect", run.string(), "--series", folder / "series.toml",
+                                    "--json", folder / "answer.json"},
+                                   folder / "log");
+  Verdict verdict;
+  verdict.departs = status == 1;
+  verdict.answer = nlohmann::json::parse(read_text_file(folder / "answer.json"))
+                       .value("departure", nlohmann::json());
+  for (const auto& output : verdict.answer)
+    verdict.probability = std::min(verdict.probability, output.value("probability", 1.0));
+  return verdict;
+}
+
+/// Largest subject of the output that departs: "column_degC, 6.1 um".
+std::string subject_text(const nlohmann::json& answer) {
+  for (const auto& [name, output] : answer.items()) {
+    if (!output.value("departs", false) || output["subjects"].empty()) continue;
+    const auto& first = output["subjects"][0];
+    std::array<char, 160> text{};
+    std::snprintf(text.data(), text.size(), "%s: %s, %.1f um", name.c_str(),
+                  first.value("subject", std::string()).c_str(), first.value("effect_um", 0.0));
+    return text.data();
+  }
+  return "more is left than of its sisters";
+}
+
+/// `diagnose` with the model in use: the week before shows, the night decides.
+nlohmann::json diagnosed(pqxx::connection& store, const MachineNight& night,
+                         const WorkFolder& folder, const fs::path& run) {
+  pqxx::nontransaction work(store);
+  const pqxx::result model = work.exec_params(
+      "SELECT content FROM fleet.document WHERE checksum = (SELECT model FROM fleet.setup WHERE"
+      " machine = $1 ORDER BY number DESC LIMIT 1)",
+      night.machine);
+  if (model.empty()) return nullptr;
+  write_text(folder / "model.toml", model[0][0].as<std::string>());
+  std::vector<std::string> arguments{"diagnose", "--model", folder / "model.toml", "--train"};
+  const pqxx::result days = work.exec_params(
+      "SELECT ($1::date - days)::text FROM generate_series(3, 1, -1) AS days", night.night);
+  work.commit();
+  const std::size_t before = arguments.size();
+  for (const pqxx::row& day : days) {
+    MachineNight earlier = night;
+    earlier.night = day[0].as<std::string>();
+    const fs::path file = folder / (earlier.night + ".csv");
+    if (write_run(store, earlier, file) >= probings_min) arguments.push_back(file.string());
+  }
+  if (arguments.size() == before) return nullptr;
+  for (const std::string& more :
+       {std::string("--test"), run.string(), std::string("--json"), folder / "cause.json"})
+    arguments.push_back(more);
+  run_modelling(arguments, folder / "log");
+  return nlohmann::json::parse(read_text_file(folder / "cause.json"));
+}
+
+constexpr const char* write_result =
+    "INSERT INTO fleet.night_result (machine, night, model, program_version, state, statistics,"
+    " departs, probability, remainder_um, claimed_um, departure, diagnosis, error, took_s)"
+    " SELECT $1, $2::date, coalesce((SELECT model FROM fleet.setup WHERE machine = $1"
+    "   ORDER BY number DESC LIMIT 1), ''), $3, $4, $5, $6::boolean, $7::real,"
+    "   sqrt(avg((displacement_um - modelled_um) ^ 2)), sqrt(avg(claimed_um ^ 2)), $8::jsonb,"
+    "   $9::jsonb, $10, $11::real"
+    " FROM fleet.probing WHERE machine = $1 AND at >= $2::date AND at < $2::date + 1"
+    " ON CONFLICT (machine, night, model, program_version) DO UPDATE SET state = excluded.state,"
+    " statistics = excluded.statistics, departs = excluded.departs, probability ="
+    " excluded.probability, remainder_um = excluded.remainder_um, claimed_um = excluded.claimed_um,"
+    " departure = excluded.departure, diagnosis = excluded.diagnosis, error = excluded.error,"
+    " took_s = excluded.took_s, finished = now()";
+
+struct Result {
+  std::string state{"done"};
+  std::optional<std::string> statistics;
+  std::optional<bool> departs;
+  std::optional<double> probability;
+  nlohmann::json departure = nullptr;
+  nlohmann::json diagnosis = nullptr;
+  std::optional<std::string> error;
+  double took_s{0.0};
+};
+
+void write(pqxx::connection& store, const MachineNight& night, const Result& result) {
+  const auto text = [](const nlohmann::json& json) {
+    return json.is_null() ? std::nullopt : std::optional(json.dump());
+  };
+  const auto pointer = [](const std::optional<std::string>& value) {
+    return value ? value->c_str() : nullptr;
+  };
+  const auto departs =
+      result.departs ? std::optional<std::string>(*result.departs ? "t" : "f") : std::nullopt;
+  const auto probability =
+      result.probability ? std::optional(number_text(*result.probability)) : std::nullopt;
+  const auto departure = text(result.departure);
+  const auto diagnosis = text(result.diagnosis);
+  pqxx::work work(store);
+  work.exec_params0(write_result, night.machine, night.night, THERMOCOMP_VERSION, result.state,
+                    pointer(result.statistics), pointer(departs), pointer(probability),
+                    pointer(departure), pointer(diagnosis), pointer(result.error), result.took_s);
+  work.commit();
+}
+
+}  // namespace
+
+WorkFolder::WorkFolder() {
+  std::string name = (fs::temp_directory_path() / "thermocomp-night-XXXXXX").string();
+  if (mkdtemp(name.data()) == nullptr)
+    throw std::system_error(errno, std::generic_category(), "a temporary folder");
+  path_ = name;
+}
+WorkFolder::~WorkFolder() {
+  std::error_code ignored;
+  fs::remove_all(path_, ignored);
+}
+
+int run_modelling(const std::vector<std::string>& arguments, const fs::path& log) {
+  const std::string program =
+      (fs::read_symlink("/proc/self/exe").parent_path() / "thermocomp-modelling").string();
+  std::vector<char*> words{const_cast<char*>(program.c_str())};
+  for (const std::string& argument : arguments)
+    words.push_back(const_cast<char*>(argument.c_str()));
+  words.push_back(nullptr);
+  posix_spawn_file_actions_t files;
+  posix_spawn_file_actions_init(&files);
+  posix_spawn_file_actions_addopen(&files, 0, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_addopen(&files, 1, log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
+  posix_spawn_file_actions_adddup2(&files, 1, 2);
+  pid_t child = 0;
+  const int failed = posix_spawn(&child, program.c_str(), &files, nullptr, words.data(), environ);
+  posix_spawn_file_actions_destroy(&files);
+  if (failed != 0) throw std::system_error(failed, std::generic_category(), program);
+  int status = 0;
+  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  if (!WIFEXITED(status) || WEXITSTATUS(status) > 1)
+    throw std::runtime_error(std::string(arguments.front()).append(": ").append(last_line(log)));
+  return WEXITSTATUS(status);
+}
+
+int write_run(pqxx::connection& store, const MachineNight& night, const fs::path& file) {
+  pqxx::nontransaction work(store);
+  std::map<std::int64_t, std::map<std::string, std::string>> rows;
+  std::vector<std::string> columns;
+  std::vector<std::string> outputs;
+  const auto note = [](std::vector<std::string>& names, const std::string& name) {
+    if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+  };
+  for (const pqxx::row& row : work.exec_params(minutes_of_night, night.machine, night.night)) {
+    const std::vector<std::string> names = elements(row[0].as<std::string>());
+    const std::vector<std::string> values = elements(row[2].as<std::string>());
+    for (std::size_t i = 0; i < std::min(names.size(), values.size()); ++i) {
+      if (!is_column_of_run(names[i])) continue;
+      note(columns, names[i]);
+      rows[row[1].as<std::int64_t>()][names[i]] = values[i];
+    }
+  }
+  for (const pqxx::row& row : work.exec_params(probings_of_night, night.machine, night.night)) {
+    const auto output = row[1].as<std::string>();
+    note(outputs, output);
+    // A minute without a sample has no temperatures beside which it could count.
+    if (const auto found = rows.find(row[0].as<std::int64_t>()); found != rows.end())
+      found->second[output] = row[2].as<std::string>();
+  }
+  columns.insert(columns.end(), outputs.begin(), outputs.end());
+  std::ofstream out(file);
+  out << "time_s";
+  for (const std::string& column : columns) out << ',' << column;
+  out << '\n';
+  int probed = 0;
+  for (auto& [at_s, values] : rows) {
+    out << at_s - rows.begin()->first;
+    for (const std::string& column : columns) out << ',' << values[column];
+    out << '\n';
+    probed +=
+        !outputs.empty() && std::all_of(outputs.begin(), outputs.end(),
+                                        [&](const auto& name) { return !values[name].empty(); });
+  }
+  if (!out.flush()) throw std::runtime_error(file.string() + ": could not be written");
+  return probed;
+}
+
+std::string work_off(pqxx::connection& store, const MachineNight& night) {
+  const auto began = std::chrono::steady_clock::now();
+  const WorkFolder folder;
+  {
+    pqxx::work work(store);
+    work.exec_params("SELECT fleet.make_minutes($1, $2::date)", night.machine, night.night);
+    work.commit();
+  }
+  Result result;
+  std::string told = "no series yet";
+  const fs::path run = folder / (night.night + ".csv");
+  if (write_run(store, night, run) < probings_min) {
+    result.state = "empty";
+    told = "hardly anything was probed";
+  } else {
+    run_modelling(
+        {"series", "--machine", night.name, run.string(), "-o", folder / "statistics.toml"},
+        folder / "log");
+    result.statistics = read_text_file(folder / "statistics.toml");
+    result.departure = nlohmann::json::object();
+    for (const std::string kind : {"sisters", "own_past"}) {
+      const std::optional<std::string> series = series_of(store, night, kind);
+      if (!series) continue;
+      const Verdict verdict = compared(folder, run, *series);
+      result.departure[kind] = verdict.answer;
+      result.probability = std::min(result.probability.value_or(1.0), verdict.probability);
+      if (verdict.departs)
+        told = std::string("DEPARTS from its ") + (kind == "sisters" ? kind : "own past") + ", " +
+               subject_text(verdict.answer);
+      else if (!result.departs.value_or(false))
+        told = "as usual";
+      result.departs = result.departs.value_or(false) || verdict.departs;
+    }
+    if (result.departs.value_or(false)) result.diagnosis = diagnosed(store, night, folder, run);
+  }
+  result.took_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+  write(store, night, result);
+  return told;
+}
+
+void note_failure(pqxx::connection& store, const MachineNight& night, const std::string& why) {
+  Result result;
+  result.state = "failed";
+  result.error = why;
+  write(store, night, result);
+}
+
+void make_series(pqxx::connection& store, const std::string& type, const std::string& night) {
+  pqxx::nontransaction work(store);
+  const bool is_there = !work.exec_params(
+                                 "SELECT FROM fleet.series WHERE type = $1 AND kind = 'type' AND "
+                                 "through < $2::date AND"
+                                 " through >= $2::date - $3::int",
+                                 type, night, nights_of_series)
+                             .empty();
+  const pqxx::result machines = work.exec_params(
+      "SELECT id, name, EXISTS (SELECT FROM fleet.series WHERE machine = machine.id AND kind ="
+      " 'own_past') AS has_past FROM fleet.machine WHERE type = $1 ORDER BY name",
+      type);
+  const pqxx::result days = work.exec_params(
+      "SELECT ($1::date - days)::text FROM generate_series($2::int, 1, -1) AS days", night,
+      nights_of_series);
+  work.commit();
+  if (is_there) return;
+  const WorkFolder folder;
+  struct Ready {
+    int machine{0};
+    bool has_past{false};
+    std::vector<std::string> runs;
+    std::string statistics;
+  };
+  std::vector<Ready> ready;
+  for (const pqxx::row& machine : machines) {
+    MachineNight each{machine[0].as<int>(), machine[1].as<std::string>(), type, ""};
+    Ready of_machine{each.machine, machine[2].as<bool>(), {}, folder / (each.name + ".toml")};
+    for (const pqxx::row& day : days) {
+      each.night = day[0].as<std::string>();
+      const fs::path file = folder / (each.name + "_" + each.night + ".csv");
+      if (write_run(store, each, file) >= probings_min) of_machine.runs.push_back(file);
+    }
+    if (of_machine.runs.size() < nights_of_series) continue;
+    std::vector<std::string> arguments{"series", "--machine", each.name, "-o",
+                                       of_machine.statistics};
+    arguments.insert(arguments.end(), of_machine.runs.begin(), of_machine.runs.end());
+    run_modelling(arguments, folder / "log");
+    ready.push_back(std::move(of_machine));
+  }
+  const auto keep = [&](const char* kind, const Ready* machine, std::size_t count,
+                        const std::vector<std::string>& arguments) {
+    run_modelling(arguments, folder / "log");
+    const std::string id = machine != nullptr ? std::to_string(machine->machine) : "";
+    pqxx::work keeping(store);
+    keeping.exec_params0(
+        "INSERT INTO fleet.series (type, kind, machine, through, machines, program_version, "
+        "content)"
+        " VALUES ($1, $2, nullif($3, '')::int, $4::date - 1, $5, $6, $7) ON CONFLICT DO NOTHING",
+        type, kind, id, night, count, THERMOCOMP_VERSION, read_text_file(folder / "series.toml"));
+    keeping.commit();
+  };
+  /// Of some machines, but one.
+  const auto series_without = [&](const Ready* left_out) {
+    std::vector<std::string> arguments{"series", "-o", folder / "series.toml"};
+    for (const Ready& each : ready)
+      if (&each != left_out && arguments.size() < sisters_max) arguments.push_back(each.statistics);
+    return arguments;
+  };
+  if (std::ssize(ready) <= machines_min) return;
+  for (const Ready& each : ready) {
+    const std::vector<std::string> sisters = series_without(&each);
+    keep("sisters", &each, sisters.size() - 3, sisters);
+    if (each.has_past) continue;
+    fs::rename(folder / "series.toml", folder / "sisters.toml");
+    std::vector<std::string> past{
+        "series", "--machine",           "its past", "--prior", folder / "sisters.toml",
+        "-o",     folder / "series.toml"};
+    past.insert(past.end(), each.runs.begin(), each.runs.end());
+    keep("own_past", &each, 1, past);
+  }
+  // Last: with it the week's series are complete.
+  keep("type", nullptr, ready.size(), series_without(nullptr));
+}
+
+}  // namespace thermocomp::fleet
