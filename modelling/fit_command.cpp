@@ -14,6 +14,7 @@
 #include "config/text/units.hpp"
 #include "modelling/identification/equation/fit.hpp"
 #include "modelling/identification/families/families.hpp"
+#include "modelling/inspection/inspection.hpp"
 #include "modelling/series/series.hpp"
 #include "report/output_file.hpp"
 #include "report/run_loader.hpp"
@@ -166,7 +167,9 @@ int run(const Options& options) {
   fit_options.threshold = options.threshold;
   fit_options.lags = options.lags;
   fit_options.sensor_error_K = options.sensor_error_K;
-  const std::vector<RunFile> runs = cli::RunLoader(options.columns).load(options.runs);
+  const auto [runs, steps] = inspection::without_steps(
+      cli::RunLoader(options.columns).load(options.runs), options.tests.outputs);
+  for (const std::string& note : steps) std::fprintf(stderr, "%s\n", note.c_str());
   if (!options.prior.empty()) return run_prior(options, runs);
   TestOptions test_options = options.tests;
   const bool few = options.few_asked_for() && options.family.empty();

@@ -28,6 +28,7 @@ constexpr Index rows_min = 40;  // of a run; fewer show no colour
 constexpr double step_K_min = 0.5;
 constexpr double drift_K_min = 1.0;
 constexpr double step_um_min = 1.0;
+constexpr double step_share_min = 0.3;  ///< of what wanders; where all of it is less than 1 um
 constexpr double moved_K_min = 1.0;     // below that a reading's gain cannot be seen
 constexpr double normal_maximum = 2.6;  // of |z| among a window's rows, where z is normal
 constexpr Index windows = 24;
@@ -141,8 +142,8 @@ double wildness(const std::vector<Expectation::Evidence>& steps) {
 
 class ChangeSearch {
  public:
-  explicit ChangeSearch(Recording recording) : recording_(std::move(recording)) {
-    for (std::size_t i = 0; i < recording_.temps.size(); ++i)
+  ChangeSearch(Recording recording, Looked looked) : recording_(std::move(recording)) {
+    for (std::size_t i = 0; looked == Looked::all && i < recording_.temps.size(); ++i)
       targets_.push_back({recording_.temps[i], false, static_cast<Index>(i)});
     for (std::size_t i = 0; i < recording_.outputs.size(); ++i)
       targets_.push_back({recording_.outputs[i], true, static_cast<Index>(i)});
@@ -268,9 +269,9 @@ class ChangeSearch {
     constexpr double times_usual = 3.0;
     const Index rows = judged.begins[run + 1] - judged.begins[run];
     const auto value = [&](Index i) {
-      const Index at = judged.rows[static_cast<std::size_t>(judged.begins[run] + i)];
-      return target.output ? recording_.outputs_um(at, target.column)
-                           : recording_.temps_K(at, target.column);
+      if (target.output) return judged.expectation.remainder()[judged.begins[run] + i];
+      return recording_.temps_K(judged.rows[static_cast<std::size_t>(judged.begins[run] + i)],
+                                target.column);
     };
     const auto change = [&](Index i) {
       return i < 1 || i > rows - 2 ? 0.0 : value(i + 1) - value(i - 1);
@@ -289,7 +290,10 @@ class ChangeSearch {
   void look_for_step(const Judged& judged, const Target& target, std::size_t run) {
     const auto steps = judged.expectation.steps(run);
     const double wild = wildness(steps);
-    const double least = target.output ? step_um_min : step_K_min;
+    const double least =
+        target.output
+            ? std::min(step_um_min, step_share_min * spread(judged.expectation.remainder()))
+            : step_K_min;
     std::vector<std::size_t> order;
     for (std::size_t i = 4; i + 4 < steps.size(); ++i)
       if (std::abs(steps[i].size) >= least && std::abs(steps[i].z) > 4.0) order.push_back(i);
@@ -400,10 +404,10 @@ class ChangeSearch {
 
 }  // namespace
 
-void check_changes(Recording recording, Suspicions& found,
+void check_changes(Recording recording, Looked looked, Suspicions& found,
                    const std::function<void(double)>& progress) {
   if (recording.temps.empty() && recording.outputs.empty()) return;
-  ChangeSearch(std::move(recording)).search(found, progress);
+  ChangeSearch(std::move(recording), looked).search(found, progress);
 }
 
 void check_exchanged(const Recording& recording, Suspicions& found) {

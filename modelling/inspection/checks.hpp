@@ -32,7 +32,8 @@ void check_values(const std::vector<RunFile>& runs, Suspicions& found);
 /// Each reading against its expectation from the others: steps, creep, loosening of temperatures;
 /// steps of displacements. What is found is taken out of `recording`, and what is left is looked at
 /// again, so that one sensor's fault is not blamed on its neighbours.
-void check_changes(Recording recording, Suspicions& found,
+enum class Looked { all, displacements };
+void check_changes(Recording recording, Looked looked, Suspicions& found,
                    const std::function<void(double)>& progress);
 /// Pairs of readings that agree with the other runs only when they are exchanged.
 void check_exchanged(const Recording& recording, Suspicions& found);

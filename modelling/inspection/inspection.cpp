@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string_view>
 
+#include "config/text/units.hpp"
 #include "modelling/inspection/checks.hpp"
 
 namespace thermocomp::inspection {
@@ -46,7 +47,43 @@ RunFile of_machine(RunFile run) {
   return run;
 }
 
+/// Displacements only of `outputs`, no row behind the selection.
+RunFile selected_part(RunFile run, const std::vector<std::string>& outputs) {
+  for (std::size_t i = run.columns.size(); i-- > 0;) {
+    run.values[i].resize(run.selected_end);
+    if (!is_output(run.columns[i]) ||
+        std::find(outputs.begin(), outputs.end(), run.columns[i]) != outputs.end())
+      continue;
+    run.columns.erase(run.columns.begin() + static_cast<std::ptrdiff_t>(i));
+    run.values.erase(run.values.begin() + static_cast<std::ptrdiff_t>(i));
+  }
+  return run;
+}
+
+Eigen::Index rows_max(std::size_t runs) {
+  return std::min(
+      rows_of_a_run_max,
+      std::max<Eigen::Index>(100, rows_of_all_runs_max / static_cast<Eigen::Index>(runs)));
+}
+
 }  // namespace
+
+Cleaned without_steps(const std::vector<RunFile>& runs, const std::vector<std::string>& outputs,
+                      double probability_min) {
+  std::vector<RunFile> calm;
+  Suspicions spikes;
+  Suspicions steps;
+  for (const RunFile& run : runs)
+    check_spikes(calm.emplace_back(selected_part(run, outputs)), calm.size() - 1, spikes);
+  check_changes(make_recording(calm, rows_max(runs.size())), Looked::displacements, steps, {});
+  Inspection inspection;
+  for (Suspicion& each : steps) {
+    each.finding.probability = probability_of(each.finding.kind, each.score);
+    describe(each.finding, runs);
+    inspection.findings.push_back(std::move(each.finding));
+  }
+  return cleaned(runs, inspection, probability_min);
+}
 
 Inspection inspect(const std::vector<RunFile>& given, double told_min,
                    const std::function<void(double)>& progress) {
@@ -64,14 +101,11 @@ Inspection inspect(const std::vector<RunFile>& given, double told_min,
   check_values(runs, suspicions);
   for (const Suspicion& each : suspicions)
     if (each.finding.kind == "stuck") bridge(calm[each.finding.run], each.finding);
-  Recording recording = make_recording(
-      calm, std::min(rows_of_a_run_max,
-                     std::max<Eigen::Index>(
-                         100, rows_of_all_runs_max / static_cast<Eigen::Index>(runs.size()))));
+  Recording recording = make_recording(calm, rows_max(runs.size()));
   inspection.groups = groups_of(recording);
   judge_excitation(recording, inspection);
   check_exchanged(recording, suspicions);
-  check_changes(std::move(recording), suspicions, progress);
+  check_changes(std::move(recording), Looked::all, suspicions, progress);
   for (Suspicion& each : suspicions) {
     each.finding.score = each.score;
     each.finding.probability = probability_of(each.finding.kind, each.score);

@@ -30,6 +30,12 @@ struct Cleaned {
 [[nodiscard]] Cleaned cleaned(const std::vector<RunFile>& runs, const Inspection& inspection,
                               double probability_min = 0.9);
 
+/// Takes steps of these displacements out (a probe that was hit, another datum) and nothing else,
+/// before something is fitted to them. Rows behind a run's selection are not looked at.
+[[nodiscard]] Cleaned without_steps(const std::vector<RunFile>& runs,
+                                    const std::vector<std::string>& outputs,
+                                    double probability_min = 0.8);
+
 /// "10 s", "3.71 h": the time between two rows.
 [[nodiscard]] std::string step_text(double step_s);
 /// @param departure  a JSON value, or empty

@@ -97,6 +97,28 @@ TEST_CASE("a reading that jumps is named with its time and size, and its neighbo
         Approx(run.column("t3_degC")[500] - 2.0).margin(0.1));
 }
 
+TEST_CASE(
+    "a step of a displacement is taken out before a fit, large or below 1 um, and nothing else",
+    "[inspection]") {
+  const double size_um = GENERATE(40.0, 0.5);
+  RunFile run = recording();
+  if (size_um < 1.0)
+    for (double& each : column(run, "z_um")) each *= 0.01;
+  CHECK(without_steps({run}, {"z_um"}).notes.empty());
+  const RunFile still = run;
+  for (std::size_t row = 300; row < rows; ++row) column(run, "z_um")[row] += size_um;
+  for (std::size_t row = 400; row < rows; ++row) column(run, "t3_degC")[row] += 2.0;
+  const Cleaned clean = without_steps({run}, {"z_um"});
+  REQUIRE(clean.notes.size() == 1);
+  CHECK_THAT(clean.notes.front(), Catch::Contains("z_um jumps") && Catch::Contains("taken out"));
+  CHECK(clean.runs.front().column("z_um")[500] ==
+        Approx(still.column("z_um")[500]).margin(0.1 * size_um));
+  CHECK(clean.runs.front().column("t3_degC") == run.column("t3_degC"));
+  CHECK(without_steps({run}, {}).notes.empty());
+  run.selected_end = 300;  // what is behind the selection is not looked at
+  CHECK(without_steps({run}, {"z_um"}).notes.empty());
+}
+
 TEST_CASE("a heater that is switched on and off is a ramp, no step of a sensor", "[inspection]") {
   // No signal says when: the bed warms by 4 K in a row for six rows, holds, and cools.
   for (unsigned seed = 1; seed <= 3; ++seed) {
