@@ -1,0 +1,18 @@
+#include "fleet/page/command_line.hpp"
+
+#include <CLI/CLI.hpp>
+
+namespace thermocomp::fleet {
+
+void declare_page_command_line(CLI::App& app, std::string& file) {
+  app.name("thermocomp-fleet-page");
+  app.description("The machines of a store as a page, for phone and desktop");
+  app.set_version_flag("--version", THERMOCOMP_VERSION);
+  file = "/etc/thermocomp/fleet_page.toml";
+  app.add_option("CONFIG", file, "the configuration (TOML)")
+      ->type_name("FILE")
+      ->capture_default_str();
+  app.footer("Exit status: 0 stopped as asked, 2 bad use, configuration, or a port that is taken.");
+}
+
+}  // namespace thermocomp::fleet

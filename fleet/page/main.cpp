@@ -1,0 +1,180 @@
+// thermocomp-fleet-page: the store of a series of machines, for browsers.
+#include <charconv>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <ctime>
+#include <exception>
+#include <optional>
+#include <pqxx/pqxx>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+#include <systemd/sd-daemon.h>
+
+#include "config/text/clean_output.hpp"
+#include "config/text/problems.hpp"
+#include "config/toml/toml_reader.hpp"
+#include "fleet/page/command_line.hpp"
+#include "fleet/store/store.hpp"
+#include "gateway/door/http_door.hpp"
+
+namespace thermocomp::fleet {
+namespace {
+
+using gateway::AnswerThread;
+using gateway::error_text;
+using gateway::HttpExchange;
+using gateway::json_type;
+using gateway::JsonAnswer;
+
+struct PageSettings {
+  std::string store;  ///< connection
+  gateway::HttpSettings http;
+};
+
+PageSettings load_settings(const std::filesystem::path& file) {
+  const TomlDocument document = TomlDocument::from_file(file);
+  const TomlTable root = document.root();
+  PageSettings settings;
+  static_cast<void>(root.integer("format", 1, 1));
+  settings.store = root.text("store", "dbname=thermocomp_fleet");
+  settings.http = gateway::read_http(root.table_or_empty("http"), file.parent_path());
+  document.finish();
+  return settings;
+}
+
+/// Asks the store on a thread of its own, over a connection of its own that changes nothing.
+class Asker {
+ public:
+  explicit Asker(std::string conninfo) : conninfo_(std::move(conninfo)) {}
+
+  /// @param call  a function of the schema, with $1, $2, ... where `values` go
+  void ask(HttpExchange& exchange, const char* call, std::vector<std::string> values) {
+    exchange.later(thread_, [this, call, values = std::move(values)] {
+      return answer(std::string("SELECT ").append(call), values);
+    });
+  }
+
+ private:
+  JsonAnswer answer(const std::string& sql, const std::vector<std::string>& values) noexcept {
+    try {
+      if (!store_) {
+        store_.emplace(complete_conninfo(conninfo_));
+        pqxx::nontransaction(*store_).exec0(
+            "SET default_transaction_read_only = on; SET statement_timeout = '20s'");
+      }
+      pqxx::nontransaction work(*store_);
+      const pqxx::row row = work.exec_params1(sql, pqxx::prepare::make_dynamic_params(values));
+      if (row[0].is_null()) return {404, error_text("there is no such machine")};
+      return {200, row[0].as<std::string>()};
+    } catch (const std::exception& error) {
+      spdlog::warn("not answered: {}", error.what());
+      store_.reset();
+      return {503, error_text("the store does not answer")};
+    }
+  }
+
+  std::string conninfo_;
+  std::optional<pqxx::connection> store_;  ///< the thread's
+  AnswerThread thread_;
+};
+
+std::optional<double> number_in(const HttpExchange& exchange, const char* name) {
+  const std::string_view text = exchange.argument(name);
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value))
+    return std::nullopt;
+  return value;
+}
+
+class Page {
+ public:
+  explicit Page(const PageSettings& settings)
+      : tables_(settings.store),
+        curves_(settings.store),
+        files_(gateway::page_folder("fleet/page"), {}, {}),
+        door_(settings.http, files_, [this](HttpExchange& exchange) { serve(exchange); }) {}
+
+  [[nodiscard]] std::uint16_t port() const { return door_.port(); }
+  void tick() { door_.end_slow_connections(); }
+
+ private:
+  void serve(HttpExchange& exchange) {
+    const std::string_view path = exchange.path();
+    if (exchange.is_post()) return exchange.answer(405, json_type, error_text("only GET"));
+    if (path == "/api/machines") return tables_.ask(exchange, "fleet.page_machines()", {});
+    if (path == "/api/machine")
+      return tables_.ask(exchange, "fleet.page_machine($1)",
+                         {std::string(exchange.argument("name"))});
+    if (path == "/api/curves") return ask_curves(exchange);
+    exchange.answer(404, json_type, error_text("there is no such page"));
+  }
+
+  /// `seconds` up to now, at most a year.
+  void ask_curves(HttpExchange& exchange) {
+    const std::optional<double> seconds = number_in(exchange, "seconds");
+    constexpr double seconds_max = 366.0 * 86400.0;
+    if (!seconds || !(*seconds >= 60.0 && *seconds <= seconds_max))
+      return exchange.answer(400, json_type,
+                             error_text("seconds must be a number in [60, 31622400]"));
+    const auto now_s = static_cast<double>(std::time(nullptr));
+    curves_.ask(exchange, "fleet.page_curves($1, $2, $3::float8, $4::float8, 400)",
+                {std::string(exchange.argument("name")), std::string(exchange.argument("column")),
+                 std::to_string(now_s - *seconds), std::to_string(now_s)});
+  }
+
+  Asker tables_;
+  Asker curves_;  ///< of its own: nobody's curves are in the way of the table
+  gateway::PageFiles files_;
+  gateway::HttpDoor door_;  ///< last: what its handler uses is there
+};
+
+/// Until a signal ends it.
+void run(const PageSettings& settings) {
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGTERM);
+  sigaddset(&signals, SIGINT);
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  std::signal(SIGPIPE, SIG_IGN);
+  spdlog::set_default_logger(spdlog::stderr_color_mt("thermocomp-fleet-page"));
+  Page page(settings);
+  std::printf("{\"ready\":true,\"http\":%u}\n", static_cast<unsigned>(page.port()));
+  std::fflush(stdout);
+  sd_notify(0, "READY=1");
+  const timespec second{1, 0};
+  while (sigtimedwait(&signals, nullptr, &second) < 0) {
+    page.tick();
+    sd_notify(0, "WATCHDOG=1");
+  }
+}
+
+}  // namespace
+}  // namespace thermocomp::fleet
+
+int main(int argc, char** argv) {
+  thermocomp::clean_standard_output();
+  CLI::App app;
+  std::string file;
+  thermocomp::fleet::declare_page_command_line(app, file);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  try {
+    thermocomp::fleet::run(thermocomp::fleet::load_settings(file));
+    return 0;
+  } catch (const thermocomp::ConfigurationError& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "thermocomp-fleet-page: %s\n", error.what());
+  }
+  return 2;
+}
