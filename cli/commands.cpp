@@ -106,6 +106,7 @@ void declare_command_line(CLI::App& app, GlobalOptions& global, Action& action) 
   add_observe_commands(app, global, action);
   add_operate_commands(app, global, action);
   app.fallthrough(false);
+  add_admit_command(app, action);
   add_history_commands(app, action);
   add_report_command(app, action);
   add_import_command(app, action);

@@ -23,6 +23,8 @@ void add_observe_commands(CLI::App& app, const GlobalOptions& global, Action& ac
 /// reference, enable, disable, measured, cycle-end, reload, prove, promote: what an operator (or
 /// the CNC's program) asks of the running daemon.
 void add_operate_commands(CLI::App& app, const GlobalOptions& global, Action& action);
+/// admit: models that the office offers.
+void add_admit_command(CLI::App& app, Action& action);
 /// export, replay: what the daemon's history holds, and whether it can be reproduced.
 void add_history_commands(CLI::App& app, Action& action);
 /// report: a machine's week from its history, as a page.

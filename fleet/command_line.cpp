@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 
 #include "fleet/night/night_command.hpp"
+#include "fleet/release/release_commands.hpp"
 #include "fleet/store/store_commands.hpp"
 #include "report/command.hpp"
 
@@ -25,6 +26,7 @@ void declare_fleet_command_line(CLI::App& app, std::string& store, cli::Action& 
       ->capture_default_str();
   add_store_commands(app, store, action);
   add_night_command(app, store, action);
+  add_release_commands(app, store, action);
 }
 
 }  // namespace thermocomp::fleet

@@ -12,8 +12,7 @@
 #include "cli/common/daemon_client.hpp"
 #include "cli/common/json_fields.hpp"
 #include "cli/operate/axis_commands.hpp"
-#include "config/toml/toml_reader.hpp"
-#include "report/output_file.hpp"
+#include "cli/operate/promotion.hpp"
 #include "status/figures.hpp"
 
 namespace thermocomp::cli {
@@ -172,56 +171,22 @@ void add_measured_command(CLI::App& app, const GlobalOptions& global, Action& ac
   });
 }
 
-std::string text_of_model(const fs::path& path) {
-  return read_text_file(path, model_bytes_max);
-}
-
-/// @return the candidate's file. @throws Failure: none runs
-fs::path candidate_in(const json& status) {
-  if (!status.contains("candidate"))
-    throw Failure(
-        "no candidate runs beside the model: thermocomp candidate FILE, or [model] candidate in "
-        "the configuration and thermocomp reload");
-  const json& candidate = status["candidate"];
-  const std::string problem = text_of(candidate, "problem");
-  if (!problem.empty()) throw Failure("the candidate does not run: " + problem);
-  return text_of(candidate, "file");
-}
-
 int run_promote(const GlobalOptions& global, bool back) {
-  const json status = ask_daemon(global.socket, "status", json::object());
-  const fs::path model = text_of(status["model"], "file");
-  const fs::path before = model.string() + ".before";
-  if (back && !fs::exists(before)) throw Failure(before.string() + ": nothing was promoted");
-  const std::string next = text_of_model(back ? before : candidate_in(status));
-  const std::string now = text_of_model(model);
-  // In this order the model that was in use first is in one of the files at any moment.
-  if (!back) cli::write_file(before, now);
-  cli::write_file(model, next);
-  try {
-    static_cast<void>(ask_daemon(global.socket, "reload", json::object()));
-  } catch (...) {
-    cli::write_file(model, now);
-    throw;
-  }
-  if (back) cli::write_file(before, now);
-  std::cout << model.string() << (back ? ": the model before runs again" : ": the candidate runs")
-            << "; the other is kept as " << before.string()
+  const Promotion done = back ? take_back(global.socket) : promote(global.socket);
+  std::cout << done.model << (back ? ": the model before runs again" : ": the candidate runs")
+            << "; the other is kept as " << done.before
             << ", and thermocomp promote --back exchanges them\n";
   return exit_success;
 }
 
 int run_candidate(const GlobalOptions& global, const std::string& file) {
   const bool is_none = file == "none";
-  static_cast<void>(ask_daemon(global.socket, "candidate",
-                               {{"file", is_none ? "" : fs::absolute(file).string()}}));
+  run_beside(global.socket, is_none ? fs::path() : fs::absolute(file));
   if (is_none) {
     std::cout << "no candidate runs beside the model\n";
     return exit_success;
   }
-  const json status = ask_daemon(global.socket, "status", json::object());
-  if (!status.contains("candidate")) throw Failure(file + ": is the model in use itself");
-  std::cout << candidate_in(status).string()
+  std::cout << fs::absolute(file).string()
             << ": runs beside the model, and thermocomp status says how it does. To keep it over a "
                "restart: [model] candidate in the configuration\n";
   return exit_success;

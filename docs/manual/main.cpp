@@ -20,6 +20,7 @@
 #endif
 #ifdef THERMOCOMP_WITH_FLEET
 #include "fleet/command_line.hpp"
+#include "fleet/page/command_line.hpp"
 #include "fleet/uplink/command_line.hpp"
 #endif
 #ifdef THERMOCOMP_WITH_MODELLING
@@ -138,6 +139,20 @@ void write_gateway(const fs::path& examples, const fs::path& folder) {
 #endif
 
 #ifdef THERMOCOMP_WITH_FLEET
+void write_fleet_format(const fs::path& examples, const fs::path& folder, const std::string& name,
+                        const std::string& program, const std::string& see) {
+  FormatPage page;
+  page.name = name;
+  page.what = "configuration of " + program;
+  page.text =
+      "The file is TOML, and is read strictly.\n"
+      "\n"
+      "The commented example below is the reference; every key is shown with its default.\n";
+  page.examples = {{"THE CONFIGURATION", content(examples / name)}};
+  page.see_also = {see};
+  write(folder / (name + ".5"), format_page(page));
+}
+
 void write_fleet(const fs::path& examples, const fs::path& folder) {
   CLI::App fleet_app;
   std::string store;
@@ -156,16 +171,19 @@ void write_fleet(const fs::path& examples, const fs::path& folder) {
       {options.config_file, "the configuration; the service does not start without it"}};
   extras.see_also = {"uplink.toml(5)", "thermocomp-fleet(1)", "thermocompd(8)"};
   write_program(folder, uplink_app, extras);
-  FormatPage page;
-  page.name = "uplink.toml";
-  page.what = "configuration of thermocomp-uplink";
-  page.text =
-      "The file is TOML, and is read strictly.\n"
-      "\n"
-      "The commented example below is the reference; every key is shown with its default.\n";
-  page.examples = {{"THE CONFIGURATION", content(examples / "uplink.toml")}};
-  page.see_also = {"thermocomp-uplink(1)"};
-  write(folder / "uplink.toml.5", format_page(page));
+
+  CLI::App page_app;
+  std::string page_file;
+  fleet::declare_page_command_line(page_app, page_file);
+  extras = {};
+  extras.files = {{page_file, "the configuration; the service does not start without it"}};
+  extras.see_also = {"fleet_page.toml(5)", "thermocomp-fleet(1)"};
+  write_program(folder, page_app, extras);
+
+  write_fleet_format(examples, folder, "uplink.toml", "thermocomp-uplink", "thermocomp-uplink(1)");
+  write_fleet_format(examples, folder, "releases.toml", "thermocomp admit", "thermocomp(1)");
+  write_fleet_format(examples, folder, "fleet_page.toml", "thermocomp-fleet-page",
+                     "thermocomp-fleet-page(1)");
 }
 #endif
 

@@ -54,7 +54,21 @@ bool Uplink::send_new() {
   }
   bool is_new = false;
   for (Source& source : sources_) is_new |= send_new(source);
+  exchange();
   return is_new;
+}
+
+/// What is wrong with a release stops nothing else.
+void Uplink::exchange() {
+  try {
+    exchange_releases(*store_, settings_.releases);
+    told_.clear();
+  } catch (const pqxx::broken_connection&) {
+    throw;
+  } catch (const std::exception& error) {
+    if (told_ != error.what()) spdlog::warn("releases: {}", error.what());
+    told_ = error.what();
+  }
 }
 
 bool Uplink::send_new(Source& source) {

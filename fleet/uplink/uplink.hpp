@@ -58,11 +58,13 @@ class Uplink {
   };
   bool send_new(Source& source);
   bool send_events(Source& source);
+  void exchange();
 
   const UplinkSettings& settings_;
   Pace& pace_;
   std::optional<pqxx::connection> store_;
   std::vector<Source> sources_;
+  std::string told_;  ///< of releases, wrong since
 };
 
 }  // namespace thermocomp::fleet

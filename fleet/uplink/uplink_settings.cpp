@@ -39,6 +39,8 @@ UplinkSettings load_uplink_settings(const fs::path& file) {
   settings.period_s = root.number("period_s", Range::between(1, 3600), settings.period_s);
   settings.cpu_percent_max =
       root.number("cpu_percent_max", Range::between(0.1, 100), settings.cpu_percent_max);
+  settings.releases = {path(root.text("offer", "/var/lib/thermocomp-uplink/offer.json")),
+                       path(root.text("steps", "/var/lib/thermocomp-admit/steps.json"))};
   document.finish();
   return settings;
 }

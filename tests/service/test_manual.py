@@ -13,13 +13,16 @@ import pytest
 BIN = pathlib.Path(os.environ["THERMOCOMP_BIN"])
 MANUAL = pathlib.Path(os.environ["THERMOCOMP_MANUAL"])
 PAGES = ["thermocomp.1", "thermocompd.8", "thermocomp-sim.1", "thermocomp-modelling.1",
-         "thermocomp-gateway.1", "thermocomp-fleet.1", "thermocomp-uplink.1", "thermocompd.toml.5",
-         "gateway.toml.5", "uplink.toml.5", "thermocomp-run.5"]
+         "thermocomp-gateway.1", "thermocomp-fleet.1",
+         "thermocomp-fleet-page.1", "thermocomp-uplink.1", "thermocompd.toml.5",
+         "gateway.toml.5", "uplink.toml.5",
+         "releases.toml.5", "fleet_page.toml.5", "thermocomp-run.5"]
 PROGRAMS = {"thermocomp": "thermocomp.1", "thermocompd": "thermocompd.8",
             "thermocomp-sim": "thermocomp-sim.1",
             "thermocomp-modelling": "thermocomp-modelling.1",
             "thermocomp-gateway": "thermocomp-gateway.1",
-            "thermocomp-fleet": "thermocomp-fleet.1", "thermocomp-uplink": "thermocomp-uplink.1"}
+            "thermocomp-fleet": "thermocomp-fleet.1",
+            "thermocomp-fleet-page": "thermocomp-fleet-page.1", "thermocomp-uplink": "thermocomp-uplink.1"}
 # Carried out by a program of its own, which has the help.
 MODELLING = {"structure", "place", "tiebar", "plan", "series", "group", "fit", "diagnose", "inspect"}
 
