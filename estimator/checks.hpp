@@ -24,6 +24,34 @@ class InvalidValue : public std::invalid_argument {
 /// @throws InvalidValue unless `holds`
 void require(bool holds, const char* key, double value, const char* rule);
 
+/// A number of the configuration in one place: its key, its member and its range. The reader of the
+/// file, the check and the message come from there.
+template <class Config>
+struct NumberKey {
+  const char* key;
+  double Config::*member;
+  double min;
+  double max;
+  bool min_excluded{false};
+
+  /// (min, max]
+  static constexpr NumberKey above(const char* key, double Config::*member, double min,
+                                   double max) {
+    return {key, member, min, max, true};
+  }
+};
+
+/// @throws InvalidValue unless `value` is in [min, max], or in (min, max]; its rule is "must be in
+///         (0, 1e6]"
+void require_in(double value, const char* key, double min, double max, bool min_excluded);
+
+/// @throws InvalidValue at the first of Config::numbers() that is not in its range
+template <class Config>
+void require_numbers(const Config& config) {
+  for (const NumberKey<Config>& each : Config::numbers())
+    require_in(config.*each.member, each.key, each.min, each.max, each.min_excluded);
+}
+
 [[noreturn]] void abort_with(const char* expression, const char* file, int line) noexcept;
 
 }  // namespace thermocomp

@@ -1,9 +1,12 @@
 /// How measured displacements correct the model while it runs.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <string>
 #include <vector>
+
+#include "estimator/checks.hpp"
 
 namespace thermocomp {
 
@@ -42,7 +45,25 @@ struct CorrectionConfig {
   double bias_drift_um_per_sqrt_h{0.0};  ///< 0: no bias is learned
   double outlier_sigma{4.0};
   double probe_sd_um{3.0};  ///< beyond, a new probing is worth it
-  void validate() const;    ///< @throws InvalidValue
+
+  static constexpr auto numbers() {
+    using Key = NumberKey<CorrectionConfig>;
+    using C = CorrectionConfig;
+    return std::array{
+        Key{"noise_um", &C::noise_um, 0.01, 100},
+        Key{"turn_um", &C::turn_um, 0.01, 500},
+        Key{"contribution_um_min", &C::contribution_um_min, 0.01, 500},
+        Key{"gain_min", &C::gain_min, 0, 1},
+        Key{"gain_max", &C::gain_max, 1, 10},
+        Key{"step_um_max", &C::step_um_max, 0.01, 500},
+        Key{"gain_sd", &C::gain_sd, 0.001, 10},
+        Key{"gain_drift_per_sqrt_h", &C::gain_drift_per_sqrt_h, 0, 10},
+        Key{"bias_drift_um_per_sqrt_h", &C::bias_drift_um_per_sqrt_h, 0, 100},
+        Key{"outlier_sigma", &C::outlier_sigma, 1, 100},
+        Key{"probe_sd_um", &C::probe_sd_um, 0.01, 500},
+    };
+  }
+  void validate() const { require_numbers(*this); }  ///< @throws InvalidValue
   bool operator==(const CorrectionConfig&) const = default;
 };
 

@@ -1,6 +1,7 @@
 /// What the estimator is built from: plain structures, filled by config/ or by a test.
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -8,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "estimator/checks.hpp"
 #include "estimator/correction_config.hpp"
 #include "estimator/types.hpp"
 
@@ -25,7 +27,22 @@ struct ScreeningConfig {
   double outage_K_max{10.0};     ///< largest change over an outage, and 10 K/h more
   double settle_s{10.0};         ///< how long a value must last before it counts; 0: at once
   double stuck_after_s{0.0};     ///< the same value for this long is a fault; 0: never
-  void validate() const;         ///< @throws InvalidValue
+
+  static constexpr auto numbers() {
+    using Key = NumberKey<ScreeningConfig>;
+    using C = ScreeningConfig;
+    return std::array{
+        Key{"temp_degC_min", &C::temp_degC_min, -273.15, 2000},
+        Key{"temp_degC_max", &C::temp_degC_max, -273.15, 2000},
+        Key::above("stale_after_s", &C::stale_after_s, 0, 3600),
+        Key::above("rate_K_per_s_max", &C::rate_K_per_s_max, 0, 1e6),
+        Key{"rate_allowance_K", &C::rate_allowance_K, 0, 1000},
+        Key{"outage_K_max", &C::outage_K_max, 0, 1000},
+        Key{"settle_s", &C::settle_s, 0, 3600},
+        Key{"stuck_after_s", &C::stuck_after_s, 0, 1e6},
+    };
+  }
+  void validate() const;  ///< @throws InvalidValue
 };
 
 enum class SmoothingForm { off, sliding_line, line_of_lines };
@@ -42,7 +59,17 @@ struct SmoothingConfig {
   std::size_t blocks{3};     ///< line_of_lines: lines that the expected one follows (1..6)
   double half_width_K{0.3};  ///< w, half the band
   double outage_s{5.0};      ///< a gap longer than this and than two periods restarts the history
-  void validate() const;     ///< @throws InvalidValue
+
+  static constexpr auto numbers() {
+    using Key = NumberKey<SmoothingConfig>;
+    using C = SmoothingConfig;
+    return std::array{
+        Key{"period_s", &C::period_s, 0, 3600},
+        Key::above("half_width_K", &C::half_width_K, 0, 100),
+        Key::above("outage_s", &C::outage_s, 0, 86400),
+    };
+  }
+  void validate() const;  ///< @throws InvalidValue
 };
 
 struct SensorConfig {
@@ -66,7 +93,16 @@ inline constexpr double offset_um_max_of_any_axis = 500.0;
 struct LimiterConfig {
   double offset_um_max{50.0};     ///< bound on |offset| of an axis [um]
   double rate_um_per_s_max{1.0};  ///< slew bound of an axis [um/s]
-  void validate() const;          ///< @throws InvalidValue
+
+  static constexpr auto numbers() {
+    using Key = NumberKey<LimiterConfig>;
+    using C = LimiterConfig;
+    return std::array{
+        Key::above("offset_um_max", &C::offset_um_max, 0, offset_um_max_of_any_axis),
+        Key::above("rate_um_per_s_max", &C::rate_um_per_s_max, 0, 1000),
+    };
+  }
+  void validate() const { require_numbers(*this); }  ///< @throws InvalidValue
 };
 
 /// What the controller makes of the offsets at the nodes of an axis' travel.
@@ -145,6 +181,24 @@ struct CompensationConfig {
   double warm_um{5.0};  ///< warm is a machine of which no axis is to move farther than this
   double prove_um_max{10.0};
   double prove_hold_s{3.0};
+
+  static constexpr auto numbers() {
+    using Key = NumberKey<CompensationConfig>;
+    using C = CompensationConfig;
+    return std::array{
+        Key{"cycle_ahead", &C::cycle_ahead, 0, 1},
+        Key{"hold_s", &C::hold_s, 0, 1e6},
+        Key::above("stop_ramp_s_max", &C::stop_ramp_s_max, 0, 3600),
+        Key::above("controller_stale_after_s", &C::controller_stale_after_s, 0, 3600),
+        Key::above("mismatch_um", &C::mismatch_um, 0, 500),
+        Key::above("mismatch_after_s", &C::mismatch_after_s, 0, 3600),
+        Key::above("restart_leap_um_max", &C::restart_leap_um_max, 0, 500),
+        Key::above("offset_sd_um_max", &C::offset_sd_um_max, 0, 500),
+        Key::above("warm_um", &C::warm_um, 0, 500),
+        Key::above("prove_um_max", &C::prove_um_max, 0, 50),
+        Key{"prove_hold_s", &C::prove_hold_s, 0, 60},
+    };
+  }
   void validate() const;  ///< @throws InvalidValue
 };
 

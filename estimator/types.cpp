@@ -109,6 +109,15 @@ void require(bool holds, const char* key, double value, const char* rule) {
   throw InvalidValue(key, text.str(), rule);
 }
 
+void require_in(double value, const char* key, double min, double max, bool min_excluded) {
+  if ((min_excluded ? value > min : value >= min) && value <= max) return;
+  std::ostringstream rule;
+  rule << "must be in " << (min_excluded ? '(' : '[') << min << ", " << max << ']';
+  std::string text = rule.str();
+  if (const auto at = text.find("e+0"); at != std::string::npos) text.erase(at + 1, 2);  // 1e6
+  require(false, key, value, text.c_str());
+}
+
 void abort_with(const char* expression, const char* file, int line) noexcept {
   std::fprintf(stderr, "thermocomp: broken promise: %s (%s:%d)\n", expression, file, line);
   std::abort();

@@ -1,7 +1,6 @@
 /// What the sections of the daemon's file have in common.
 #pragma once
 
-#include <array>
 #include <initializer_list>
 #include <set>
 #include <span>
@@ -47,22 +46,17 @@ inline std::string unique_name(const TomlTable& table, std::set<std::string>& se
 [[nodiscard]] std::vector<Sentinel> read_status_codes(const TomlTable& table, std::int64_t high,
                                                       std::int64_t mask);
 
-template <class Config>
-struct NumberField {
-  std::string_view key;
-  double Config::*member;
-};
-
-/// Reads each field, absent ones as in `fallback`, and then calls Config::validate(): every field
-/// it refuses becomes a problem at its key and goes back to `fallback`, until the rest is valid.
+/// Reads Config::numbers(), absent ones as in `fallback`, and then calls Config::validate(): every
+/// number it refuses becomes a problem at its key and goes back to `fallback`, until the rest is
+/// valid.
 /// @pre fallback.validate() passes
-template <class Config, std::size_t N>
-void read_fields(const TomlTable& table, const std::array<NumberField<Config>, N>& fields,
-                 const Config& fallback, Config& config) {
-  for (const auto& field : fields) {
-    config.*field.member = table.number(field.key, Range::any(), fallback.*field.member);
+template <class Config>
+void read_numbers(const TomlTable& table, const Config& fallback, Config& config) {
+  constexpr auto numbers = Config::numbers();
+  for (const auto& number : numbers) {
+    config.*number.member = table.number(number.key, Range::any(), fallback.*number.member);
   }
-  for (std::size_t attempt = 0; attempt <= N; ++attempt) {
+  for (std::size_t attempt = 0; attempt <= numbers.size(); ++attempt) {
     try {
       config.validate();
       return;
@@ -73,15 +67,15 @@ void read_fields(const TomlTable& table, const std::array<NumberField<Config>, N
         table.problem(error.key(), error.value(), error.rule());
       }
       bool reset = false;
-      for (const auto& field : fields) {
-        if (field.key != error.key() || config.*field.member == fallback.*field.member) continue;
-        config.*field.member = fallback.*field.member;
+      for (const auto& number : numbers) {
+        if (number.key != error.key() || config.*number.member == fallback.*number.member) continue;
+        config.*number.member = fallback.*number.member;
         reset = true;
       }
       if (!reset) break;  // broken beside a fallback: nothing more can be told apart
     }
   }
-  for (const auto& field : fields) config.*field.member = fallback.*field.member;
+  for (const auto& number : numbers) config.*number.member = fallback.*number.member;
 }
 
 }  // namespace thermocomp::sections

@@ -11,27 +11,12 @@ namespace thermocomp::sections {
 namespace {
 
 ScreeningConfig read_screening(const TomlTable& table, const ScreeningConfig& fallback) {
-  constexpr std::array<NumberField<ScreeningConfig>, 8> fields{{
-      {"temp_degC_min", &ScreeningConfig::temp_degC_min},
-      {"temp_degC_max", &ScreeningConfig::temp_degC_max},
-      {"stale_after_s", &ScreeningConfig::stale_after_s},
-      {"rate_K_per_s_max", &ScreeningConfig::rate_K_per_s_max},
-      {"rate_allowance_K", &ScreeningConfig::rate_allowance_K},
-      {"outage_K_max", &ScreeningConfig::outage_K_max},
-      {"settle_s", &ScreeningConfig::settle_s},
-      {"stuck_after_s", &ScreeningConfig::stuck_after_s},
-  }};
   ScreeningConfig config = fallback;
-  read_fields(table, fields, fallback, config);
+  read_numbers(table, fallback, config);
   return config;
 }
 
 SmoothingConfig read_smoothing(const TomlTable& table, const SmoothingConfig& fallback) {
-  constexpr std::array<NumberField<SmoothingConfig>, 3> fields{{
-      {"period_s", &SmoothingConfig::period_s},
-      {"half_width_K", &SmoothingConfig::half_width_K},
-      {"outage_s", &SmoothingConfig::outage_s},
-  }};
   SmoothingConfig config = fallback;
   config.form = table.choice<SmoothingForm>("form",
                                             {{"off", SmoothingForm::off},
@@ -43,7 +28,7 @@ SmoothingConfig read_smoothing(const TomlTable& table, const SmoothingConfig& fa
       fallback.history);
   config.samples = table.integer<std::size_t>("samples", 3, 32, fallback.samples);
   config.blocks = table.integer<std::size_t>("blocks", 1, smoothing_blocks_max, fallback.blocks);
-  read_fields(table, fields, fallback, config);
+  read_numbers(table, fallback, config);
   return config;
 }
 
@@ -204,10 +189,6 @@ std::vector<AxisConfig> nodes_of(const TomlTable& table, const AxisConfig& axis,
 }  // namespace
 
 std::vector<AxisConfig> read_axes(const std::vector<TomlTable>& tables) {
-  constexpr std::array<NumberField<LimiterConfig>, 2> fields{{
-      {"offset_um_max", &LimiterConfig::offset_um_max},
-      {"rate_um_per_s_max", &LimiterConfig::rate_um_per_s_max},
-  }};
   std::set<std::string> names;
   std::vector<AxisConfig> axes;
   for (const TomlTable& table : tables) {
@@ -220,10 +201,11 @@ std::vector<AxisConfig> read_axes(const std::vector<TomlTable>& tables) {
     const int sign = table.integer("sign", -1, 1, 1);
     if (sign == 0) table.problem("sign", "must be 1 or -1");
     axis.sign = sign;
-    for (const auto& field : fields) {  // how far and how fast an axis may move has no default
-      if (!table.has(field.key)) table.problem(field.key, "must be given");
+    for (const auto& number :
+         LimiterConfig::numbers()) {  // how far and how fast an axis may move has no default
+      if (!table.has(number.key)) table.problem(number.key, "must be given");
     }
-    read_fields(table, fields, LimiterConfig{}, axis.limiter);
+    read_numbers(table, LimiterConfig{}, axis.limiter);
     const bool has_nodes = table.has("line") || table.has("table");
     const bool fitted = axes.size() <= axes_max;
     if (has_nodes) {
@@ -242,19 +224,6 @@ std::vector<AxisConfig> read_axes(const std::vector<TomlTable>& tables) {
 
 CompensationConfig read_compensation(const TomlTable& table,
                                      const std::vector<std::string>& signals) {
-  constexpr std::array<NumberField<CompensationConfig>, 11> fields{{
-      {"cycle_ahead", &CompensationConfig::cycle_ahead},
-      {"hold_s", &CompensationConfig::hold_s},
-      {"stop_ramp_s_max", &CompensationConfig::stop_ramp_s_max},
-      {"controller_stale_after_s", &CompensationConfig::controller_stale_after_s},
-      {"mismatch_um", &CompensationConfig::mismatch_um},
-      {"mismatch_after_s", &CompensationConfig::mismatch_after_s},
-      {"restart_leap_um_max", &CompensationConfig::restart_leap_um_max},
-      {"offset_sd_um_max", &CompensationConfig::offset_sd_um_max},
-      {"warm_um", &CompensationConfig::warm_um},
-      {"prove_um_max", &CompensationConfig::prove_um_max},
-      {"prove_hold_s", &CompensationConfig::prove_hold_s},
-  }};
   CompensationConfig config;
   config.on_loss = table.choice<LossPolicy>(
       "on_loss", {{"hold", LossPolicy::hold}, {"ramp_to_zero", LossPolicy::ramp_to_zero}},
@@ -282,7 +251,7 @@ CompensationConfig read_compensation(const TomlTable& table,
   config.cycles_per_update =
       table.integer<std::uint64_t>("cycles_per_update", 1, 1'000'000, config.cycles_per_update);
   config.hold_while_cutting = table.flag("hold_while_cutting", config.hold_while_cutting);
-  read_fields(table, fields, CompensationConfig{}, config);
+  read_numbers(table, CompensationConfig{}, config);
   const auto read_signal = [&](std::string_view key) {
     std::string name = table.text(key, "");
     if (!name.empty() && std::find(signals.begin(), signals.end(), name) == signals.end()) {
@@ -303,19 +272,6 @@ CompensationConfig read_compensation(const TomlTable& table,
 }
 
 CorrectionConfig read_correction(const TomlTable& table) {
-  constexpr std::array<NumberField<CorrectionConfig>, 11> fields{{
-      {"noise_um", &CorrectionConfig::noise_um},
-      {"turn_um", &CorrectionConfig::turn_um},
-      {"contribution_um_min", &CorrectionConfig::contribution_um_min},
-      {"gain_min", &CorrectionConfig::gain_min},
-      {"gain_max", &CorrectionConfig::gain_max},
-      {"step_um_max", &CorrectionConfig::step_um_max},
-      {"gain_sd", &CorrectionConfig::gain_sd},
-      {"gain_drift_per_sqrt_h", &CorrectionConfig::gain_drift_per_sqrt_h},
-      {"bias_drift_um_per_sqrt_h", &CorrectionConfig::bias_drift_um_per_sqrt_h},
-      {"outlier_sigma", &CorrectionConfig::outlier_sigma},
-      {"probe_sd_um", &CorrectionConfig::probe_sd_um},
-  }};
   CorrectionConfig config;
   config.form = table.choice<CorrectionForm>("form",
                                              {{"off", CorrectionForm::off},
@@ -331,7 +287,7 @@ CorrectionConfig read_correction(const TomlTable& table) {
                                                {"eq_34", FirstGain::eq_34},
                                                {"eq_31", FirstGain::eq_31}},
                                               config.first_gain);
-  read_fields(table, fields, CorrectionConfig{}, config);
+  read_numbers(table, CorrectionConfig{}, config);
   for (const TomlTable& group : table.tables("group"))
     config.groups.push_back(group.texts("inputs"));
   const std::size_t count = config.groups.size();

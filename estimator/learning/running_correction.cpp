@@ -37,23 +37,6 @@ std::map<std::string, double> of_axis(const std::map<std::string, double>& value
 
 }  // namespace
 
-void CorrectionConfig::validate() const {
-  const auto in = [](double value, const char* key, double low, double high, const char* rule) {
-    require(value >= low && value <= high, key, value, rule);
-  };
-  in(noise_um, "noise_um", 0.01, 100, "must be in [0.01, 100]");
-  in(turn_um, "turn_um", 0.01, 500, "must be in [0.01, 500]");
-  in(contribution_um_min, "contribution_um_min", 0.01, 500, "must be in [0.01, 500]");
-  in(gain_min, "gain_min", 0.0, 1.0, "must be in [0, 1]");
-  in(gain_max, "gain_max", 1.0, 10.0, "must be in [1, 10]");
-  in(step_um_max, "step_um_max", 0.01, 500, "must be in [0.01, 500]");
-  in(gain_sd, "gain_sd", 0.001, 10, "must be in [0.001, 10]");
-  in(gain_drift_per_sqrt_h, "gain_drift_per_sqrt_h", 0, 10, "must be in [0, 10]");
-  in(bias_drift_um_per_sqrt_h, "bias_drift_um_per_sqrt_h", 0, 100, "must be in [0, 100]");
-  in(outlier_sigma, "outlier_sigma", 1, 100, "must be in [1, 100]");
-  in(probe_sd_um, "probe_sd_um", 0.01, 500, "must be in [0.01, 500]");
-}
-
 RunningCorrection::RunningCorrection(const CorrectionConfig& config, const ThermalModel& model,
                                      std::size_t output)
     : config_(config),
