@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/locks/name_lock.hpp"
+#include "daemon/locks/locks.hpp"
 #include "drivers/controllers/controller_config.hpp"
 
 namespace thermocomp {

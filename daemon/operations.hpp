@@ -14,7 +14,7 @@
 #include "daemon/cycle/cycle_handle.hpp"
 #include "daemon/history/writing/history_writer.hpp"
 #include "daemon/socket/rpc.hpp"
-#include "daemon/state/state_keeper.hpp"
+#include "daemon/state/state_file.hpp"
 #include "daemon/status/event_journal.hpp"
 #include "daemon/system/service_manager.hpp"
 #include "daemon/threads/side_thread.hpp"

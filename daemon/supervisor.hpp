@@ -7,18 +7,39 @@
 #include <string>
 #include <vector>
 
-#include "daemon/locks/name_lock.hpp"
+#include "daemon/locks/locks.hpp"
 #include "daemon/operations.hpp"
 #include "daemon/socket/status_server.hpp"
 #include "daemon/status/event_log.hpp"
 #include "daemon/status/status_view.hpp"
-#include "daemon/status/temperature_trend.hpp"
+#include "daemon/status/warm_up.hpp"
 #include "daemon/system/service_manager.hpp"
-#include "daemon/system/signal_file.hpp"
 #include "drivers/controllers/controller_link.hpp"
 #include "drivers/sensors/sensor_source.hpp"
 
 namespace thermocomp {
+
+/// The signals that the daemon answers to, as a file that can be polled.
+class SignalFile {
+ public:
+  /// What came since the last call; any number of SIGHUPs count as one.
+  struct Asked {
+    int stop{0};  ///< SIGTERM or SIGINT, the last of them; 0: none
+    bool reload{false};
+  };
+
+  /// Blocks SIGTERM, SIGINT and SIGHUP for this thread and all that it makes from now on.
+  SignalFile();
+  ~SignalFile();
+  SignalFile(const SignalFile&) = delete;
+  SignalFile& operator=(const SignalFile&) = delete;
+
+  [[nodiscard]] int fd() const noexcept { return fd_; }
+  [[nodiscard]] Asked drain() const noexcept;
+
+ private:
+  int fd_;
+};
 
 /// Nothing here waits longer than a tick, whatever is under way: the watchdog is fed while, and
 /// only while, the cycle advances.

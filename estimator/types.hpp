@@ -14,6 +14,14 @@
 namespace thermocomp {
 
 using std::chrono::nanoseconds;
+using seconds_d = std::chrono::duration<double>;
+
+[[nodiscard]] constexpr double to_seconds(nanoseconds time) noexcept {
+  return 1e-9 * static_cast<double>(time.count());
+}
+[[nodiscard]] constexpr nanoseconds to_nanoseconds(double time_s) noexcept {
+  return std::chrono::duration_cast<nanoseconds>(seconds_d(time_s));
+}
 
 inline constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 inline constexpr std::size_t axes_max = 16;     ///< axes of one controller

@@ -6,7 +6,7 @@
     scripts/check_includes.py --write    draws the floors anew into docs/ARCHITECTURE.md
     scripts/check_includes.py --sizes    the largest folders and files
 
-A unit is a header and its source (`limiter.hpp` and `limiter.cpp`). A circle is a set of units, or
+A unit is a header and its source (`screening.hpp` and `screening.cpp`). A circle is a set of units, or
 of folders, each of which leads to each other one; a folder and one inside it are two folders.
 """
 import argparse

@@ -18,7 +18,7 @@
 #include "config/text/problems.hpp"
 #include "config/text/units.hpp"
 #include "drivers/sensors/bus_config.hpp"
-#include "estimator/axis_spans.hpp"
+#include "estimator/estimator_config.hpp"
 #include "estimator/model/displacement_model.hpp"
 #include "estimator/model/travel_curves.hpp"
 #include "gateway/settings/gateway_settings.hpp"

@@ -10,7 +10,7 @@
 #include "config/text/printable_text.hpp"
 #include "config/text/units.hpp"
 #include "drivers/controllers/kinds/modbus/modbus_layout.hpp"
-#include "estimator/axis_spans.hpp"
+#include "estimator/estimator_config.hpp"
 #include "status/figures.hpp"
 
 namespace thermocomp::cli {

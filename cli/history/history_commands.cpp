@@ -10,7 +10,6 @@
 #include "cli/commands.hpp"
 #include "config/daemon/daemon_config.hpp"
 #include "config/runs/run_file.hpp"
-#include "daemon/history/replay/history_check.hpp"
 #include "daemon/history/replay/replay.hpp"
 #include "daemon/history/replay/run_replay.hpp"
 #include "report/output_file.hpp"

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "config/runs/run_file.hpp"
-#include "estimator/correction_config.hpp"
+#include "estimator/estimator_config.hpp"
 #include "estimator/thermal_model.hpp"
 
 namespace thermocomp::cli {

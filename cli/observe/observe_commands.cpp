@@ -17,7 +17,7 @@
 #include "cli/observe/status_text.hpp"
 #include "cli/observe/watch_text.hpp"
 #include "config/text/clean_output.hpp"
-#include "daemon/history/format/recorded_event.hpp"
+#include "daemon/history/reading/history_reader.hpp"
 #include "daemon/socket/status_client.hpp"
 #include "report/terminal.hpp"
 #include "status/status_json.hpp"

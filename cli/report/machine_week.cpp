@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "daemon/history/replay/replay_setup.hpp"
+#include "daemon/history/replay/segment_walk.hpp"
 
 namespace thermocomp::cli {
 namespace {

@@ -10,9 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "daemon/history/format/recorded_event.hpp"
 #include "daemon/history/reading/history_reader.hpp"
-#include "daemon/history/replay/replay_setup.hpp"
+#include "daemon/history/replay/segment_walk.hpp"
 #include "daemon/history/replay/thinned_history.hpp"
 
 namespace thermocomp::cli {

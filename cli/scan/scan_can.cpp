@@ -12,8 +12,8 @@
 #include "drivers/bus_thread.hpp"
 #include "drivers/can/can_socket.hpp"
 #include "drivers/can/signal_codec.hpp"
-#include "estimator/axis_spans.hpp"
 #include "estimator/checks.hpp"
+#include "estimator/estimator_config.hpp"
 
 namespace thermocomp::cli {
 namespace {

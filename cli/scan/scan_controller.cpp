@@ -19,7 +19,7 @@
 #include "drivers/controllers/kinds/modbus/modbus_layout.hpp"
 #include "drivers/modbus/connection.hpp"
 #include "drivers/modbus/register_codec.hpp"
-#include "estimator/axis_spans.hpp"
+#include "estimator/estimator_config.hpp"
 #include "status/status_json.hpp"
 
 namespace thermocomp::cli {

@@ -18,7 +18,7 @@
 #include "config/sections/model_binding.hpp"
 #include "config/toml/toml_reader.hpp"
 #include "estimator/pipeline/estimator.hpp"
-#include "estimator/temperature_range.hpp"
+#include "estimator/sensing/screening.hpp"
 
 namespace thermocomp {
 namespace {

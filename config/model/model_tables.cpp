@@ -9,7 +9,7 @@
 #include <Eigen/Core>
 
 #include "config/toml/toml_text.hpp"
-#include "estimator/correction_config.hpp"
+#include "estimator/estimator_config.hpp"
 #include "estimator/model/model_domain.hpp"
 
 namespace thermocomp {

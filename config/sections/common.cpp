@@ -1,5 +1,6 @@
 #include "config/sections/common.hpp"
 
+#include <array>
 #include <map>
 #include <utility>
 

@@ -10,7 +10,7 @@
 #include "config/sections/travel_section.hpp"
 #include "config/text/printable_text.hpp"
 #include "config/text/units.hpp"
-#include "estimator/axis_spans.hpp"
+#include "estimator/estimator_config.hpp"
 
 namespace thermocomp::sections {
 namespace {

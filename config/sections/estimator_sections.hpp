@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "config/toml/toml_reader.hpp"
-#include "estimator/correction_config.hpp"
 #include "estimator/estimator_config.hpp"
 #include "estimator/thermal_model.hpp"
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "config/text/units.hpp"
-#include "estimator/axis_spans.hpp"
+#include "estimator/estimator_config.hpp"
 #include "estimator/sensing/neighbour_check.hpp"
 
 namespace thermocomp::sections {

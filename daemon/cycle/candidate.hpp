@@ -1,16 +1,102 @@
 /// A model that runs beside the one in use: evaluated in the same cycle, never sent, scored at each
-/// probing.
+/// probing; and which of the two leaves less at the tool.
 #pragma once
 
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <cstddef>
 #include <map>
 #include <span>
 #include <string>
 
 #include "drivers/wait_free_slot.hpp"
-#include "estimator/learning/model_contest.hpp"
 #include "estimator/pipeline/estimator.hpp"
+#include "estimator/types.hpp"
 
 namespace thermocomp {
+
+/// A test by betting (Waudby-Smith and Ramdas 2024), which may be looked at after every probing.
+/// With e the errors of both models at the probings of an axis, m their mean square so far, and a
+/// bet at most every two hours, because errors at neighbouring probings are alike:
+///
+///     b = 0.95 tanh(lambda sum (e_model^2 - e_candidate^2) / m),   summed since the last bet
+///     W = mean over lambda of prod (1 + b),   V the same with 1 - b
+///
+/// Where both models are equally good, b is as often positive as negative, and W exceeds 40 at any
+/// time with a probability of at most 1/40 (Ville's inequality). W and V of several axes are
+/// averaged. With a chance at first of 1/2 for equal and 1/4 each for better and worse:
+///
+///     P(better) = W / (W + 2 + V)
+class ModelContest {
+ public:
+  static constexpr std::array<double, 2> lambdas{0.25, 0.5};
+  static constexpr std::chrono::hours apart{2};
+
+  struct AxisScore {
+    double probings{0.0};
+    double model_um2{0.0};  ///< sum of the squared errors, as the next
+    double candidate_um2{0.0};
+    std::array<double, lambdas.size()> log_better{};  ///< ln of prod (1 + b)
+    std::array<double, lambdas.size()> log_worse{};   ///< ln of prod (1 - b)
+  };
+  using Score = std::array<AxisScore, axes_max>;
+
+  void take(std::size_t axis, nanoseconds now, double model_error_um,
+            double candidate_error_um) noexcept {
+    const double model_um2 = model_error_um * model_error_um;
+    const double candidate_um2 = candidate_error_um * candidate_error_um;
+    if (!std::isfinite(model_um2) || !std::isfinite(candidate_um2)) return;
+    AxisScore& score = score_[axis];
+    score.probings += 1.0;
+    score.model_um2 += model_um2;
+    score.candidate_um2 += candidate_um2;
+    Pending& pending = pending_[axis];
+    pending.less_um2 += model_um2 - candidate_um2;
+    if (now - pending.bet_at < apart) return;
+    const double mean_um2 = (score.model_um2 + score.candidate_um2) / (2.0 * score.probings);
+    const double less = mean_um2 > 0 ? pending.less_um2 / mean_um2 : 0.0;
+    pending = {0.0, now};
+    for (std::size_t i = 0; i < lambdas.size(); ++i) {
+      const double bet = 0.95 * std::tanh(lambdas[i] * less);
+      score.log_better[i] += std::log1p(bet);
+      score.log_worse[i] += std::log1p(-bet);
+    }
+  }
+  [[nodiscard]] const Score& score() const noexcept { return score_; }
+  void restore(const Score& score) noexcept { score_ = score; }
+
+  struct Chances {
+    double better{0.0};
+    double worse{0.0};
+  };
+  [[nodiscard]] static Chances chances(const Score& score) noexcept {
+    const double better = wealth(score, &AxisScore::log_better);
+    const double worse = wealth(score, &AxisScore::log_worse);
+    return {better / (better + 2.0 + worse), worse / (better + 2.0 + worse)};
+  }
+
+ private:
+  struct Pending {
+    double less_um2{0.0};  ///< by so much the candidate's squares are less, since the last bet
+    nanoseconds bet_at{-apart};
+  };
+  [[nodiscard]] static double wealth(const Score& score,
+                                     std::array<double, lambdas.size()> AxisScore::*logs) noexcept {
+    double sum = 0.0;
+    double count = 0.0;
+    for (const AxisScore& axis : score) {
+      if (!(axis.probings > 0)) continue;
+      for (const double log : axis.*logs) sum += std::exp(std::min(log, 500.0));
+      count += static_cast<double>(lambdas.size());
+    }
+    return count > 0 ? sum / count : 1.0;
+  }
+
+  Score score_{};
+  std::array<Pending, axes_max> pending_{};
+};
 
 /// Both models are judged by themselves, without a running correction.
 class Candidate {

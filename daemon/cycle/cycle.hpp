@@ -1,7 +1,11 @@
-/// The fixed-rate cycle: newest readings -> estimator -> offsets, on an absolute grid of time.
+/// The fixed-rate cycle: newest readings -> estimator -> offsets, on an absolute grid of time; with
+/// the commands on their way to it and how long it takes.
 #pragma once
 
+#include <array>
 #include <atomic>
+#include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -9,17 +13,76 @@
 #include <vector>
 
 #include "daemon/cycle/candidate.hpp"
-#include "daemon/cycle/command_queue.hpp"
-#include "daemon/cycle/duration_histogram.hpp"
 #include "daemon/recording/cycle_recorder.hpp"
-#include "daemon/recording/grid.hpp"
 #include "daemon/recording/last_sent.hpp"
+#include "daemon/recording/record.hpp"
 #include "drivers/controllers/controller_link.hpp"
 #include "drivers/sensors/sensor_source.hpp"
 #include "drivers/wait_free_slot.hpp"
 #include "estimator/pipeline/estimator.hpp"
+#include "estimator/types.hpp"
 
 namespace thermocomp {
+
+/// How long something took, over millions of times: percentiles to 1.6 % without keeping samples.
+/// One writer counts, any thread reads. Buckets: 64 per factor of two, from 1 ns to 18 minutes.
+/// Wait-free, no allocation.
+class DurationHistogram {
+ public:
+  /// Negative durations count as 0.
+  void record(std::chrono::nanoseconds duration) noexcept;
+
+  [[nodiscard]] std::uint64_t count() const noexcept;
+  /// @param fraction  0..1, e.g. 0.999 for the 99.9th percentile
+  /// @return upper edge of the bucket in which it lies; 0 while empty
+  [[nodiscard]] std::chrono::nanoseconds percentile(double fraction) const noexcept;
+  [[nodiscard]] std::chrono::nanoseconds max() const noexcept {
+    return std::chrono::nanoseconds(max_ns_.load(std::memory_order_relaxed));
+  }
+  /// Starts anew; readers may see a mixture for a moment.
+  void clear() noexcept;
+
+ private:
+  static constexpr unsigned sub_bits = 6;
+  static constexpr std::size_t subs = std::size_t{1} << sub_bits;
+  static constexpr std::size_t octaves = 35;
+
+  [[nodiscard]] static std::size_t bucket_of(std::uint64_t ns) noexcept;
+  [[nodiscard]] static std::uint64_t upper_edge_ns(std::size_t bucket) noexcept;
+
+  std::array<std::atomic<std::uint32_t>, subs * octaves> buckets_{};
+  std::atomic<std::int64_t> max_ns_{0};
+};
+
+/// One producer, one consumer, wait-free. What has not been taken yet can be withdrawn: either the
+/// consumer gets it or the producer has it back, never both.
+class CommandQueue {
+ public:
+  static constexpr std::size_t capacity = 64;
+
+  /// Producer. @return the command's number, counted from 0; none: 64 wait already
+  std::optional<std::uint64_t> try_push(const Command& command) noexcept;
+  /// Producer. @param number  of a command that was pushed and is not known to be done
+  /// @return false: the consumer has it
+  [[nodiscard]] bool withdraw(std::uint64_t number) noexcept;
+  /// Consumer; leaves out what was withdrawn.
+  [[nodiscard]] bool try_pop(Command& command) noexcept;
+  /// Consumer: all before this number were taken or withdrawn.
+  [[nodiscard]] std::uint64_t taken() const noexcept {
+    return tail_.load(std::memory_order_relaxed);
+  }
+
+ private:
+  enum class State : std::uint8_t { waiting, taken, withdrawn };
+  struct Place {
+    Command command;
+    std::atomic<State> state{State::taken};
+  };
+
+  std::array<Place, capacity> places_{};
+  std::atomic<std::uint64_t> head_{0};
+  std::atomic<std::uint64_t> tail_{0};
+};
 
 /// What a configuration gives the cycle and a reload replaces as a whole.
 struct CycleParts {

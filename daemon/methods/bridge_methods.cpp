@@ -1,9 +1,8 @@
-#include "daemon/methods/bridge_methods.hpp"
-
 #include <cmath>
 
 #include <nlohmann/json.hpp>
 
+#include "daemon/methods/methods.hpp"
 #include "daemon/socket/rpc.hpp"
 
 namespace thermocomp {

@@ -9,8 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "daemon/recording/grid.hpp"
-#include "daemon/recording/record_ring.hpp"
+#include "daemon/recording/record.hpp"
 #include "estimator/pipeline/estimator.hpp"
 #include "estimator/types.hpp"
 

@@ -1,12 +1,28 @@
-/// What the cycle tells the history: records of fixed size.
+/// What the cycle tells the history: records of fixed size on the cycle's grid of time, through a
+/// ring on which neither side ever waits.
 #pragma once
 
+#include <atomic>
+#include <chrono>
+#include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <span>
 #include <string_view>
 
 #include "estimator/types.hpp"
 
 namespace thermocomp {
+
+/// The daemon's time: cycle k is stepped with exactly this time, however late it ran, so a replay
+/// needs no clock readings.
+struct Grid {
+  nanoseconds start{};  ///< CLOCK_MONOTONIC of cycle 0
+  nanoseconds period{std::chrono::milliseconds(10)};
+  [[nodiscard]] nanoseconds time_of(std::uint64_t cycle) const noexcept {
+    return start + period * static_cast<std::int64_t>(cycle);
+  }
+};
 
 enum class RecordKind : std::uint8_t {
   reading,     ///< index: sensor; value: temp [degC]; time: taken_at; detail: Fault
@@ -72,5 +88,33 @@ constexpr void set_measured_bits(std::int64_t bits, Command& command) noexcept {
   command.sd_nm = part(2);
   command.ago_s = part(32);
 }
+
+/// Single producer (the cycle), single consumer (the writer). Wait-free on both sides, no
+/// allocation after construction.
+class RecordRing {
+ public:
+  /// @param capacity  records; rounded up to a power of two
+  explicit RecordRing(std::size_t capacity = 65536);
+
+  /// Producer. @return false when the ring is full; the record is then not in it
+  [[nodiscard]] bool try_push(const Record& record) noexcept;
+  /// Producer: free places, at least.
+  [[nodiscard]] std::size_t free_places() const noexcept;
+  /// Consumer: moves up to out.size() records into `out`. @return how many
+  std::size_t pop(std::span<Record> out) noexcept;
+
+  /// Producer: counts what could not be recorded. Any thread may ask how much that is.
+  void count_lost(std::uint64_t records) noexcept;
+  [[nodiscard]] std::uint64_t lost() const noexcept;
+  [[nodiscard]] std::size_t capacity() const noexcept { return mask_ + 1; }
+
+ private:
+  std::size_t mask_;
+  std::unique_ptr<Record[]> records_;
+  alignas(64) std::atomic<std::uint64_t> head_{0};  ///< written by the producer
+  std::uint64_t tail_seen_{0};                      ///< the producer's copy of tail_
+  alignas(64) std::atomic<std::uint64_t> tail_{0};  ///< written by the consumer
+  alignas(64) std::atomic<std::uint64_t> lost_{0};
+};
 
 }  // namespace thermocomp

@@ -1,19 +1,80 @@
-/// One connection of the status server: its socket, its buffers, where it stands. Only for this
-/// folder's .cpp files.
+/// One connection of the status server: its socket, its buffers, its rate, where it stands. Only
+/// for this folder's .cpp files.
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 
-#include "daemon/socket/line_buffer.hpp"
-#include "daemon/socket/rpc_dispatcher.hpp"
-#include "daemon/socket/token_bucket.hpp"
+#include "daemon/socket/rpc.hpp"
 
 namespace thermocomp {
+
+/// Bytes in, lines out; never holds more than the longest line and one read.
+class LineBuffer {
+ public:
+  static constexpr std::size_t line_bytes_max = std::size_t{64} * 1024;
+
+  void add(std::string_view bytes);
+  /// The next line without its end ("\n" or "\r\n").
+  /// @return false when there is no whole line
+  [[nodiscard]] bool take(std::string& line);
+  [[nodiscard]] bool has_line() const noexcept { return end_ != std::string::npos; }
+  /// The line at the front, whole or not, has more than line_bytes_max: nothing is taken any more.
+  [[nodiscard]] bool is_too_long() const noexcept;
+  /// A line has begun and is not whole.
+  [[nodiscard]] bool is_partial() const noexcept { return !has_line() && begin_ < bytes_.size(); }
+  [[nodiscard]] std::size_t capacity_bytes() const noexcept { return bytes_.capacity(); }
+
+ private:
+  void find_end();
+
+  std::string bytes_;
+  std::size_t begin_{0};                ///< of the line at the front
+  std::size_t end_{std::string::npos};  ///< its '\n'
+  std::size_t searched_{0};             ///< before this there is no '\n' of it
+};
+
+/// A bound on how many things happen per second, and at once after a pause.
+/// Level l grows with `per_s` up to `burst`; taking needs l >= 1. Time is an argument.
+class TokenBucket {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  TokenBucket(double per_s, double burst) : per_s_(per_s), burst_(burst), level_(burst) {}
+
+  [[nodiscard]] bool try_take(Clock::time_point now) noexcept {
+    refill(now);
+    if (!(level_ >= 1.0)) return false;
+    level_ -= 1.0;
+    return true;
+  }
+  void give_back() noexcept { level_ += 1.0; }
+  /// The earliest time at which one can be taken.
+  [[nodiscard]] Clock::time_point next(Clock::time_point now) noexcept {
+    refill(now);
+    if (level_ >= 1.0) return now;
+    return now + std::chrono::ceil<Clock::duration>(
+                     std::chrono::duration<double>((1.0 - level_) / per_s_));
+  }
+
+ private:
+  void refill(Clock::time_point now) noexcept {
+    const double passed_s = std::chrono::duration<double>(now - filled_at_).count();
+    filled_at_ = now;
+    if (passed_s > 0.0) level_ = std::min(burst_, level_ + per_s_ * passed_s);
+  }
+
+  double per_s_;
+  double burst_;
+  double level_;
+  Clock::time_point filled_at_{};
+};
 
 struct ServedClient {
   using Clock = std::chrono::steady_clock;

@@ -15,8 +15,7 @@
 #include <sys/timerfd.h>
 
 #include "daemon/socket/listening_socket.hpp"
-#include "daemon/socket/peer_access.hpp"
-#include "daemon/socket/rpc_dispatcher.hpp"
+#include "daemon/socket/rpc.hpp"
 #include "daemon/socket/served_client.hpp"
 #include "daemon/threads/side_thread.hpp"
 

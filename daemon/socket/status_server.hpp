@@ -9,7 +9,6 @@
 
 #include "config/daemon/daemon_config.hpp"
 #include "daemon/socket/rpc.hpp"
-#include "daemon/socket/socket_error.hpp"
 
 namespace thermocomp {
 

@@ -14,9 +14,6 @@ namespace {
 
 using nlohmann::json;
 
-double seconds(nanoseconds time) {
-  return 1e-9 * static_cast<double>(time.count());
-}
 double microseconds(nanoseconds time) {
   return 1e-3 * static_cast<double>(time.count());
 }
@@ -30,7 +27,7 @@ std::string unit_of(const std::string& output) {
 }
 
 double age_s(const StatusView& view, nanoseconds since) {
-  return std::max(0.0, seconds(view.report.now - since));
+  return std::max(0.0, to_seconds(view.report.now - since));
 }
 
 std::string form_text(CorrectionForm form) {
@@ -130,14 +127,14 @@ std::vector<InputStatus> inputs_of(const StatusView& view) {
 std::optional<SensorError> suspicion_of(const StatusView& view, const SensorReport& sensor) {
   if (!sensor.suspected) return std::nullopt;
   return SensorError{sensor.suspected_size_K,
-                     view.wall_s - seconds(view.report.now - sensor.suspected_since),
+                     view.wall_s - to_seconds(view.report.now - sensor.suspected_since),
                      sensor.weighed_down};
 }
 
 /// nullopt: no change waits to be confirmed.
 std::optional<Jump> jump_of(const StatusView& view, const SensorReport& sensor) {
   if (!sensor.jumped) return std::nullopt;
-  return Jump{sensor.jump_K, view.wall_s - seconds(view.report.now - sensor.jumped_at)};
+  return Jump{sensor.jump_K, view.wall_s - to_seconds(view.report.now - sensor.jumped_at)};
 }
 
 /// The blocks that a sensor belongs to.
@@ -392,7 +389,7 @@ Status status_of(const StatusView& view) {
   Status status{
       .mode = view.report.mode,
       .dry_run = view.config.dry_run,
-      .mode_since_s = std::min(seconds(view.report.now - view.report.mode_since), view.uptime_s),
+      .mode_since_s = std::min(to_seconds(view.report.now - view.report.mode_since), view.uptime_s),
       .compensating_s = view.compensating_s,
       .enabled = view.report.enabled,
       .reasons = view.report.reasons,

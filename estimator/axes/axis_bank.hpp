@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "estimator/axes/axis_channel.hpp"
-#include "estimator/axis_spans.hpp"
 #include "estimator/estimator_config.hpp"
 #include "estimator/state_archive.hpp"
 #include "estimator/step_values.hpp"

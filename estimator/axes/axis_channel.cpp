@@ -4,6 +4,25 @@
 #include <cmath>
 
 namespace thermocomp {
+
+Limiter::Limiter(const LimiterConfig& config)
+    : bound_um_(config.offset_um_max), rate_um_per_s_(config.rate_um_per_s_max) {
+  config.validate();
+}
+
+void Limiter::step(double target_um, double dt_s) noexcept {
+  constexpr double dt_s_max = 1.0;
+  const double wanted_um = std::isfinite(target_um) ? target_um : offset_um_;
+  const double bounded_um = std::clamp(wanted_um, -bound_um_, bound_um_);
+  at_bound_ = bounded_um != wanted_um;
+  if (!(dt_s > 0)) return;
+  const double step_um_max = rate_um_per_s_ * std::min(dt_s, dt_s_max);
+  const double way_um = bounded_um - offset_um_;
+  // Lands on the target exactly, so that a settled offset equals it to the last bit.
+  offset_um_ = std::abs(way_um) <= step_um_max ? bounded_um
+                                               : offset_um_ + std::copysign(step_um_max, way_um);
+}
+
 namespace {
 
 /// What a read-back may lie outside our bound because registers are rounded.
@@ -29,23 +48,16 @@ constexpr std::uint32_t first_epoch = 1;
 /// Two read-backs after a release that are no further apart say the same.
 constexpr double same_read_back_um = 0.3;
 
-nanoseconds from_seconds(double seconds) {
-  return std::chrono::duration_cast<nanoseconds>(seconds_d(seconds));
-}
-double to_seconds(nanoseconds time) {
-  return 1e-9 * static_cast<double>(time.count());
-}
-
 }  // namespace
 
 AxisChannel::AxisChannel(const AxisConfig& config, const CompensationConfig& compensation,
                          bool reads_back)
     : limiter_(config.limiter),
-      check_(compensation.mismatch_um, from_seconds(compensation.mismatch_after_s)),
+      check_(compensation.mismatch_um, to_nanoseconds(compensation.mismatch_after_s)),
       reads_back_(reads_back),
-      mismatch_after_(from_seconds(compensation.mismatch_after_s)),
+      mismatch_after_(to_nanoseconds(compensation.mismatch_after_s)),
       prove_um_max_(compensation.prove_um_max),
-      prove_hold_(from_seconds(compensation.prove_hold_s)),
+      prove_hold_(to_nanoseconds(compensation.prove_hold_s)),
       corridor_um_(compensation.restart_leap_um_max) {
   state_.trusted_um = config.limiter.offset_um_max;
 }

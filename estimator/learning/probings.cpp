@@ -7,20 +7,10 @@
 #include "estimator/name_index.hpp"
 
 namespace thermocomp {
-namespace {
-
-std::vector<std::string> names_of(const std::vector<AxisConfig>& axes) {
-  std::vector<std::string> names;
-  names.reserve(axes.size());
-  for (const AxisConfig& axis : axes) names.push_back(axis.name);
-  return names;
-}
-
-}  // namespace
 
 Probings::Probings(const EstimatorConfig& config, const ThermalModel& model,
                    const std::vector<std::size_t>& axis_output)
-    : axis_names_(names_of(config.axes)),
+    : axis_names_(entry_names(config.axes)),
       is_on_(config.correction.form != CorrectionForm::off),
       meaning_(config.correction.measured),
       errors_(config.axes.size()),

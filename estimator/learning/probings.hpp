@@ -1,22 +1,88 @@
 /// What displacements measured at the tool teach: a correction per axis, and how far the model was
-/// off.
+/// off; and whether one that a person gives contradicts what the model claims of itself.
 #pragma once
 
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <map>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "estimator/estimator_config.hpp"
-#include "estimator/learning/probed_error.hpp"
 #include "estimator/learning/running_correction.hpp"
 #include "estimator/state_archive.hpp"
 #include "estimator/step_values.hpp"
 #include "estimator/thermal_model.hpp"
+#include "estimator/types.hpp"
 
 namespace thermocomp {
+
+/// Mean square over the last probings: of all up to 20, then each new one counts for 1/20.
+class ProbedError {
+ public:
+  void take(double error_um) noexcept {
+    if (!std::isfinite(error_um)) return;
+    ++count_;
+    const double weight = 1.0 / static_cast<double>(std::min<std::uint64_t>(count_, 20));
+    mean_square_um2_ += weight * (error_um * error_um - mean_square_um2_);
+  }
+  [[nodiscard]] double rms_um() const noexcept {
+    return count_ > 0 ? std::sqrt(mean_square_um2_) : not_a_number;
+  }
+  [[nodiscard]] std::uint64_t count() const noexcept { return count_; }
+  void visit_state(StateArchive& archive) { archive(count_, mean_square_um2_); }
+
+ private:
+  std::uint64_t count_{0};
+  double mean_square_um2_{0.0};
+};
+
+/// Which slip explains a displacement that contradicts what the model claims of itself.
+enum class Slip : std::uint8_t {
+  none,     ///< it agrees
+  sign,     ///< its negative agrees
+  tenfold,  ///< a tenth of it agrees
+  tenth,    ///< ten times it agrees
+  unexplained
+};
+
+/// Beyond so many standard deviations a person is asked.
+inline constexpr double question_sigma = 3.0;
+
+/// @param sd_um  of their difference: the model's claim and the measurement; NaN: nothing is
+/// claimed
+[[nodiscard]] inline Slip slip_of(double value_um, double expected_um, double sd_um) noexcept {
+  if (!std::isfinite(sd_um) || !std::isfinite(expected_um)) return Slip::none;
+  const auto agrees = [&](double value) {
+    return std::abs(value - expected_um) <= question_sigma * sd_um;
+  };
+  if (agrees(value_um)) return Slip::none;
+  if (agrees(-value_um)) return Slip::sign;
+  if (agrees(0.1 * value_um)) return Slip::tenfold;
+  if (agrees(10.0 * value_um)) return Slip::tenth;
+  return Slip::unexplained;
+}
+
+[[nodiscard]] constexpr std::string_view text_of(Slip slip) noexcept {
+  switch (slip) {
+    case Slip::none:
+      return "";
+    case Slip::sign:
+      return "the opposite sign would fit";
+    case Slip::tenfold:
+      return "a tenth of it would fit";
+    case Slip::tenth:
+      return "ten times it would fit";
+    case Slip::unexplained:
+      break;
+  }
+  return "perhaps another axis or another tool";
+}
 
 /// What operators have entered at the controller since the reference, as displacement of the axis.
 /// It stands there: what the correction learns of it must not be taken out a second time.

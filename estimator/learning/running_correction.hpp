@@ -10,8 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "estimator/correction_config.hpp"
-#include "estimator/learning/heat_phase.hpp"
+#include "estimator/estimator_config.hpp"
 #include "estimator/learning/recorded_course.hpp"
 #include "estimator/state_archive.hpp"
 #include "estimator/thermal_model.hpp"

@@ -1,9 +1,17 @@
-/// What the estimator does, and why it does not simply compensate.
+/// What the estimator does in a step, why it does not simply compensate, and where each axis is to
+/// go.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string_view>
+#include <vector>
+
+#include "estimator/estimator_config.hpp"
+#include "estimator/state_archive.hpp"
+#include "estimator/step_values.hpp"
+#include "estimator/types.hpp"
 
 namespace thermocomp {
 
@@ -46,5 +54,75 @@ inline constexpr std::size_t reasons_count = 19;
 [[nodiscard]] constexpr bool has_reason(std::uint32_t reasons, Reason reason) noexcept {
   return (reasons & static_cast<std::uint32_t>(reason)) != 0;
 }
+
+struct ModeInput {
+  StepTime time;
+  bool displacement_known{false};
+  bool controller_online{false};
+  bool axes_synced{false};          ///< what the controller applies is known of each axis
+  bool controller_written{false};   ///< offsets that were sent lately are known to have been taken
+  bool controller_disables{false};  ///< by its switch, as last told
+};
+
+/// The rule, the first that holds:
+///
+///     disabled          by the operator or the controller
+///     ramping_to_zero   the daemon is about to end, or nothing worked for longer than hold_s and
+///                       on_loss says so
+///     compensating      displacement, controller and what it applies are known, and the offsets
+///                       are written ("works")
+///     holding           it worked before
+///     starting          it never did
+class ModeDecision {
+ public:
+  struct State {
+    bool ever_worked{false};
+    nanoseconds lost_since{};  ///< the last step that worked, or the first one
+    bool enabled{true};        ///< the operator's switch
+    bool stopping{false};      ///< the daemon is about to end: nowhere but to zero
+    Mode mode{Mode::starting};
+    nanoseconds mode_since{};
+  };
+
+  explicit ModeDecision(const CompensationConfig& config);
+
+  Mode step(const ModeInput& input) noexcept;
+
+  void enable(bool enabled) noexcept { state_.enabled = enabled; }
+  void stop() noexcept { state_.stopping = true; }
+  [[nodiscard]] const State& state() const noexcept { return state_; }
+
+  void adopt(const ModeDecision& previous) noexcept { state_ = previous.state_; }
+  void visit_state(StateArchive& archive) {
+    auto& [ever_worked, lost_since, enabled, stopping, mode, mode_since] = state_;
+    archive(ever_worked, lost_since, enabled, stopping, mode, mode_since);
+  }
+
+ private:
+  [[nodiscard]] Mode decide(const ModeInput& input, bool works) const noexcept;
+
+  const bool gives_up_;  ///< on_loss = "ramp_to_zero"
+  const nanoseconds hold_;
+  State state_;
+};
+
+/// Compensating: the negative of the displacement, times the axis' sign. Disabled or on the way to
+/// zero: zero. Otherwise: stay.
+///
+/// Lost data never clear an offset mid-cut, nor where it is not known whether the machine is
+/// cutting: it is held as in Mode::holding, so that one outside a smaller bound still comes in.
+class TargetRule {
+ public:
+  explicit TargetRule(const EstimatorConfig& config);
+
+  /// @param axis_um  one per axis: what is compensated
+  [[nodiscard]] Targets step(Mode mode, std::span<const double> axis_um,
+                             const Displacement& displacement, const Signals& signals) noexcept;
+
+ private:
+  const bool hold_while_cutting_;
+  std::vector<double> signs_;
+  std::vector<double> targets_um_;
+};
 
 }  // namespace thermocomp

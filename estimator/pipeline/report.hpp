@@ -4,10 +4,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "estimator/axes/mismatch.hpp"
+#include "estimator/axes/read_back.hpp"
 #include "estimator/learning/running_correction.hpp"
 #include "estimator/pipeline/mode.hpp"
-#include "estimator/sensing/sensor_report.hpp"
+#include "estimator/sensing/screening.hpp"
 #include "estimator/types.hpp"
 
 namespace thermocomp {

@@ -38,8 +38,7 @@ SignalIntake::SignalIntake(const EstimatorConfig& config, const ThermalModel& mo
       cutting_(switch_index(config, config.compensation.cutting_signal, "cutting_signal")),
       disable_(switch_index(config, config.compensation.disable_signal, "disable_signal")),
       cycle_end_(switch_index(config, config.compensation.cycle_end_signal, "cycle_end_signal")),
-      stale_after_(std::chrono::duration_cast<nanoseconds>(
-          seconds_d(config.compensation.controller_stale_after_s))),
+      stale_after_(to_nanoseconds(config.compensation.controller_stale_after_s)),
       of_model_(model_signals_.size(), not_a_number) {
   state_.told.fill(not_a_number);
 }

@@ -3,8 +3,7 @@
 #include "estimator/checks.hpp"
 #include "estimator/model/displacement_model.hpp"
 #include "estimator/name_index.hpp"
-#include "estimator/pipeline/reasons.hpp"
-#include "estimator/temperature_range.hpp"
+#include "estimator/sensing/screening.hpp"
 
 namespace thermocomp {
 namespace {
@@ -25,10 +24,48 @@ std::vector<std::size_t> outputs_of_axes(const EstimatorConfig& config, const Th
   return outputs;
 }
 
-std::vector<std::string> axis_names(const EstimatorConfig& config) {
-  std::vector<std::string> names;
-  for (const AxisConfig& axis : config.axes) names.push_back(axis.name);
-  return names;
+class ReasonSet {
+ public:
+  void add(bool holds, Reason reason) noexcept {
+    if (holds) bits_ |= static_cast<std::uint32_t>(reason);
+  }
+  [[nodiscard]] std::uint32_t bits() const noexcept { return bits_; }
+
+ private:
+  std::uint32_t bits_{0};
+};
+
+/// Why a step did not simply compensate, from all that the stages handed on.
+/// @param written  by the controller's link, see ControllerState
+/// @return a set of Reason
+std::uint32_t reasons_of(const Signals& signals, bool written, const Temperatures& temps,
+                         const ReferenceState& reference, const Displacement& displacement,
+                         const ModeDecision::State& mode, const Targets& targets,
+                         const AxisBank& axes) noexcept {
+  ReasonSet reasons;
+  reasons.add(!signals.online, Reason::controller_offline);
+  reasons.add(!signals.complete, Reason::signal_lost);
+  reasons.add(!reference.known, Reason::no_reference);
+  reasons.add(displacement.block_lost, Reason::block_lost);
+  reasons.add(displacement.block_estimated, Reason::block_estimated);
+  reasons.add(temps.suspected, Reason::sensor_suspected);
+  reasons.add(temps.jumped, Reason::sensor_unconfirmed);
+  reasons.add(displacement.not_finite, Reason::no_target);
+  reasons.add(displacement.outside, Reason::outside_domain);
+  reasons.add(!mode.enabled, Reason::operator_disabled);
+  reasons.add(signals.disable >= 0.5, Reason::controller_disabled);
+  reasons.add(!targets.may_change || targets.waits_for_cut, Reason::cutting);
+  for (const AxisChannel& axis : axes.all()) {
+    // Of an axis that is not driven nothing is sent.
+    reasons.add(signals.online && axis.driven() && !written, Reason::not_written);
+    reasons.add(!axis.synced(), Reason::not_synced);
+    reasons.add(axis.start_unknown(), Reason::start_unknown);
+    reasons.add(axis.mismatch(), Reason::mismatch);
+    reasons.add(axis.latched(), Reason::mismatch_latched);
+    reasons.add(axis.at_bound(), Reason::at_bound);
+    reasons.add(axis.out_of_bound(), Reason::applied_out_of_bound);
+  }
+  return reasons.bits();
 }
 
 }  // namespace
@@ -51,7 +88,7 @@ void Stages::step(nanoseconds now, std::span<const Reading> readings,
                   const ControllerState& controller, OffsetCommand& command) noexcept {
   THERMOCOMP_ENSURE(!record.stepped || now >= record.now);
   StepTime time{now, 0.0, !record.stepped};
-  if (record.stepped) time.dt_s = 1e-9 * static_cast<double>((now - record.now).count());
+  if (record.stepped) time.dt_s = to_seconds(now - record.now);
 
   const Signals told = signals.step(now, controller);
   Temperatures temps = sensing.step(now, readings);
@@ -82,7 +119,7 @@ void Stages::plan_adoption(const Stages& previous) {
   sensing.plan_adoption(previous.sensing);
   plan.columns = plan_names(model.temperature_columns(), previous.model.temperature_columns());
   plan.signals = plan_names(model.signal_columns(), previous.model.signal_columns());
-  plan.axes = plan_names(axis_names(config), axis_names(previous.config));
+  plan.axes = plan_names(entry_names(config.axes), entry_names(previous.config.axes));
   plan.terms = prediction.plan_terms(previous.prediction);
   plan.same_domain = prediction.same_domain(previous.prediction);
 }

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "estimator/sensing/screening.hpp"
-#include "estimator/sensing/sensor_report.hpp"
 #include "estimator/sensing/smoothing.hpp"
 
 namespace thermocomp {

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "estimator/checks.hpp"
-#include "estimator/sensing/precision.hpp"
+#include "estimator/sensing/neighbour_check.hpp"
 
 namespace thermocomp {
 namespace {
@@ -14,7 +14,7 @@ constexpr double variance_K2_min = 1e-12;
 constexpr double temp_degC_max = 1e4;
 
 double grown(nanoseconds age, double time_s) noexcept {
-  return thermocomp::grown(1e-9 * static_cast<double>(age.count()), time_s);
+  return thermocomp::grown(to_seconds(age), time_s);
 }
 
 }  // namespace

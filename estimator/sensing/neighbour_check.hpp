@@ -1,4 +1,5 @@
-/// Which temperature changed as its neighbours say that it cannot have.
+/// Which temperature changed as its neighbours say that it cannot have; and the precision matrix of
+/// the model's inputs, which the expectation of each from the others needs.
 #pragma once
 
 #include <array>
@@ -10,6 +11,16 @@
 #include "estimator/types.hpp"
 
 namespace thermocomp {
+
+/// (C + noise^2 I)^-1 of the model's covariance, row by row; allocates.
+/// @throws InvalidValue when the matrix or the growth of its errors does not fit the model
+[[nodiscard]] std::vector<double> precision_per_K2(const ThermalModel& model);
+
+/// 1 - exp(-age / time); 1 where it is grown at once.
+[[nodiscard]] double grown(double age_s, double time_s) noexcept;
+
+[[nodiscard]] double drift_factor(const CovarianceGrowth& growth, std::size_t input) noexcept;
+[[nodiscard]] double scatter_factor(const CovarianceGrowth& growth, std::size_t input) noexcept;
 
 /// A change between two moments, and how sure one must be.
 struct ChangeAsked {

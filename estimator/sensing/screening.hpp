@@ -1,11 +1,38 @@
-/// Which readings are refused before they can move an axis.
+/// Which readings are refused before they can move an axis, and which temperatures a column of the
+/// model can have at all: those that the screening of its sensors lets through.
 #pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
 
 #include "estimator/estimator_config.hpp"
 #include "estimator/state_archive.hpp"
+#include "estimator/thermal_model.hpp"
 #include "estimator/types.hpp"
 
 namespace thermocomp {
+
+/// One sensor after a step, for people.
+struct SensorReport {
+  double raw_degC{not_a_number};       ///< as the driver gave it
+  double smoothed_degC{not_a_number};  ///< what the block gets; a difference where configured
+  nanoseconds taken_at{};
+  Fault fault{Fault::never_read};     ///< after screening
+  std::uint32_t clipped_in_a_row{0};  ///< values that smoothing clipped in a row
+  std::uint64_t clipped{0};
+  std::uint64_t rejected{0};  ///< readings refused by screening since the start
+  bool waiting{false};        ///< a value is there that does not count yet
+  bool jumped{false};         ///< ... because it contradicts what was or what is expected
+  double jump_K{0.0};         ///< ... by so much, now
+  double jumped_from_degC{not_a_number};
+  nanoseconds jumped_at{};
+  bool suspected{false};     ///< good values that the neighbours contradict
+  bool weighed_down{false};  ///< ... and its blocks do without it
+  double suspected_size_K{0.0};
+  nanoseconds suspected_since{};
+};
 
 /// Judges one sensor's readings, each once, when it is new. A refused reading is as good as none:
 /// the last one that counted serves until it is stale.
@@ -143,5 +170,29 @@ class Screening {
   State state_;
   Surroundings surroundings_;  ///< made anew each step while a value is waiting
 };
+
+/// A reference outside it was never taken at the machine.
+class TemperatureRange {
+ public:
+  /// Of all sensors of the column's block; of a sensor that shows a difference, the difference of
+  /// two ranges. A column without sensors may have any finite temperature.
+  TemperatureRange(const EstimatorConfig& config, const std::string& column);
+
+  [[nodiscard]] bool holds(double temp_degC) const noexcept;  ///< false for NaN
+  [[nodiscard]] std::string rule() const;  ///< "must be in [-30, 200], what the screening ..."
+
+ private:
+  double degC_min_{not_a_number};
+  double degC_max_{not_a_number};
+};
+
+/// Of kept references, those that no sensor of their column can show, in words:
+/// "reference_degC.t1_degC = 1e+300 must be in ...".
+[[nodiscard]] std::vector<std::string> impossible_references(
+    const EstimatorConfig& config, const std::vector<std::string>& columns,
+    const std::map<std::string, double>& reference_degC);
+
+/// The numbers that the model file gives as reference. @throws InvalidValue with the key
+void check_reference(const EstimatorConfig& config, const ThermalModel& model);
 
 }  // namespace thermocomp

@@ -49,9 +49,8 @@ void LineOfLines::restart() noexcept {
 Smoother::Smoother(const SmoothingConfig& config)
     : form_(config.form),
       screened_(config.history == SmoothingHistory::screened),
-      period_(std::chrono::duration_cast<nanoseconds>(seconds_d(config.period_s))),
-      outage_(std::max(std::chrono::duration_cast<nanoseconds>(seconds_d(config.outage_s)),
-                       2 * period_)),
+      period_(to_nanoseconds(config.period_s)),
+      outage_(std::max(to_nanoseconds(config.outage_s), 2 * period_)),
       half_width_K_(config.half_width_K),
       sliding_line_(config.samples),
       line_of_lines_(config.samples, config.blocks) {

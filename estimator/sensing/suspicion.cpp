@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "estimator/checks.hpp"
-#include "estimator/sensing/line_fit.hpp"
+#include "estimator/sensing/smoothing.hpp"
 
 namespace thermocomp {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "estimator/estimator_config.hpp"
 #include "estimator/sensing/neighbour_check.hpp"
-#include "estimator/sensing/sensor_report.hpp"
+#include "estimator/sensing/screening.hpp"
 #include "estimator/state_archive.hpp"
 #include "estimator/thermal_model.hpp"
 

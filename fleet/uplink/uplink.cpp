@@ -4,7 +4,7 @@
 
 #include <spdlog/spdlog.h>
 
-#include "daemon/history/format/recorded_event.hpp"
+#include "daemon/history/reading/history_reader.hpp"
 
 namespace thermocomp::fleet {
 namespace {

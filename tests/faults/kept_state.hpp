@@ -11,7 +11,7 @@
 #include "chance.hpp"
 #include "daemon/recording/last_sent.hpp"
 #include "daemon/start_state.hpp"
-#include "estimator/pipeline/persistent_state.hpp"
+#include "estimator/pipeline/estimator.hpp"
 #include "fault_schedule.hpp"
 #include "machine.hpp"
 

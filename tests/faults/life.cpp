@@ -7,9 +7,9 @@
 #include <fmt/format.h>
 #include <memory>
 
-#include "estimator/axis_spans.hpp"
 #include "estimator/checks.hpp"
-#include "estimator/pipeline/persistent_state.hpp"
+#include "estimator/estimator_config.hpp"
+#include "estimator/pipeline/estimator.hpp"
 #include "history_disk.hpp"
 #include "kept_state.hpp"
 #include "recorded_twin.hpp"

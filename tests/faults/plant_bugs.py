@@ -10,10 +10,10 @@ from planting import write_copies, write_if_new  # noqa: E402
 
 # (name, file, what stands there, what stands there instead)
 BUGS = [
-    ("slew_doubled", "estimator/axes/limiter.cpp",
+    ("slew_doubled", "estimator/axes/axis_channel.cpp",
      "rate_um_per_s_ * std::min(dt_s, dt_s_max);",
      "({P} ? 2.0 : 1.0) * rate_um_per_s_ * std::min(dt_s, dt_s_max);"),
-    ("bound_forgotten", "estimator/axes/limiter.cpp",
+    ("bound_forgotten", "estimator/axes/axis_channel.cpp",
      "std::clamp(wanted_um, -bound_um_, bound_um_);",
      "{P} ? wanted_um : std::clamp(wanted_um, -bound_um_, bound_um_);"),
     ("reload_starts_from_zero", "estimator/axes/axis_channel.cpp",
@@ -36,7 +36,7 @@ BUGS = [
      "  const Exchange exchange = write_field(connection_, config_, request);",
      "  const auto once = [&] { return write_field(connection_, config_, request); };\n"
      "  const Exchange exchange = {P} ? with_retries(once) : once();"),
-    ("unwritten_compensates", "estimator/pipeline/mode_decision.cpp",
+    ("unwritten_compensates", "estimator/pipeline/mode.cpp",
      "input.controller_written;",
      "(input.controller_written || {P});"),
     ("refused_offset_pent_up", "estimator/axes/axis_channel.cpp",
@@ -71,13 +71,13 @@ BUGS = [
     ("restart_of_a_silent_controller_missed", "estimator/axes/axis_channel.cpp",
      "if (!is_same_link(state_.epoch, first_epoch) && away > lag_max)",
      "if (!is_same_link(state_.epoch, first_epoch) && away > lag_max && !{P})"),
-    ("reference_not_restored", "estimator/pipeline/reference.cpp",
+    ("reference_not_restored", "estimator/sensing/sensing.cpp",
      "take_if_finite(temps_degC, columns_[i], temps_degC_[i]);",
      "if (!{P}) take_if_finite(temps_degC, columns_[i], temps_degC_[i]);"),
-    ("hold_clears_mid_cut", "estimator/pipeline/target_rule.cpp",
+    ("hold_clears_mid_cut", "estimator/pipeline/mode.cpp",
      "mode == Mode::ramping_to_zero && signals.may_be_cutting();",
      "mode == Mode::ramping_to_zero && signals.may_be_cutting() && !{P};"),
-    ("hold_time_ignored", "estimator/pipeline/mode_decision.cpp",
+    ("hold_time_ignored", "estimator/pipeline/mode.cpp",
      "input.time.now - state_.lost_since > hold_;",
      "input.time.now - state_.lost_since > ({P} ? nanoseconds{0} : hold_);"),
     ("stale_reading_used", "estimator/sensing/screening.hpp",

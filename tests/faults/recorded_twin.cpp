@@ -3,7 +3,7 @@
 #include <array>
 #include <limits>
 
-#include "daemon/history/format/history_error.hpp"
+#include "daemon/history/format/segments.hpp"
 
 namespace thermocomp::faults {
 namespace {

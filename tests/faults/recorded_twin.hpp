@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "daemon/history/format/chunk_codec.hpp"
-#include "daemon/history/format/record_order.hpp"
+#include "daemon/history/format/segments.hpp"
 #include "daemon/history/replay/segment_walk.hpp"
 #include "daemon/recording/cycle_recorder.hpp"
 #include "daemon/recording/record.hpp"

@@ -9,8 +9,8 @@
 
 #include "common/fuzz.hpp"
 #include "common/recorded_history.hpp"
-#include "daemon/methods/bridge_methods.hpp"
-#include "daemon/socket/rpc_dispatcher.hpp"
+#include "daemon/methods/methods.hpp"
+#include "daemon/socket/rpc.hpp"
 #include "estimator/pipeline/estimator.hpp"
 
 using namespace thermocomp;

@@ -5,7 +5,7 @@
 
 #include "common/fuzz.hpp"
 #include "daemon/history/format/chunk_codec.hpp"
-#include "daemon/history/format/history_error.hpp"
+#include "daemon/history/format/segments.hpp"
 
 using namespace thermocomp;
 

@@ -16,7 +16,7 @@
 #include "common/recorded_history.hpp"
 #include "daemon/history/format/chunk_codec.hpp"
 #include "daemon/history/reading/history_reader.hpp"
-#include "daemon/history/replay/history_check.hpp"
+#include "daemon/history/replay/replay.hpp"
 
 using namespace thermocomp;
 

@@ -15,7 +15,7 @@
 
 #include "common/fuzz.hpp"
 #include "common/recorded_history.hpp"
-#include "daemon/methods/operator_methods.hpp"
+#include "daemon/methods/methods.hpp"
 #include "daemon/socket/status_server.hpp"
 #include "estimator/pipeline/estimator.hpp"
 

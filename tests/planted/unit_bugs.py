@@ -15,15 +15,14 @@ from planting import files_of, write_copies, write_if_new
 
 SCREENING = "estimator/sensing/screening.cpp"
 BLOCKS = "estimator/sensing/block_bank.cpp"
-REFERENCE = "estimator/pipeline/reference.cpp"
+REFERENCE = "estimator/sensing/sensing.cpp"
 SMOOTHING = "estimator/sensing/smoothing.cpp"
 LOST = "estimator/sensing/lost_blocks.cpp"
-APPLIED = "estimator/axes/applied_check.cpp"
-MISMATCH = "estimator/axes/mismatch.cpp"
+READ_BACK = "estimator/axes/read_back.cpp"
 TERMS = "estimator/model/terms/"
 CYCLE = "daemon/cycle/cycle.cpp"
 HANDLE = "daemon/cycle/cycle_handle.cpp"
-QUEUE = "daemon/cycle/command_queue.cpp"
+QUEUE = "daemon/cycle/cycle.cpp"
 DIALOGUE = "drivers/controllers/kinds/modbus/modbus_dialogue.cpp"
 SIGNALS = "drivers/can/signal_codec.cpp"
 SDO = "drivers/can/canopen/sdo_client.cpp"
@@ -95,19 +94,19 @@ SUITES = {
         ("restored_value_is_certain", LOST,
          "state_.spread_K2[at(i, k)] * drift_factor(growth_, i) * drift_factor(growth_, k);",
          "state_.spread_K2[at(i, k)] * drift_factor(growth_, i) * ({P} ? 0.0 : drift_factor(growth_, k));"),
-        ("offsets_of_long_ago_explain", APPLIED,
+        ("offsets_of_long_ago_explain", READ_BACK,
          "if (now >= state_.slot_until) {", "if (now >= state_.slot_until && !{P}) {"),
-        ("too_much_is_explained", APPLIED,
+        ("too_much_is_explained", READ_BACK,
          "applied_um <= high_um + tolerance_um_;",
          "applied_um <= high_um + ({P} ? 1e9 : tolerance_um_);"),
-        ("too_little_is_explained", APPLIED,
+        ("too_little_is_explained", READ_BACK,
          "applied_um >= low_um - tolerance_um_",
          "applied_um >= low_um - ({P} ? 1e9 : tolerance_um_)"),
-        ("zero_after_absence_is_a_mismatch", APPLIED,
+        ("zero_after_absence_is_a_mismatch", READ_BACK,
          "std::min(0.0, lowest_um()), std::max(0.0, highest_um())",
          "{P} ? lowest_um() : std::min(0.0, lowest_um()),\n"
          "                    {P} ? highest_um() : std::max(0.0, highest_um())"),
-        ("constant_must_have_been_there_always", MISMATCH,
+        ("constant_must_have_been_there_always", READ_BACK,
          "const bool is_constant = lately.sure &&",
          "const bool is_constant = !{P} && lately.sure &&"),
         ("lag_is_no_difference", TERMS + "thermal_lag.cpp",

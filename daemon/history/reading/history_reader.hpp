@@ -1,19 +1,35 @@
-/// Reads a history, even one that a daemon is writing at the moment.
+/// Reads a history, even one that a daemon is writing at the moment: its events, segments and
+/// records.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
-#include "daemon/history/format/history_error.hpp"
-#include "daemon/history/format/segment_info.hpp"
+#include "daemon/history/format/history_time.hpp"
+#include "daemon/history/format/segments.hpp"
 #include "daemon/recording/record.hpp"
 #include "estimator/types.hpp"
+#include "status/event.hpp"
 
 namespace thermocomp {
+
+/// The events, oldest first. Times of `from` and `to` are wall times; seconds count from the first
+/// event.
+/// @throws HistoryError: no history, or one that cannot be read
+[[nodiscard]] std::vector<RecordedEvent> read_events(const std::filesystem::path& history,
+                                                     const std::optional<HistoryTime>& from = {},
+                                                     const std::optional<HistoryTime>& to = {});
+
+/// The events after that of `run` and `number`, by run and number, `count` at most.
+/// @throws HistoryError: no history, or one that cannot be read
+[[nodiscard]] std::vector<RecordedEvent> read_events_after(const std::filesystem::path& history,
+                                                           std::int64_t run, std::uint64_t number,
+                                                           std::int64_t count);
 
 /// What was in force right before the first cycle of a segment.
 struct SegmentStart {

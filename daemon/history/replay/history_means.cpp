@@ -4,8 +4,8 @@
 #include <cmath>
 #include <utility>
 
-#include "daemon/history/replay/replay_setup.hpp"
 #include "daemon/history/replay/segment_export.hpp"
+#include "daemon/history/replay/segment_walk.hpp"
 
 namespace thermocomp {
 namespace {

@@ -1,4 +1,5 @@
-/// The daemon's own estimator over what was recorded, and the record as a run file.
+/// The daemon's own estimator over what was recorded, the record as a run file, and which parts of
+/// a history are sound. Only looks: nothing is repaired in place.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +13,7 @@
 
 #include "daemon/history/format/history_time.hpp"
 #include "daemon/history/reading/history_reader.hpp"
-#include "daemon/history/replay/replay_setup.hpp"
+#include "daemon/history/replay/segment_walk.hpp"
 #include "estimator/estimator_config.hpp"
 
 namespace thermocomp {
@@ -87,5 +88,24 @@ ExportSummary export_run(const std::filesystem::path& history,
                          const std::optional<HistoryTime>& to, std::ostream& out,
                          const Progress& progress = {}, const SetupParser& parser = parse_setup,
                          ExportContent content = ExportContent::inputs);
+
+struct SegmentCheck {
+  SegmentInfo segment;
+  std::uint64_t records{0};           ///< that can be read
+  std::vector<HistoryDamage> damage;  ///< none: it is sound
+};
+
+struct HistoryCheck {
+  std::vector<SegmentCheck> segments;  ///< those that can be read in part at least, oldest first
+  std::vector<HistoryDamage> damage;   ///< of the file, and segments that cannot be read at all
+  [[nodiscard]] bool is_sound() const noexcept;
+};
+
+/// Every row, chunk and record: checksums, the order of
+/// records, the state and inputs at the start of each segment, its configuration.
+/// @throws HistoryError when nothing can be taken from the file
+[[nodiscard]] HistoryCheck check_history(const std::filesystem::path& history,
+                                         const Progress& progress = {},
+                                         const SetupParser& parser = parse_setup);
 
 }  // namespace thermocomp

@@ -6,7 +6,7 @@
 #include <span>
 
 #include "config/text/printable_text.hpp"
-#include "estimator/axis_spans.hpp"
+#include "estimator/estimator_config.hpp"
 
 namespace thermocomp {
 namespace {

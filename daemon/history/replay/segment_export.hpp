@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "daemon/history/replay/replay.hpp"
-#include "daemon/history/replay/segment_steps.hpp"
 #include "daemon/history/replay/segment_walk.hpp"
 #include "estimator/pipeline/estimator.hpp"
 

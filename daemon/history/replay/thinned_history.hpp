@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "daemon/history/reading/history_reader.hpp"
-#include "daemon/history/replay/replay_setup.hpp"
+#include "daemon/history/replay/segment_walk.hpp"
 #include "estimator/types.hpp"
 #include "status/event.hpp"
 

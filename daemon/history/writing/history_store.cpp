@@ -10,9 +10,8 @@
 #include <sys/stat.h>
 #include <system_error>
 
+#include "daemon/history/format/database.hpp"
 #include "daemon/history/format/history_time.hpp"
-#include "daemon/history/format/recorded_event.hpp"
-#include "daemon/history/format/row_checksum.hpp"
 #include "status/status_json.hpp"
 
 namespace thermocomp {

@@ -9,8 +9,8 @@
 ///            force
 ///   chunk    the records of a segment in order, packed (chunk_codec.hpp), one row or more per
 ///            commit; wall_minus_grid_ns: wall clock minus the grid's time when it was written
-///   event    what happened (recorded_event.hpp), the newest
-/// segment and chunk have a checksum (row_checksum.hpp).
+///   event    what happened (status/event.hpp), the newest
+/// segment and chunk have a checksum (database.hpp).
 #pragma once
 
 #include <array>
@@ -29,9 +29,8 @@
 #include "config/daemon/daemon_config.hpp"
 #include "daemon/history/format/chunk_codec.hpp"
 #include "daemon/history/format/database.hpp"
-#include "daemon/history/format/segment_info.hpp"
-#include "daemon/locks/file_lock.hpp"
-#include "daemon/recording/grid.hpp"
+#include "daemon/history/format/segments.hpp"
+#include "daemon/locks/locks.hpp"
 #include "daemon/recording/record.hpp"
 #include "status/event.hpp"
 

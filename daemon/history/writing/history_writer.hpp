@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "config/daemon/daemon_config.hpp"
-#include "daemon/history/format/segment_info.hpp"
+#include "daemon/history/format/segments.hpp"
 #include "daemon/recording/cycle_recorder.hpp"
-#include "daemon/recording/grid.hpp"
+#include "daemon/recording/record.hpp"
 #include "status/event.hpp"
 
 namespace thermocomp {

@@ -1,4 +1,5 @@
-/// First-order low pass with the exact step response for an input that is constant over the step.
+/// First-order low pass with the exact step response for an input that is constant over the step,
+/// and its inverse.
 #pragma once
 
 #include <chrono>
@@ -41,6 +42,47 @@ class LowPass {
   double value_{0.0};
   nanoseconds step_{};  ///< the step that share_ was computed for: exp() once, not every cycle
   double share_{0.0};
+};
+
+/// T = r + tau d/dt LP_f(r), the inverse of a reading r that follows T with the time constant tau.
+/// The derivative is taken of the reading smoothed with tau_f = tau / 4: that multiplies the noise
+/// of single readings by at most 1 + tau / tau_f = 5, and leaves an error of only tau tau_f T''.
+/// The first step passes the reading on. tau = 0 always does.
+class Lead {
+ public:
+  explicit Lead(double tau_s) : tau_s_(tau_s), smooth_(smoothing_share * tau_s) {}
+
+  void restart() noexcept {
+    started_ = false;
+    smooth_.restart();
+  }
+
+  /// @param now  time of `reading`; must not run backwards
+  double step(nanoseconds now, double reading) noexcept {
+    const double smooth = smooth_.step(now, reading);
+    if (!started_)
+      slope_per_s_ = 0.0;
+    else if (now != at_)
+      slope_per_s_ = (smooth - before_) / std::chrono::duration<double>(now - at_).count();
+    started_ = true;
+    at_ = now;
+    before_ = smooth;
+    return reading + tau_s_ * slope_per_s_;
+  }
+
+  void visit_state(StateArchive& archive) {
+    archive(smooth_, started_, at_, before_, slope_per_s_);
+  }
+
+ private:
+  static constexpr double smoothing_share = 0.25;
+
+  double tau_s_;
+  LowPass smooth_;
+  bool started_{false};
+  nanoseconds at_{};
+  double before_{0.0};
+  double slope_per_s_{0.0};
 };
 
 }  // namespace thermocomp

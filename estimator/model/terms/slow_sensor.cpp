@@ -1,4 +1,4 @@
-#include "estimator/model/terms/lead.hpp"
+#include "estimator/model/terms/low_pass.hpp"
 #include "estimator/model/terms/term.hpp"
 
 namespace thermocomp {

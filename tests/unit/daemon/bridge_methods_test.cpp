@@ -1,9 +1,8 @@
 // The method `controller_state`: what it takes, what it refuses, what it answers.
-#include "daemon/methods/bridge_methods.hpp"
-
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
 
+#include "daemon/methods/methods.hpp"
 #include "daemon/socket/rpc.hpp"
 
 using namespace thermocomp;

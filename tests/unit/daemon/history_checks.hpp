@@ -7,7 +7,7 @@
 #include <sqlite3.h>
 
 #include "daemon/history/reading/history_reader.hpp"
-#include "daemon/history/replay/history_check.hpp"
+#include "daemon/history/replay/replay.hpp"
 #include "history_fixture.hpp"
 
 namespace thermocomp::testing {

@@ -8,7 +8,7 @@
 #include <sqlite3.h>
 
 #include "config/runs/run_file.hpp"
-#include "daemon/history/format/recorded_event.hpp"
+#include "daemon/history/reading/history_reader.hpp"
 #include "history_fixture.hpp"
 
 using namespace thermocomp;

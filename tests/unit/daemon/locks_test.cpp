@@ -1,4 +1,6 @@
 // What one process may have alone: who is refused, what they are told, and when it is free again.
+#include "daemon/locks/locks.hpp"
+
 #include <algorithm>
 #include <csignal>
 #include <cstddef>
@@ -11,8 +13,6 @@
 #include <sys/wait.h>
 
 #include "daemon/controller_lock.hpp"
-#include "daemon/locks/file_lock.hpp"
-#include "daemon/locks/name_lock.hpp"
 #include "history_fixture.hpp"
 
 using namespace thermocomp;

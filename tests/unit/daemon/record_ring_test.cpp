@@ -1,11 +1,10 @@
-#include "daemon/recording/record_ring.hpp"
-
 #include <random>
 #include <thread>
 
 #include <catch2/catch.hpp>
 
 #include "daemon/history/format/chunk_codec.hpp"
+#include "daemon/recording/record.hpp"
 
 using namespace thermocomp;
 

@@ -1,8 +1,7 @@
 // When a reference may be taken.
-#include "daemon/methods/reference_rules.hpp"
-
 #include <catch2/catch.hpp>
 
+#include "daemon/methods/methods.hpp"
 #include "estimator/checks.hpp"
 
 using namespace thermocomp;

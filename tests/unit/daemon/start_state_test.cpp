@@ -7,9 +7,8 @@
 #include <catch2/catch.hpp>
 #include <sqlite3.h>
 
-#include "daemon/history/replay/last_state.hpp"
 #include "daemon/state/state_file.hpp"
-#include "estimator/pipeline/persistent_state.hpp"
+#include "estimator/pipeline/estimator.hpp"
 #include "history_fixture.hpp"
 
 using namespace thermocomp;

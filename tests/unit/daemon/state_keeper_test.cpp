@@ -1,6 +1,4 @@
 // When the state is written, and what is known of it when it cannot be.
-#include "daemon/state/state_keeper.hpp"
-
 #include <atomic>
 #include <thread>
 #include <unistd.h>

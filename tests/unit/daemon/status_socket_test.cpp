@@ -8,8 +8,8 @@
 #include <sys/stat.h>
 #include <sys/wait.h>
 
-#include "daemon/socket/peer_access.hpp"
-#include "daemon/socket/rpc_dispatcher.hpp"
+#include "daemon/socket/listening_socket.hpp"
+#include "daemon/socket/rpc.hpp"
 #include "daemon/socket/status_client.hpp"
 #include "socket_fixture.hpp"
 

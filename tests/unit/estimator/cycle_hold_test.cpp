@@ -1,9 +1,7 @@
 /// Corrections once a machining cycle, and what is held between.
-#include "estimator/learning/cycle_hold.hpp"
-
 #include <catch2/catch.hpp>
 
-#include "estimator/learning/cycle_ends.hpp"
+#include "estimator/learning/cycle_update.hpp"
 #include "small_machine.hpp"
 
 using namespace thermocomp;

@@ -1,8 +1,8 @@
-#include "estimator/axes/limiter.hpp"
-
 #include <limits>
 
 #include <catch2/catch.hpp>
+
+#include "estimator/axes/axis_channel.hpp"
 
 using namespace thermocomp;
 

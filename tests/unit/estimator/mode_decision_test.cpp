@@ -1,7 +1,7 @@
 /// The rule of the mode, case by case.
-#include "estimator/pipeline/mode_decision.hpp"
-
 #include <catch2/catch.hpp>
+
+#include "estimator/pipeline/mode.hpp"
 
 using namespace thermocomp;
 using namespace std::chrono_literals;

@@ -7,8 +7,7 @@
 #include <catch2/catch.hpp>
 
 #include "estimator/checks.hpp"
-#include "estimator/learning/probed_error.hpp"
-#include "estimator/model/outside_share.hpp"
+#include "estimator/learning/probings.hpp"
 #include "small_machine.hpp"
 
 using namespace thermocomp;

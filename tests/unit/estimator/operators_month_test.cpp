@@ -9,7 +9,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "estimator/learning/measured_question.hpp"
+#include "estimator/learning/probings.hpp"
 #include "small_machine.hpp"
 
 using namespace thermocomp;

@@ -7,7 +7,6 @@
 #include <catch2/catch.hpp>
 
 #include "estimator/checks.hpp"
-#include "estimator/learning/heat_phase.hpp"
 #include "estimator/learning/running_correction.hpp"
 
 using namespace thermocomp;

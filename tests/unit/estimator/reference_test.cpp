@@ -1,11 +1,10 @@
 /// What displacement is counted from, and when that is taken.
-#include "estimator/pipeline/reference.hpp"
-
 #include <cmath>
 #include <vector>
 
 #include <catch2/catch.hpp>
 
+#include "estimator/sensing/sensing.hpp"
 #include "small_machine.hpp"
 
 using namespace thermocomp;

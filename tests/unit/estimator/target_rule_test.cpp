@@ -1,12 +1,11 @@
 /// Where the axes are to go, and what a step tells of the controller's signals.
-#include "estimator/pipeline/target_rule.hpp"
-
 #include <cmath>
 #include <memory>
 #include <vector>
 
 #include <catch2/catch.hpp>
 
+#include "estimator/pipeline/mode.hpp"
 #include "estimator/pipeline/signal_intake.hpp"
 #include "small_machine.hpp"
 

@@ -6,7 +6,7 @@
 #include "estimator/checks.hpp"
 #include "estimator/estimator_config.hpp"
 #include "estimator/model/displacement_model.hpp"
-#include "estimator/model/terms/lead.hpp"
+#include "estimator/model/terms/low_pass.hpp"
 #include "estimator/model/terms/play.hpp"
 
 using namespace thermocomp;

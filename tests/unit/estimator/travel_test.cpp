@@ -5,9 +5,8 @@
 
 #include <catch2/catch.hpp>
 
-#include "estimator/axis_spans.hpp"
 #include "estimator/checks.hpp"
-#include "estimator/model/minimax_line.hpp"
+#include "estimator/estimator_config.hpp"
 #include "estimator/model/travel_curves.hpp"
 #include "small_machine.hpp"
 

@@ -1,9 +1,7 @@
-#include "daemon/history/reading/sound_segments.hpp"
+#include "daemon/history/format/segments.hpp"
 
 #include <algorithm>
 #include <utility>
-
-#include "daemon/history/format/history_error.hpp"
 
 namespace thermocomp {
 namespace {

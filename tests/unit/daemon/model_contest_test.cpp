@@ -1,13 +1,13 @@
 // Probings until a candidate is called better, and how often it is called so wrongly: errors of
 // both models that are alike from hour to hour, half in common, with noise of the probe.
 // `estimator_tests "[contest]" -s` prints the figures.
-#include "estimator/learning/model_contest.hpp"
-
 #include <cmath>
 #include <random>
 #include <vector>
 
 #include <catch2/catch.hpp>
+
+#include "daemon/cycle/candidate.hpp"
 
 using namespace thermocomp;
 using namespace std::chrono_literals;

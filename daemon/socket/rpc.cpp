@@ -1,4 +1,4 @@
-#include "daemon/socket/rpc_dispatcher.hpp"
+#include "daemon/socket/rpc.hpp"
 
 #include <algorithm>
 #include <cmath>
