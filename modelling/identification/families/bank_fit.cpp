@@ -70,10 +70,9 @@ Eigen::VectorXd scales(const Eigen::VectorXd& deviation, const Eigen::VectorXd& 
   Eigen::VectorXd scale = Eigen::VectorXd::Zero(deviation.size());
   for (Eigen::Index i = 0; i < deviation.size(); ++i) {
     if (!(deviation[i] > 1e-12 * size[i])) continue;
-    const auto at = static_cast<std::size_t>(i >= late ? i - late : i);
     const Eigen::Index subject = i % static_cast<Eigen::Index>(columns.subjects.size());
     if (i >= late) {
-      if (tests.moved(columns.hinges[at].signal)) scale[i] = weight_of_hinge / deviation[i];
+      scale[i] = weight_of_hinge / deviation[i];
     } else if (subject < places) {
       scale[i] = 1.0 / std::hypot(deviation[i], usual_share * usual_K);
     } else if (tests.moved(columns.subjects[static_cast<std::size_t>(subject)])) {
@@ -143,7 +142,7 @@ void add_hinges(const MeasuredTests& tests, BankColumns& columns) {
         high = std::max(high, value);
         if (values.size() <= values_of_a_switch_max) values.insert(value);
       }
-    if (values.size() <= values_of_a_switch_max) continue;
+    if (values.size() <= values_of_a_switch_max || !tests.moved(tests.signals[i])) continue;
     const double step = (high - low) / (hinges_a_signal + 1);
     for (int j = 1; j <= hinges_a_signal; ++j) hinges.push_back({tests.signals[i], low + j * step});
   }

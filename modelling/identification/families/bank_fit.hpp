@@ -35,7 +35,8 @@ struct BankColumns {
 [[nodiscard]] BankColumns bank_columns(const MeasuredTests& tests);
 
 /// Eight hinges a signal, evenly over its range; none where they would be more than 600 columns,
-/// nor on a signal of at most six values, which its size and square say well enough.
+/// nor on a signal that did not move, or has at most six values, which its size and square say well
+/// enough.
 void add_hinges(const MeasuredTests& tests, BankColumns& columns);
 
 /// The columns over all rows of a run, less their values at its first row; shape (rows, columns).

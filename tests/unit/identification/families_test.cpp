@@ -371,6 +371,7 @@ TEST_CASE("a signal that stays at a level within each run gets no gain", "[famil
   for (std::size_t i = 0; i < bank.subjects.size(); ++i)
     if (bank.subjects[i] == "load_A")
       for (const double gain : bank.gain_um_per_unit.at("z_um")[i]) CHECK(gain == 0.0);
+  CHECK(fit.model.terms.size() == 1);  // nor has it hinges
 }
 
 TEST_CASE("a signal that goes one way once in all runs gets no gain", "[families]") {
