@@ -28,10 +28,10 @@ void require(bool holds, const char* key, double value, const char* rule);
 /// file, the check and the message come from there.
 template <class Config>
 struct NumberKey {
-  const char* key;
-  double Config::*member;
-  double min;
-  double max;
+  const char* key{nullptr};
+  double Config::*member{nullptr};
+  double min{0.0};
+  double max{0.0};
   bool min_excluded{false};
 
   /// (min, max]

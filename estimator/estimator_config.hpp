@@ -284,6 +284,7 @@ struct AxisSpan {
 /// The names of all entries.
 [[nodiscard]] inline std::vector<std::string> entry_names(const std::vector<AxisConfig>& axes) {
   std::vector<std::string> names;
+  names.reserve(axes.size());
   for (const AxisConfig& axis : axes) names.push_back(axis.name);
   return names;
 }
