@@ -2,9 +2,21 @@
 # A simulated machining centre works through an eight-hour shift in 48 s; thermocompd reads its
 # thermocouples and the height of its head over Modbus, and keeps its tool where it should be. At the
 # end: a picture, and what was left of the error. Everything it writes is in demo_output/.
+#   ./demo.sh fleet     instead: twelve machines of one type, two weeks, a PostgreSQL of its own
 set -euo pipefail
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")"
 source scripts/common.sh
+
+if [[ ${1:-} == fleet ]]; then
+  stage "packages" scripts/setup.sh demo_fleet
+  stage "configure" cmake --preset release
+  stage "build" cmake --build --preset release -j "$(build_jobs)" \
+    --target thermocomp thermocomp-modelling thermocomp-fleet
+  exec "$python" scripts/demo_fleet.py build/release/bin demo_output
+elif (($# > 0)); then
+  echo "usage: ./demo.sh [fleet]" >&2
+  exit 2
+fi
 
 bin=build/release/bin
 out=demo_output

@@ -1,6 +1,6 @@
 #!/bin/bash
 # Installs the Debian packages that are missing, after saying which.
-#   scripts/setup.sh build|modelling|petsc|demo|test
+#   scripts/setup.sh build|modelling|petsc|demo|demo_fleet|test|bench
 # Needs root or sudo only where something is missing. Exit status 0: everything is there.
 set -euo pipefail
 here=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)
@@ -55,10 +55,11 @@ main() {
     modelling) wanted=("${packages_modelling[@]}") ;;
     petsc) wanted=("${packages_petsc[@]}") ;;
     demo) wanted=("${packages_demo[@]}") ;;
+    demo_fleet) wanted=("${packages_demo_fleet[@]}") ;;
     test) wanted=("${packages_test[@]}") ;;
     bench) wanted=("${packages_bench[@]}") ;;
     *)
-      echo "usage: setup.sh build|modelling|petsc|demo|test|bench" >&2
+      echo "usage: setup.sh build|modelling|petsc|demo|demo_fleet|test|bench" >&2
       exit 2
       ;;
   esac

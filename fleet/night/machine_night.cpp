@@ -117,13 +117,25 @@ std::string subject_text(const nlohmann::json& answer) {
   return "more is left than of its sisters";
 }
 
+/// Whether the last night before that was judged was unusual too. One night alone is unusual by
+/// chance some times a year; two in a row are less than once.
+bool was_unusual(pqxx::connection& store, const MachineNight& night) {
+  pqxx::nontransaction work(store);
+  const pqxx::result before = work.exec_params(
+      "SELECT coalesce((departure ->> 'unusual')::boolean, false) FROM fleet.night_result"
+      " WHERE machine = $1 AND night < $2::date AND departs IS NOT NULL"
+      " ORDER BY night DESC, finished DESC LIMIT 1",
+      night.machine, night.night);
+  return !before.empty() && before[0][0].as<bool>();
+}
+
 /// `diagnose` with the model in use: the week before shows, the night decides.
 nlohmann::json diagnosed(pqxx::connection& store, const MachineNight& night,
                          const WorkFolder& folder, const fs::path& run) {
   pqxx::nontransaction work(store);
   const pqxx::result model = work.exec_params(
       "SELECT content FROM fleet.document WHERE checksum = (SELECT model FROM fleet.setup WHERE"
-      " machine = $1 ORDER BY number DESC LIMIT 1)",
+      " machine = $1 ORDER BY number DESC LIMIT 1) AND content <> ''",
       night.machine);
   if (model.empty()) return nullptr;
   write_text(folder / "model.toml", model[0][0].as<std::string>());
@@ -290,6 +302,8 @@ std::string work_off(pqxx::connection& store, const MachineNight& night) {
         folder / "log");
     result.statistics = read_text_file(folder / "statistics.toml");
     result.departure = nlohmann::json::object();
+    bool is_judged = false;
+    bool is_unusual = false;
     for (const std::string kind : {"sisters", "own_past"}) {
       const std::optional<std::string> series = series_of(store, night, kind);
       if (!series) continue;
@@ -297,11 +311,15 @@ std::string work_off(pqxx::connection& store, const MachineNight& night) {
       result.departure[kind] = verdict.answer;
       result.probability = std::min(result.probability.value_or(1.0), verdict.probability);
       if (verdict.departs)
-        told = std::string("DEPARTS from its ") + (kind == "sisters" ? kind : "own past") + ", " +
+        told = std::string("from its ") + (kind == "sisters" ? kind : "own past") + ", " +
                subject_text(verdict.answer);
-      else if (!result.departs.value_or(false))
-        told = "as usual";
-      result.departs = result.departs.value_or(false) || verdict.departs;
+      is_judged = true;
+      is_unusual = is_unusual || verdict.departs;
+    }
+    if (is_judged) {
+      result.departs = is_unusual && was_unusual(store, night);
+      result.departure["unusual"] = is_unusual;
+      told = !is_unusual ? "as usual" : (*result.departs ? "DEPARTS " : "unusual, ") + told;
     }
     if (result.departs.value_or(false)) result.diagnosis = diagnosed(store, night, folder, run);
   }
@@ -357,39 +375,45 @@ void make_series(pqxx::connection& store, const std::string& type, const std::st
     run_modelling(arguments, folder / "log");
     ready.push_back(std::move(of_machine));
   }
+  if (std::ssize(ready) <= machines_min) return;
   const auto keep = [&](const char* kind, const Ready* machine, std::size_t count,
-                        const std::vector<std::string>& arguments) {
-    run_modelling(arguments, folder / "log");
+                        const std::string& file) {
     const std::string id = machine != nullptr ? std::to_string(machine->machine) : "";
     pqxx::work keeping(store);
     keeping.exec_params0(
         "INSERT INTO fleet.series (type, kind, machine, through, machines, program_version, "
         "content)"
         " VALUES ($1, $2, nullif($3, '')::int, $4::date - 1, $5, $6, $7) ON CONFLICT DO NOTHING",
-        type, kind, id, night, count, THERMOCOMP_VERSION, read_text_file(folder / "series.toml"));
+        type, kind, id, night, count, THERMOCOMP_VERSION, read_text_file(file));
     keeping.commit();
   };
-  /// Of some machines, but one.
-  const auto series_without = [&](const Ready* left_out) {
-    std::vector<std::string> arguments{"series", "-o", folder / "series.toml"};
-    for (const Ready& each : ready)
-      if (&each != left_out && arguments.size() < sisters_max) arguments.push_back(each.statistics);
-    return arguments;
+  /// Of all machines but a group. @return how many
+  const auto make = [&](std::size_t groups, std::size_t left_out, const std::string& file) {
+    std::vector<std::string> arguments{"series", "-o", file};
+    for (std::size_t i = 0; i < ready.size(); ++i)
+      if (i % groups != left_out && arguments.size() < sisters_max)
+        arguments.push_back(ready[i].statistics);
+    run_modelling(arguments, folder / "log");
+    return arguments.size() - 3;
   };
-  if (std::ssize(ready) <= machines_min) return;
-  for (const Ready& each : ready) {
-    const std::vector<std::string> sisters = series_without(&each);
-    keep("sisters", &each, sisters.size() - 3, sisters);
-    if (each.has_past) continue;
-    fs::rename(folder / "series.toml", folder / "sisters.toml");
-    std::vector<std::string> past{
-        "series", "--machine",           "its past", "--prior", folder / "sisters.toml",
-        "-o",     folder / "series.toml"};
-    past.insert(past.end(), each.runs.begin(), each.runs.end());
-    keep("own_past", &each, 1, past);
+  // A machine is no sister of its own; of many machines a half at a time is left out.
+  const std::size_t groups = ready.size() < 8 ? ready.size() : 2;
+  for (std::size_t group = 0; group < groups; ++group) {
+    const std::string sisters = folder / "sisters.toml";
+    const std::size_t count = make(groups, group, sisters);
+    for (std::size_t i = group; i < ready.size(); i += groups) {
+      keep("sisters", &ready[i], count, sisters);
+      if (ready[i].has_past) continue;
+      std::vector<std::string> past{"series", "--machine", "its past",          "--prior",
+                                    sisters,  "-o",        folder / "past.toml"};
+      past.insert(past.end(), ready[i].runs.begin(), ready[i].runs.end());
+      run_modelling(past, folder / "log");
+      keep("own_past", &ready[i], 1, folder / "past.toml");
+    }
   }
   // Last: with it the week's series are complete.
-  keep("type", nullptr, ready.size(), series_without(nullptr));
+  const std::size_t count = make(1, 1, folder / "type.toml");
+  keep("type", nullptr, count, folder / "type.toml");
 }
 
 }  // namespace thermocomp::fleet
