@@ -37,6 +37,7 @@ class Life {
         probings_(options.seed, 6),
         releases_(options.seed, 8),
         power_cuts_(options.seed, 15),
+        offers_(options.seed, 16),
         gains_{probings_.between(0.4, 2.0), probings_.between(0.4, 2.0)},
         judge_(shape_, schedule_, world_.thermocouples),
         end_(life_begin + nanoseconds{static_cast<nanoseconds::rep>(options.hours * 3600e9)}) {
@@ -145,7 +146,7 @@ class Life {
     release();
     accept();
     probe();
-    reload();
+    if (!reload()) release_model();
   }
 
   /// Main stands still; the service manager has ended what came before its last kill.
@@ -332,17 +333,48 @@ class Life {
   }
 
   /// At the begin of the fault another configuration and model; a broken one is refused.
-  void reload() {
+  bool reload() {
     const FaultEvent* fault = schedule_.find(FaultKind::model_reload, world_.now);
-    if (fault == nullptr || fault->number == last_reload_) return;
+    if (fault == nullptr || fault->number == last_reload_) return false;
     last_reload_ = fault->number;
     ++result_.reloads;
     refuse_broken_model();
+    model_before_.reset();
     shape_.change_for_reload(chance_);
     judge_.reloaded(shape_);
-    auto parts = make_cycle_parts();
+    hand_over(make_cycle_parts());
+    return true;
+  }
+
+  void hand_over(std::unique_ptr<CycleParts> parts) {
     parts->estimator.plan_adoption(daemon_->cycle().parts().estimator);
+    if (parts->candidate) parts->candidate->plan_adoption(daemon_->cycle().parts().estimator);
     daemon_->cycle().hand_over(std::move(parts));
+  }
+
+  /// A model from elsewhere at random times, a step each: it runs beside the one in use, is
+  /// promoted, and taken back; or given up, where the daemon was started or reloaded meanwhile.
+  void release_model() {
+    if (!offers_.one_in(static_cast<std::uint64_t>(600.0 * options_.cycle_hz))) return;
+    const bool runs_beside = daemon_->cycle().parts().candidate != nullptr;
+    if (model_before_) {
+      shape_.model = *std::exchange(model_before_, std::nullopt);
+      ++result_.taken_back;
+      return hand_over(make_cycle_parts());
+    }
+    if (runs_beside) {
+      model_before_ = shape_.model;
+      shape_.model = daemon_->cycle().parts().candidate->estimator().model();
+      ++result_.promotions;
+      auto parts = make_cycle_parts();
+      parts->promotes = true;
+      return hand_over(std::move(parts));
+    }
+    auto parts = make_cycle_parts();
+    EstimatorConfig beside = shape_.estimator;
+    beside.correction.form = CorrectionForm::off;
+    parts->candidate = std::make_unique<Candidate>(beside, shape_.offered_model(offers_), 1.0);
+    hand_over(std::move(parts));
   }
 
   void refuse_broken_model() {
@@ -434,6 +466,7 @@ class Life {
   Chance probings_;
   Chance releases_;
   Chance power_cuts_;
+  Chance offers_;
   std::array<double, 2> gains_;                 ///< of the machine, where the model's are 1
   std::array<double, axes_count> probed_um_{};  ///< measured last
   std::array<nanoseconds, sensors_count> unconfirmed_since_{};
@@ -453,6 +486,7 @@ class Life {
   std::uint64_t last_kill_{0};
   std::uint64_t last_stall_{0};  ///< that the service manager has ended
   std::uint64_t last_reload_{0};
+  std::optional<ThermalModel> model_before_;  ///< since a promotion
   std::uint64_t said_{0};
   Mode said_mode_{Mode::starting};
   std::vector<std::string> last_cycles_;

@@ -31,6 +31,8 @@ struct LifeResult {
   std::uint64_t replayed{0};  ///< cycles that a second estimator took again
   std::uint64_t restarts{0};
   std::uint64_t reloads{0};
+  std::uint64_t promotions{0};
+  std::uint64_t taken_back{0};
   std::uint64_t commits{0};  ///< of the history on disk
   std::uint64_t compensating{0};
   std::array<std::uint64_t, fault_kinds> faults{};

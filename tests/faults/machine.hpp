@@ -67,6 +67,8 @@ struct MachineShape {
 
   /// What an operator might change while the daemon runs: bounds, slew, matrix, policy.
   void change_for_reload(Chance& chance);
+  /// The model in use with another matrix.
+  [[nodiscard]] ThermalModel offered_model(Chance& chance) const;
 };
 
 /// How the registers of one simulated unit are laid out; the same as in MachineShape, told apart so

@@ -250,6 +250,12 @@ MachineShape::MachineShape(std::uint64_t seed, double cycle_hz) {
   draw_correction(own, estimator);
 }
 
+ThermalModel MachineShape::offered_model(Chance& chance) const {
+  ThermalModel offered = model;
+  offered.matrix_um_per_K = random_matrix(chance);
+  return offered;
+}
+
 void MachineShape::change_for_reload(Chance& chance) {
   for (AxisConfig& axis : estimator.axes)
     axis.limiter = {chance.between(8.0, 80.0), chance.between(0.2, 3.0)};

@@ -84,6 +84,7 @@ class Campaign {
                    static_cast<double>(std::max<std::uint64_t>(1, total_.cycles)));
     fmt::print("  replayed to the bit      {:>9}\n", total_.replayed);
     fmt::print("starts, reloads            {:>9} {:>9}\n", total_.restarts, total_.reloads);
+    fmt::print("promoted, taken back       {:>9} {:>9}\n", total_.promotions, total_.taken_back);
     fmt::print("commits on disk checked    {:>9}\n", total_.commits);
     fmt::print("faults                     {:>9}\n", faults);
     fmt::print("pairs of faults            {:>9} of {}\n", total_.pairs.count(), fault_pairs);
@@ -91,8 +92,8 @@ class Campaign {
     fmt::print("machine hours a second     {:>9.1f}   ({:.1f} s)\n", total_.machine_hours / took_s,
                took_s);
     if (options_.expect_found) return report_found();
-    if (options_.complete && !total_.pairs.all()) {
-      fmt::print("not every pair of kinds of faults came up\n");
+    if (options_.complete && (!total_.pairs.all() || total_.taken_back == 0)) {
+      fmt::print("not every pair of kinds of faults came up, or no release was taken back\n");
       return 1;
     }
     return broken_ == 0 ? 0 : 1;
@@ -128,6 +129,8 @@ class Campaign {
     total_.replayed += result.replayed;
     total_.restarts += result.restarts;
     total_.reloads += result.reloads;
+    total_.promotions += result.promotions;
+    total_.taken_back += result.taken_back;
     total_.commits += result.commits;
     total_.compensating += result.compensating;
     total_.pairs |= result.pairs;
