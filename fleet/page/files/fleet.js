@@ -115,11 +115,11 @@ function showMachines(machines) {
 
 // ------------------------------------------------------------------ one machine
 
-const worst = night => {
-  const outputs = night && night.departure && night.departure.outputs;
-  if (!outputs) return '';
-  return Object.entries(outputs).map(([output, told]) => output + ': ' + (told.text || 'departs')).join('; ');
-};
+// From whom it departs, and by which subjects: {"sisters": {"z_um": {"departs", "subjects": [...]}}, "own_past": ...}
+const whatDeparts = night => Object.entries(night.departure || {}).flatMap(([kind, outputs]) =>
+  Object.entries(outputs || {}).filter(([, output]) => output.departs).map(([name, output]) =>
+    'departs from its ' + kind.replace('_', ' ') + ' in ' + placeName(name) + ': ' + (output.subjects || []).slice(0, 3).map(part =>
+      part.subject + ' ' + fixed(100 * part.share, 0) + ' % (' + fixed(part.effect_um, 1) + ' \u00b5m)').join(', '))).join('; ');
 
 function section(heading, ...parts) {
   const made = make('section');
@@ -131,7 +131,7 @@ function monthTable(months) {
   if (!months.length) return make('p', 'no night was worked on yet', {class: 'note'});
   const table = make('table');
   const head = make('tr');
-  for (const text of ['month', 'left (median)', 'claimed', 'nights', 'departing'])
+  for (const text of ['month', 'left (median)', 'claimed', 'nights', 'departs'])
     head.append(make('th', text, {scope: 'col', class: text === 'month' ? '' : 'number'}));
   const rows = months.map(month => {
     const row = make('tr');
@@ -177,7 +177,7 @@ function showMachine(machine, verdict) {
     events.append(line);
   }
   const night = machine.night;
-  const told = night ? 'night of ' + night.night + ': ' + (night.error || worst(night) ||
+  const told = night ? 'night of ' + night.night + ': ' + (night.error || whatDeparts(night) ||
     (night.departs ? 'departs from its sisters' : night.departs === false ? 'as its sisters' : 'not compared')) : 'no night yet';
   const findings = make('ol');
   for (const finding of (night && night.diagnosis) || [])

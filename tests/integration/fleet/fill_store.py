@@ -13,9 +13,10 @@ INSERT INTO fleet.setup (machine, number, configuration, model, columns, program
   SELECT id, 1, encode(sha256('x'), 'hex'), encode(sha256('x'), 'hex'), '{{{columns}}}', '1' FROM fleet.machine;
 INSERT INTO fleet.uplink (machine, history, newest, seen)
   SELECT id, 'history.db', now(), now() - CASE WHEN id % 40 = 0 THEN interval '3 days' ELSE interval '20 s' END FROM fleet.machine;
-INSERT INTO fleet.night_result (machine, night, model, program_version, state, departs, probability, remainder_um, claimed_um)
+INSERT INTO fleet.night_result (machine, night, model, program_version, state, departs, probability, departure, remainder_um, claimed_um)
   SELECT id, day::date, '', '1', 'done', name = '{odd}' AND day >= now() - interval '10 days',
-    0.5, (1.5 + 0.5 * sin(id)) * CASE WHEN name = '{odd}' AND day >= now() - interval '10 days' THEN 6 ELSE 1 END, 2
+    0.5, CASE WHEN name = '{odd}' THEN '{{"sisters": {{"z_um": {{"departs": true, "subjects":
+      [{{"subject": "head_degC", "share": 0.8, "effect_um": 9.1}}]}}}}}}'::jsonb END, (1.5 + 0.5 * sin(id)) * CASE WHEN name = '{odd}' AND day >= now() - interval '10 days' THEN 6 ELSE 1 END, 2
   FROM fleet.machine, generate_series(now() - interval '364 days', now() - interval '1 day', '1 day') day;
 INSERT INTO fleet.probing (machine, at, output, displacement_um, measured_um, modelled_um, claimed_um)
   SELECT id, day, 'z_um', 20 + 1.5 * sin(id + extract(day FROM day)) + CASE WHEN name = '{odd}' THEN 9 ELSE 0 END, 2, 20, 2

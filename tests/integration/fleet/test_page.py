@@ -101,8 +101,8 @@ def errors(browser):
     return [entry["message"] for entry in browser.get_log("browser") if entry["level"] in ("SEVERE", "WARNING")]
 
 
-def fits(browser):
-    return browser.execute_script("return document.documentElement.scrollWidth <= window.innerWidth")
+def fits(browser, size):
+    return browser.execute_script("return document.documentElement.scrollWidth") <= size[0]
 
 
 def picture(browser, name):
@@ -118,7 +118,7 @@ def test_three_clicks_from_a_hall_to_the_curve_of_a_sensor(page, browser, size):
     eventually(lambda: len(all_of(browser, "#machines tbody tr")) == MACHINES, "all machines")
     assert "200 machines, 1 depart" in browser.find_element("id", "summary").text
     assert ODD in texts(browser, "#machines tbody tr")[0]  # what is wrong stands first
-    assert fits(browser)
+    assert fits(browser, size)
     picture(browser, name + "_machines")
     click(browser, "nav button", "hall 2")
     rows = eventually(lambda: 0 < len(texts(browser, "#machines tbody tr")) < MACHINES and
@@ -126,13 +126,14 @@ def test_three_clicks_from_a_hall_to_the_curve_of_a_sensor(page, browser, size):
     assert len(rows) == 40 and "departs from its sisters" in rows[0]
     click(browser, "#machines tbody th a", ODD)
     eventually(lambda: all_of(browser, ".places a"), "the machine's places")
-    assert fits(browser)
+    assert fits(browser, size)
     assert not any("undefined" in text or "NaN" in text for text in texts(browser, "section"))
     assert len(texts(browser, "main table tr")) >= 13  # months
+    assert "departs from its sisters in z: head_degC 80 % (9.1 \u00b5m)" in texts(browser, "section")[0]
     picture(browser, name + "_machine")
     click(browser, ".places a", "head")
     eventually(lambda: len(all_of(browser, "svg path")) == 21, "its curve and those of twenty sisters")
-    assert len(all_of(browser, "svg path.own")) == 1 and fits(browser)
+    assert len(all_of(browser, "svg path.own")) == 1 and fits(browser, size)
     picture(browser, name + "_place")
     click(browser, "nav button", "8 h")
     eventually(lambda: texts(browser, "nav button[aria-pressed=true]") == ["8 h"], "the other span")

@@ -66,6 +66,7 @@ password_file = "{store.folder / 'mill_1.password'}"
 history = ["{self.daemon.history}"]
 offer = "offer.json"
 steps = "admit/steps.json"
+cpu_percent_max = 100
 """)
 
     def probe(self):
