@@ -18,5 +18,10 @@ def server():
 
 @pytest.fixture
 def store(server, tmp_path, request):
-    """An empty store."""
-    return Store(server, tmp_path, request.node.name)
+    """An empty store. What a failed test has left running ends."""
+    opened = Store(server, tmp_path, request.node.name)
+    yield opened
+    for process in opened.running:
+        if process.poll() is None:
+            process.kill()
+            process.wait()

@@ -20,6 +20,7 @@ class Store:
     def __init__(self, server, folder, name):
         self.server = server
         self.folder = folder
+        self.running = []
         self.name = re.sub(r"\W", "_", name.lower())[:40]
         server.ask(f"DROP DATABASE IF EXISTS {self.name}", conninfo=server.local("postgres"))
         for [role] in server.ask("SELECT rolname FROM pg_roles WHERE rolname LIKE 'machine\\_%'"
@@ -167,6 +168,7 @@ class Machine:
         with self.log.open("a") as log:
             self.process = subprocess.Popen([str(BIN / "thermocomp-uplink"), str(self.folder / "uplink.toml")],
                                             stdin=subprocess.DEVNULL, stdout=log, stderr=log)
+        self.store.running.append(self.process)
         return self
 
     def end(self):
