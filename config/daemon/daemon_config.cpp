@@ -357,7 +357,7 @@ DaemonConfig build(const TomlDocument& document, const fs::path& folder, Files f
     config.model_text = *source.text;
     config.model_checksum = sha256_hex(*source.text);
     if (reading.names_known) {
-      sections::check_binding(tables, config.estimator, config.model);
+      sections::check_binding(tables, config.estimator, config.model, source.name);
       sections::check_correction(root.table_or_empty("correction"), config.estimator.correction,
                                  config.model);
       add_reference_problems(source, config, model_problems);

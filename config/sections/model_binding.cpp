@@ -49,9 +49,9 @@ void check_weighing_down(const BindingTables& tables, const EstimatorConfig& con
   if (config.compensation.suspected_sensors != SuspectedPolicy::weigh_down) return;
   if (!model.covariance_K2.empty() && model.inputs.size() >= NeighbourCheck::inputs_min) return;
   tables.root.problem("compensation.suspected_sensors", "weigh_down",
-                      "needs a model with [covariance] and at least " +
-                          std::to_string(NeighbourCheck::inputs_min) +
-                          " inputs (`thermocomp covariance` makes it from records)");
+                      std::string("needs a model with [covariance] and at least ")
+                          .append(std::to_string(NeighbourCheck::inputs_min))
+                          .append(" inputs (`thermocomp covariance` makes it from records)"));
 }
 
 /// What a controller is to interpolate by must be what the displacement depends on, and that must
@@ -80,26 +80,33 @@ void check_diameter(const TomlTable& table, const AxisConfig& axis, const Therma
   table.problem("output", axis.output, rule);
 }
 
-void check_signals(const TomlTable& root, const EstimatorConfig& config,
-                   const ThermalModel& model) {
+void check_signals(const TomlTable& root, const EstimatorConfig& config, const ThermalModel& model,
+                   const std::string& model_file) {
   const bool has_controller = root.table("controller").text("kind") != "dry_run";
-  std::string rule = "the model needs this signal";
-  rule += has_controller ? " from the controller"
-                         : ", and kind = \"dry_run\" has none: give the controller's own kind and "
-                           "dry_run = true, or until there is one a model that needs no signal";
   for (const std::string& signal : model.signal_columns()) {
     if (!is_operating(signal)) continue;  // a problem of the model file already
-    if (!contains(config.signals, signal)) root.problem("controller.signal", signal, rule);
+    if (contains(config.signals, signal)) continue;
+    std::string rule = model_file;
+    rule += " needs this signal";
+    if (has_controller)
+      rule.append(" from the controller: add a [[controller.signal]], or fit without it: fit "
+                  "--columns FILE with ignore = [\"")
+          .append(signal)
+          .append("\"]");
+    else
+      rule += ", and kind = \"dry_run\" has none: give the controller's own kind and dry_run = "
+              "true, or until there is one a model that needs no signal";
+    root.problem("controller.signal", signal, rule);
   }
 }
 
 }  // namespace
 
 void check_binding(const BindingTables& tables, const EstimatorConfig& config,
-                   const ThermalModel& model) {
+                   const ThermalModel& model, const std::string& model_file) {
   check_blocks(tables, config, model.temperature_columns());
   check_weighing_down(tables, config, model);
-  check_signals(tables.root, config, model);
+  check_signals(tables.root, config, model, model_file);
   const std::vector<AxisSpan> spans = axis_spans(config.axes);
   for (std::size_t i = 0; i < spans.size(); ++i) {
     const AxisConfig& axis = config.axes[spans[i].first];

@@ -19,7 +19,8 @@ struct BindingTables {
 /// Checks that every temperature column of the model has exactly one block, every signal it names
 /// is read from the controller, every axis' output exists, and the model has the covariance that
 /// the configuration needs.
+/// @param model_file  named where the model is what does not fit
 void check_binding(const BindingTables& tables, const EstimatorConfig& config,
-                   const ThermalModel& model);
+                   const ThermalModel& model, const std::string& model_file);
 
 }  // namespace thermocomp::sections

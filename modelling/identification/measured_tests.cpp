@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <set>
 
 #include "config/runs/blunders.hpp"
 #include "config/text/printable_text.hpp"
@@ -19,6 +18,10 @@ constexpr std::size_t rows_min = 3;  // of a test; fewer say nothing of a course
 constexpr double share_present_min = 0.5;
 /// A signal that stays so close to a level within each run, as a share of it, has not moved.
 constexpr double still_share = 0.03;
+/// What a temperature moves by less than is the rounding of its text.
+constexpr double still_K = 1e-6;
+/// Of a signal's size: what varies by less is the rounding of its text.
+constexpr double rounding_share = 1e-9;
 /// Of a signal's range: what goes back by less goes on.
 constexpr double way_share = 0.1;
 
@@ -121,6 +124,18 @@ std::vector<std::string> usable_places(const std::vector<RunFile>& runs,
   return places;
 }
 
+/// Beyond the rounding of a position that was converted or summed up.
+bool varies(const std::vector<RunFile>& runs, const std::string& column) {
+  double least = std::numeric_limits<double>::infinity();
+  double most = -least;
+  for (const RunFile& run : runs)
+    for (const double each : run.column(column)) {
+      least = std::fmin(least, each);
+      most = std::fmax(most, each);
+    }
+  return most - least > rounding_share * std::max(std::abs(least), std::abs(most));
+}
+
 /// Operating signals and positions that all runs have, mostly, and that vary in some. Rows in which
 /// one is missing go as those without a temperature do: `predict` and the daemon have no value
 /// there.
@@ -140,11 +155,7 @@ std::vector<std::string> usable_signals(const std::vector<RunFile>& runs,
       notes.push_back(std::string(column).append(" is left out: most of its values are missing"));
       continue;
     }
-    std::set<double> values;
-    for (const RunFile& run : runs)
-      for (const double each : run.column(column))
-        if (std::isfinite(each) && values.size() < 2) values.insert(each);
-    if (values.size() > 1) signals.push_back(column);
+    if (varies(runs, column)) signals.push_back(column);
   }
   return signals;
 }
@@ -216,7 +227,7 @@ void leave_out_still_places(MeasuredTests& tests) {
     const auto column = static_cast<Eigen::Index>(i);
     const bool moves = std::any_of(tests.runs.begin(), tests.runs.end(), [&](const TestRun& run) {
       return run.places_K.col(column).tail(run.places_K.rows() - run.begin).cwiseAbs().maxCoeff() >
-             0;
+             still_K;
     });
     if (moves) {
       kept.push_back(column);

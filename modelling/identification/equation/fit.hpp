@@ -89,6 +89,12 @@ struct Equation {
 /// The model file that the daemon runs; reference: first sample.
 [[nodiscard]] ThermalModel model_of(const MeasuredTests& tests, const Fit& fit);
 
+/// Whether a model leaves half or more of what no model leaves of an output, RMS of what was left
+/// out.
+[[nodiscard]] constexpr bool is_unfit(double left_um, double no_model_um) noexcept {
+  return !(left_um < 0.5 * no_model_um);
+}
+
 [[nodiscard]] std::string fit_text(const MeasuredTests& tests, const Fit& fit);
 [[nodiscard]] std::string fit_json(const MeasuredTests& tests, const Fit& fit);
 /// One page with curves of measured and left-out prediction, residuals, and the chosen places.

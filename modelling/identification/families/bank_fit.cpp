@@ -186,17 +186,17 @@ TermSpec bank_term(const BankColumns& columns, const std::vector<std::string>& o
                    const Eigen::MatrixXd& gains) {
   TermSpec term;
   term.kind = "lag_bank";
-  term.bank.subjects = columns.subjects;
-  term.bank.powers = columns.powers;
   term.bank.taus_s = columns.taus_s;
-  const std::size_t subjects = columns.subjects.size();
-  for (std::size_t o = 0; o < outputs.size(); ++o) {
-    const auto column = gains.col(static_cast<Eigen::Index>(o));
-    auto& table = term.bank.gain_um_per_unit[outputs[o]];
-    for (std::size_t i = 0; i < subjects; ++i) {
-      auto& of_subject = table.emplace_back();
-      for (std::size_t j = 0; j < columns.taus_s.size(); ++j)
-        of_subject.push_back(column[static_cast<Eigen::Index>(j * subjects + i)]);
+  const auto subjects = static_cast<Eigen::Index>(columns.subjects.size());
+  const auto taus = static_cast<Eigen::Index>(columns.taus_s.size());
+  for (Eigen::Index i = 0; i < subjects; ++i) {
+    const Eigen::MatrixXd of_subject = gains(Eigen::seqN(i, taus, subjects), Eigen::all);
+    if ((of_subject.array() == 0.0).all()) continue;
+    term.bank.subjects.push_back(columns.subjects[static_cast<std::size_t>(i)]);
+    term.bank.powers.push_back(columns.powers[static_cast<std::size_t>(i)]);
+    for (std::size_t o = 0; o < outputs.size(); ++o) {
+      const auto of_output = of_subject.col(static_cast<Eigen::Index>(o));
+      term.bank.gain_um_per_unit[outputs[o]].emplace_back(of_output.begin(), of_output.end());
     }
   }
   return term;
@@ -208,13 +208,14 @@ std::vector<TermSpec> hinge_terms(const BankColumns& columns,
   std::vector<TermSpec> terms;
   auto row = static_cast<Eigen::Index>(columns.late());
   for (const Hinge& hinge : columns.hinges) {
+    const auto of_hinge = gains.row(row++);
+    if ((of_hinge.array() == 0.0).all()) continue;
     TermSpec& term = terms.emplace_back();
     term.kind = "signal_hinge";
     term.subject = hinge.signal;
     term.shared["above"] = hinge.above;
     for (std::size_t o = 0; o < outputs.size(); ++o)
-      term.per_output["gain_um_per_unit"][outputs[o]] = gains(row, static_cast<Eigen::Index>(o));
-    ++row;
+      term.per_output["gain_um_per_unit"][outputs[o]] = of_hinge[static_cast<Eigen::Index>(o)];
   }
   return terms;
 }
@@ -232,7 +233,8 @@ ThermalModel bank_model(const std::vector<std::string>& places,
   }
   gains.topRows(count).setZero();
   model.terms = hinge_terms(columns, outputs, gains);
-  model.terms.insert(model.terms.begin(), bank_term(columns, outputs, gains));
+  TermSpec bank = bank_term(columns, outputs, gains);
+  if (!bank.bank.subjects.empty()) model.terms.insert(model.terms.begin(), std::move(bank));
   return model;
 }
 

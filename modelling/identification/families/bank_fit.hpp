@@ -43,12 +43,13 @@ void add_hinges(const MeasuredTests& tests, BankColumns& columns);
 [[nodiscard]] Eigen::MatrixXd bank_of(const TestRun& run, const MeasuredTests& tests,
                                       const BankColumns& columns);
 
-/// The term that the daemon evaluates, without the hinges.
+/// The term that the daemon evaluates, without the hinges and without subjects of no gain: the
+/// daemon asks the controller for every signal that a term names.
 /// @param gains  [um per unit], shape (columns, outputs)
 [[nodiscard]] TermSpec bank_term(const BankColumns& columns,
                                  const std::vector<std::string>& outputs,
                                  const Eigen::MatrixXd& gains);
-/// Those of the hinges, one each.
+/// Those of the hinges that have a gain, one each.
 [[nodiscard]] std::vector<TermSpec> hinge_terms(const BankColumns& columns,
                                                 const std::vector<std::string>& outputs,
                                                 const Eigen::MatrixXd& gains);

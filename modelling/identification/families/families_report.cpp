@@ -21,7 +21,7 @@ std::string line_of(const FamilyResult& result, bool chosen) {
       printed("  %c %-11s", chosen ? '*' : ' ', std::string(to_string(result.family)).c_str());
   if (!result.answers) return text.append(" no answer: ").append(result.why_not).append("\n");
   for (const double rms_um : result.left_out_rms_um) text += printed(" %10.3f", rms_um);
-  return text + printed("   %5.1f %%\n", 100.0 * score_of(result));
+  return text + printed("   %5.1f %%\n", 100.0 * std::sqrt(score_of(result)));
 }
 
 /// Coefficients with their intervals. What this choice leaves on rows that took part in choosing
@@ -86,7 +86,7 @@ std::string families_text(const MeasuredTests& tests, const FamiliesFit& fit) {
       tests.folds.size());
   text += printed("    %-11s", "family");
   for (const std::string& output : tests.outputs) text += printed(" %10s", output.c_str());
-  text += "   of none's squares\n";
+  text += "   of none's RMS\n";
   for (const FamilyResult& result : fit.results)
     text += line_of(result, result.family == fit.chosen);
   text += printed("chosen: %s, %s\n", std::string(to_string(fit.chosen)).c_str(),

@@ -106,6 +106,8 @@ std::string page(const MeasuredTests& tests, const Fit& fit, const std::vector<L
                          figure_text(left_out[o].without_um) + " µm."
                    : "no model does better than none, which leaves " +
                          figure_text(left_out[o].without_um) + " µm RMS.";
+    if (is_unfit(left_out[o].with_um, left_out[o].without_um))
+      verdict += " Half or more is left: not fit for use. Next: thermocomp diagnose.";
     if (left_out[o].other_day_um > 0.0)
       verdict += " Another day is not known: expect about " +
                  figure_text(left_out[o].other_day_um) + " µm.";
@@ -128,8 +130,8 @@ std::string fit_text(const MeasuredTests& tests, const Fit& fit) {
   for (std::size_t terms = 0; terms < fit.ranking.size(); ++terms) {
     if (fit.ranking[terms].empty()) continue;
     const Subset& best = fit.ranking[terms].front();
-    text += printed("  %zu terms, linear: left-out sum of squares %.3g %% of no model's:", terms,
-                    100.0 * best.score);
+    text += printed("  %zu terms, linear: left-out RMS %.3g %% of no model's:", terms,
+                    100.0 * std::sqrt(best.score));
     for (const std::size_t place : best.places) text.append(" ").append(tests.places[place]);
     text += "\n";
   }
@@ -140,6 +142,8 @@ std::string fit_text(const MeasuredTests& tests, const Fit& fit) {
                     tests.runs.size() < 2 ? "of blocks of this run left out" : "left out",
                     output.left_out_rms_um, output.left_out_peak_um, output.train_rms_um,
                     output.no_model_rms_um);
+    if (is_unfit(output.left_out_rms_um, output.no_model_rms_um))
+      text += "  half or more is left: not fit for use. Next: thermocomp diagnose\n";
     for (std::size_t i = 0; i < fit.columns.size(); ++i)
       text += printed(
           "  %+10.4f +- %.4f um/K  %s\n", output.coefficients[static_cast<Eigen::Index>(i)],

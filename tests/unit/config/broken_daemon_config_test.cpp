@@ -451,8 +451,9 @@ TEST_CASE("an edit that breaks several rules is told once a rule", "[config]") {
                  "controller.signal[cutting_on].name", "used twice"));
   CHECK(mentions(told("name = \"compensation_off_on\"", "name = \"oil_degC\""),
                  "controller.signal[oil_degC].name", "by its unit"));
-  CHECK(mentions(told("name = \"x_mm\"", "name = \"w_mm\""), "controller.signal",
-                 "needs this signal"));
+  const auto unread = told("name = \"x_mm\"", "name = \"w_mm\"");
+  CHECK(mentions(unread, "controller.signal", "model.toml needs this signal from the controller"));
+  CHECK(mentions(unread, "controller.signal", "ignore = [\"x_mm\"]"));
   CHECK(mentions(told("input = \"room_degC\"", "input = \"bed_degC\""), "block[room].input",
                  "another block"));
   CHECK(mentions(told("input = \"room_degC\"", "input = \"oil_degC\""), "block[room].input",

@@ -1,7 +1,9 @@
 #include "modelling/identification/families/families.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
 #include <random>
 
 #include <catch2/catch.hpp>
@@ -96,6 +98,28 @@ TEST_CASE("displacement that nothing recorded says gets no model", "[families]")
     CHECK(fit.chosen == Family::none);
     CHECK(fit.model.matrix_um_per_K[0][0] == 0.0);
     CHECK(families_text(tests, fit).find("no model is better than none") != std::string::npos);
+  }
+}
+
+TEST_CASE("a model that leaves half and more is said not to be fit for use", "[families]") {
+  std::mt19937_64 engine(5);
+  for (const double noise_um : {0.5, 4.0}) {
+    const MeasuredTests tests = machine_tests(4, [&](double quick, double, double, double) {
+      return quick + noise_um * gaussian(engine);
+    });
+    const FamiliesFit fit = fitted(tests, Family::static_few);
+    const std::string said = families_text(tests, fit);
+    const std::string page = families_html(tests, fit);
+    const double share =
+        fit.chosen_result().left_out_rms_um[0] / fit.results.front().left_out_rms_um[0];
+    CAPTURE(noise_um, share);
+    CHECK((share >= 0.5) == (noise_um > 1.0));
+    CHECK((said.find("Next: thermocomp diagnose") != std::string::npos) == (share >= 0.5));
+    CHECK((page.find("not fit for use. Next: thermocomp diagnose") != std::string::npos) ==
+          (share >= 0.5));
+    std::array<char, 20> printed_share{};  // of the RMS, not of its square
+    std::snprintf(printed_share.data(), printed_share.size(), " %.1f %%\n", 100.0 * share);
+    CHECK(said.find(printed_share.data()) != std::string::npos);
   }
 }
 
@@ -350,7 +374,8 @@ TEST_CASE("blunders of a probe are left out with a word, the first row's too", "
   CHECK(measured_tests({steps}, options).notes.empty());
 }
 
-TEST_CASE("a signal that stays at a level within each run gets no gain", "[families]") {
+TEST_CASE("a signal that stays at a level within each run is not asked of the controller",
+          "[families]") {
   std::vector<RunFile> files;
   std::mt19937_64 engine(3);
   for (std::size_t i = 0; i < 3; ++i) {
@@ -367,11 +392,26 @@ TEST_CASE("a signal that stays at a level within each run gets no gain", "[famil
   const MeasuredTests tests = measured_tests(files, options);
   const FamiliesFit fit = fitted(tests, Family::lag_bank);
   CHECK(tests.unmoved == std::vector<std::string>{"load_A"});
-  const auto& bank = fit.model.terms[0].bank;
-  for (std::size_t i = 0; i < bank.subjects.size(); ++i)
-    if (bank.subjects[i] == "load_A")
-      for (const double gain : bank.gain_um_per_unit.at("z_um")[i]) CHECK(gain == 0.0);
   CHECK(fit.model.terms.size() == 1);  // nor has it hinges
+  CHECK(fit.model.terms[0].bank.subjects == std::vector<std::string>{"t1_degC", "t2_degC"});
+  CHECK(fit.model.signal_columns().empty());
+  CHECK_NOTHROW(parse_model(write_model(fit.model), "written"));
+}
+
+TEST_CASE("a position and a place that vary by rounding alone are constant", "[families]") {
+  RunFile run = machine_run("run", 1, [](double quick, double, double, double) { return quick; });
+  run.columns[2] = "still_degC";
+  run.columns[3] = "z_mm";
+  for (std::size_t row = 0; row < run.rows(); ++row) {
+    run.values[2][row] = 20.0 + (row % 2 == 0 ? 1e-13 : 0.0);
+    run.values[3][row] = -150.0 + (row % 3 == 0 ? 3e-14 : 0.0);
+  }
+  TestOptions options;
+  options.outputs = {"z_um"};
+  options.signals = true;
+  const MeasuredTests tests = measured_tests({run}, options);
+  CHECK(tests.signals.empty());
+  CHECK(tests.places == std::vector<std::string>{"t1_degC"});
 }
 
 TEST_CASE("a signal that goes one way once in all runs gets no gain", "[families]") {
