@@ -251,6 +251,15 @@ class ChangeSearch {
     return false;
   }
 
+  /// Whether a gap ends about then: what went on in it came all at once.
+  [[nodiscard]] bool is_after_gap(Index row, const Target& target) const {
+    constexpr Index reach = 2;
+    const Index first = std::max<Index>(0, row - reach);
+    const Index last = std::min(recording_.after_gap.rows() - 1, row + reach);
+    const Index column = target.output ? recording_.temps_K.cols() : target.column;
+    return recording_.after_gap.col(column).segment(first, last - first + 1).any();
+  }
+
   /// Whether nothing near takes it back by half or more: what comes back is no step.
   static bool stays(const std::vector<Expectation::Evidence>& steps, std::size_t at) {
     constexpr std::size_t near = 60;
@@ -304,7 +313,7 @@ class ChangeSearch {
     for (const std::size_t i : order) {
       const auto row = static_cast<Index>(i);
       const Index at = judged.rows[static_cast<std::size_t>(judged.begins[run] + row)];
-      if (is_operated(at, run) || !stays(steps, i) ||
+      if (is_operated(at, run) || is_after_gap(at, target) || !stays(steps, i) ||
           !is_sudden(judged, target, run, row, steps[i].size))
         continue;
       offer(target, target.output ? "displacement_step" : "sensor_step", run,

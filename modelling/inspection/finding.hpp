@@ -13,7 +13,7 @@ namespace thermocomp::inspection {
 struct Finding {
   std::string kind;
   std::string column;  ///< empty: the run as a whole
-  std::string other;   ///< the second column of a copy or an exchange
+  std::string other;   ///< the second column of a copy or an exchange; all further ones of a gap
   std::size_t run{0};
   double at_s{0.0};
   double until_s{0.0};
@@ -29,7 +29,7 @@ struct RunSampling {
   std::string file;
   std::size_t rows{0};
   double step_s{0.0};                           ///< median from row to row
-  std::vector<std::pair<double, double>> gaps;  ///< [t0, t1]
+  std::vector<std::pair<double, double>> gaps;  ///< without a row, or of a column
 };
 
 struct Inspection {

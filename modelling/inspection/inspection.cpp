@@ -96,6 +96,7 @@ Inspection inspect(const std::vector<RunFile>& given, double told_min,
   for (std::size_t i = 0; i < runs.size(); ++i) {
     inspection.runs.push_back(sampling_of(runs[i]));
     check_clock(runs[i], i, inspection.runs.back(), suspicions);
+    check_empty(runs[i], i, suspicions);
     check_spikes(calm[i], i, suspicions);
   }
   check_values(runs, suspicions);

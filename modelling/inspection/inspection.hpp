@@ -38,6 +38,9 @@ struct Cleaned {
 
 /// "10 s", "3.71 h": the time between two rows.
 [[nodiscard]] std::string step_text(double step_s);
+/// Groups of two and more, names joined.
+[[nodiscard]] std::vector<std::string> alike(const Inspection& inspection);
+inline constexpr const char* none_alike = "No two places move alike.";
 /// @param departure  a JSON value, or empty
 [[nodiscard]] std::string inspection_json(const Inspection& inspection,
                                           const std::string& departure = "");

@@ -45,6 +45,7 @@ std::string picture(const RunFile& run, const std::string& column, double from_s
 
 /// The place that moved most like the one of the finding, for comparison.
 std::string neighbour_of(const Inspection& inspection, const Finding& finding, const RunFile& run) {
+  if (finding.kind == "gap") return "";
   if (!finding.other.empty()) return finding.other;
   if (!is_temperature(finding.column)) return "";
   for (const auto& group : inspection.groups) {
@@ -94,13 +95,10 @@ std::string inspection_html(const std::vector<RunFile>& runs, const Inspection& 
                              : "The likeliest fault stands first, with its probability.");
   for (const Finding& finding : inspection.findings)
     html += finding_html(runs, inspection, finding);
-  std::vector<std::string> groups;
-  for (const auto& group : inspection.groups) {
-    std::string names;
-    for (const std::string& name : group) names += (names.empty() ? "" : ", ") + name;
-    groups.push_back(names);
-  }
-  html += runs_table(inspection) + html_heading("Places that move alike") + html_list(groups);
+  html += runs_table(inspection);
+  const std::vector<std::string> groups = alike(inspection);
+  html += groups.empty() ? html_paragraph(none_alike)
+                         : html_heading("Places that move alike") + html_list(groups);
   if (!inspection.experiments.empty())
     html += html_heading("Experiments that would show more") + html_list(inspection.experiments);
   return html + html_end();

@@ -36,6 +36,16 @@ Json json_of(const Finding& finding, const Inspection& inspection) {
 
 }  // namespace
 
+std::vector<std::string> alike(const Inspection& inspection) {
+  std::vector<std::string> groups;
+  for (const auto& group : inspection.groups) {
+    if (group.size() < 2) continue;
+    std::string& names = groups.emplace_back();
+    for (const std::string& name : group) names += (names.empty() ? "" : ", ") + name;
+  }
+  return groups;
+}
+
 std::string step_text(double step_s) {
   const bool in_hours = step_s >= 7200.0;
   const bool in_minutes = !in_hours && step_s >= 120.0;
@@ -81,12 +91,9 @@ std::string inspection_text(const Inspection& inspection) {
     std::snprintf(line, sizeof line, "%3.0f %%  ", 100 * finding.probability);
     text += line + inspection.runs[finding.run].file + ": " + finding.text + "\n";
   }
-  text += "\nPlaces that move alike:\n";
-  for (const auto& group : inspection.groups) {
-    text += " ";
-    for (const std::string& name : group) text += " " + name;
-    text += "\n";
-  }
+  const std::vector<std::string> groups = alike(inspection);
+  text.append("\n").append(groups.empty() ? none_alike : "Places that move alike:").append("\n");
+  for (const std::string& group : groups) text.append("  ").append(group).append("\n");
   if (!inspection.experiments.empty()) text += "\nWhat would tell more:\n";
   for (const std::string& experiment : inspection.experiments) text += "  " + experiment + "\n";
   return text;

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "config/text/units.hpp"
+#include "modelling/inspection/checks.hpp"
 
 namespace thermocomp::inspection {
 namespace {
@@ -104,6 +105,14 @@ Recording make_recording(const std::vector<RunFile>& runs, Index rows_max) {
   fill_all(recording.temps, recording.temps_K, true);
   fill_all(recording.signals, recording.values, true);
   fill_all(recording.outputs, recording.outputs_um, false);
+  std::vector<std::string> names = recording.temps;
+  names.emplace_back("time_s");
+  recording.after_gap.setConstant(rows, static_cast<Index>(names.size()), false);
+  for (std::size_t r = 0; r < runs.size(); ++r)
+    for (std::size_t i = 0; i < names.size(); ++i)
+      for (const std::size_t row : ends_of_gaps(runs[r], runs[r].column(names[i])))
+        recording.after_gap(recording.begins[r] + static_cast<Index>(row / strides[r]),
+                            static_cast<Index>(i)) = true;
   return recording;
 }
 

@@ -21,6 +21,8 @@ struct Recording {
   Eigen::MatrixXd values;            ///< shape (rows, signals)
   Eigen::MatrixXd outputs_um;        ///< shape (rows, outputs)
   std::vector<Eigen::Index> begins;  ///< of each run, and the end
+  /// Whether a gap ends in the row; shape (rows, temps + 1), last those in which rows are missing.
+  Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic> after_gap;
 
   [[nodiscard]] std::size_t runs() const noexcept { return begins.size() - 1; }
 };

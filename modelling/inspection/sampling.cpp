@@ -1,5 +1,8 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <optional>
+#include <tuple>
 
 #include "config/runs/robust.hpp"
 #include "config/text/units.hpp"
@@ -50,28 +53,101 @@ bool goes_on(const RunFile& run, std::size_t row) {
   return judged > 0;
 }
 
+using Span = std::pair<double, double>;
+
+/// Stretches without a value, from the last one before to the first one after.
+std::vector<Span> gaps_of(const RunFile& run, const std::vector<double>& column) {
+  std::vector<Span> gaps;
+  for (const std::size_t end : ends_of_gaps(run, column)) {
+    std::size_t before = end - 1;
+    while (!std::isfinite(column[before])) --before;
+    gaps.emplace_back(run.time_s()[before], run.time_s()[end]);
+  }
+  return gaps;
+}
+
+/// Whether it is meant to have a value in every row; displacements are often probed now and then.
+bool is_dense(const RunFile& run, std::size_t column) {
+  const std::vector<double>& values = run.values[column];
+  const auto count = std::count_if(values.begin(), values.end(),
+                                   [](double value) { return std::isfinite(value); });
+  return 2 * static_cast<std::size_t>(count) >= values.size();
+}
+
 }  // namespace
+
+double gap_s_min(const RunFile& run) {
+  const std::vector<double> steps = steps_of(run);
+  if (steps.empty()) return std::numeric_limits<double>::infinity();
+  const double step_s = median(steps);
+  if (is_regular(steps, step_s)) return gap_steps_min * step_s;
+  std::vector<double> sorted = steps;
+  std::sort(sorted.begin(), sorted.end());
+  return std::max(irregular_gap_steps_min * step_s, 3.0 * sorted[sorted.size() * 95 / 100]);
+}
+
+std::vector<std::size_t> ends_of_gaps(const RunFile& run, const std::vector<double>& column) {
+  const double least_s = gap_s_min(run);
+  std::vector<std::size_t> ends;
+  std::optional<std::size_t> last;
+  for (std::size_t row = 0; row < column.size(); ++row) {
+    if (!std::isfinite(column[row])) continue;
+    if (last && run.time_s()[row] - run.time_s()[*last] > least_s) ends.push_back(row);
+    last = row;
+  }
+  return ends;
+}
 
 RunSampling sampling_of(const RunFile& run) {
   RunSampling sampling{run.name, run.rows(), 0.0, {}};
   const std::vector<double> steps = steps_of(run);
   if (steps.empty()) return sampling;
   sampling.step_s = median(steps);
-  double usual_s = gap_steps_min * sampling.step_s;
-  if (!is_regular(steps, sampling.step_s)) {
-    std::vector<double> sorted = steps;
-    std::sort(sorted.begin(), sorted.end());
-    usual_s =
-        std::max(irregular_gap_steps_min * sampling.step_s, 3.0 * sorted[sorted.size() * 95 / 100]);
+  std::vector<Span> gaps;
+  for (std::size_t i = 0; i < run.columns.size(); ++i) {
+    if (!is_dense(run, i)) continue;
+    const std::vector<Span> of_column = gaps_of(run, run.values[i]);
+    gaps.insert(gaps.end(), of_column.begin(), of_column.end());
   }
-  for (std::size_t i = 0; i < steps.size(); ++i)
-    if (steps[i] > usual_s) sampling.gaps.emplace_back(run.time_s()[i], run.time_s()[i + 1]);
+  std::sort(gaps.begin(), gaps.end());
+  for (const Span& gap : gaps) {
+    if (sampling.gaps.empty() || gap.first >= sampling.gaps.back().second)
+      sampling.gaps.push_back(gap);
+    else
+      sampling.gaps.back().second = std::max(sampling.gaps.back().second, gap.second);
+  }
   return sampling;
+}
+
+void check_empty(const RunFile& run, std::size_t index, Suspicions& found) {
+  const std::vector<Span> without_rows = gaps_of(run, run.time_s());
+  Suspicion longest;
+  longest.score = 10.0;
+  longest.finding.kind = std::string("gap");
+  longest.finding.run = index;
+  longest.finding.unit = std::string("s");
+  for (std::size_t i = 0; i < run.columns.size(); ++i) {
+    if (!is_dense(run, i)) continue;
+    Finding& finding = longest.finding;
+    for (const Span& gap : gaps_of(run, run.values[i])) {
+      if (std::find(without_rows.begin(), without_rows.end(), gap) != without_rows.end()) continue;
+      if (Span(finding.at_s, finding.until_s) == gap) {
+        finding.other.append(finding.other.empty() ? "" : ", ").append(run.columns[i]);
+      } else if (gap.second - gap.first > finding.size) {
+        finding.column = run.columns[i];
+        finding.other.clear();
+        std::tie(finding.at_s, finding.until_s) = gap;
+        finding.size = gap.second - gap.first;
+      }
+    }
+  }
+  if (longest.finding.size > 0) found.push_back(longest);
 }
 
 void check_clock(const RunFile& run, std::size_t index, const RunSampling& sampling,
                  Suspicions& found) {
   const std::vector<double> steps = steps_of(run);
+  const double gap_s = gap_s_min(run);
   const bool regular = !steps.empty() && is_regular(steps, sampling.step_s);
   const auto offer = [&](const char* kind, double from_s, double to_s, double size, double score) {
     Suspicion made;
@@ -89,8 +165,7 @@ void check_clock(const RunFile& run, std::size_t index, const RunSampling& sampl
   for (std::size_t i = 0; i < steps.size(); ++i) {
     const double from_s = run.time_s()[i];
     const double to_s = run.time_s()[i + 1];
-    const bool gap = std::find(sampling.gaps.begin(), sampling.gaps.end(),
-                               std::pair(from_s, to_s)) != sampling.gaps.end();
+    const bool gap = steps[i] > gap_s;
     const double jump_s = steps[i] - sampling.step_s;
     const double hours = std::round(jump_s / hour_s);
     const bool whole_hours = hours >= 1 && std::abs(jump_s - hours * hour_s) <= 2 * sampling.step_s;

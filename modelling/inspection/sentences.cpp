@@ -75,7 +75,9 @@ std::string sentence(const Finding& finding, const RunFile& run) {
            " without a change of temperature or operation: the probe, the work or the zero was "
            "moved.";
   if (kind == "gap")
-    return (finding.column.empty() ? "Nothing was recorded" : finding.column + " has no value") +
+    return (finding.column.empty()  ? "Nothing was recorded"
+            : finding.other.empty() ? finding.column + " has no value"
+                                    : finding.column + ", " + finding.other + " have no value") +
            " for " + duration(finding.size) + " after " + at + ".";
   if (finding.size < 0)
     return "Two rows after " + at +

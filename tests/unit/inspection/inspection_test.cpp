@@ -119,6 +119,32 @@ TEST_CASE(
   CHECK(without_steps({run}, {"z_um"}).notes.empty());
 }
 
+TEST_CASE("a module that was away left a gap, and no sensor moved", "[inspection]") {
+  RunFile run = recording();
+  for (const char* name : {"t1_degC", "t2_degC"})
+    for (std::size_t row = 215; row < 240; ++row) column(run, name)[row] = std::nan("");
+  const Inspection inspection = inspect({run});
+  INFO(inspection_text(inspection));
+  CHECK(find(inspection, "sensor_step") == nullptr);
+  const std::pair<double, double> away{214 * 60.0, 240 * 60.0};
+  CHECK(inspection.runs.front().gaps == std::vector{away});
+  REQUIRE(inspection.findings.size() == 1);
+  CHECK(inspection.findings.front().text ==
+        "t1_degC, t2_degC have no value for 26 min after 3 h 34 min.");
+  CHECK_THAT(inspection_html({run}, inspection), Catch::Contains("t1_degC, t2_degC"));
+}
+
+TEST_CASE("single places are no group", "[inspection]") {
+  Inspection inspection;
+  inspection.groups = {{"t1_degC"}, {"t2_degC"}};
+  CHECK_THAT(inspection_text(inspection), Catch::Contains("No two places move alike."));
+  CHECK_THAT(inspection_html({recording()}, inspection),
+             Catch::Contains("No two places move alike."));
+  inspection.groups = {{"t1_degC", "t2_degC"}, {"t3_degC"}};
+  CHECK_THAT(inspection_text(inspection), Catch::Contains("alike:\n  t1_degC, t2_degC\n"));
+  CHECK_THAT(inspection_text(inspection), !Catch::Contains("t3_degC"));
+}
+
 TEST_CASE("a heater that is switched on and off is a ramp, no step of a sensor", "[inspection]") {
   // No signal says when: the bed warms by 4 K in a row for six rows, holds, and cools.
   for (unsigned seed = 1; seed <= 3; ++seed) {
