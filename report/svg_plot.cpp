@@ -28,6 +28,7 @@ constexpr double cell_size = 18.0;
 constexpr std::size_t panel_points_max = 8000;
 constexpr std::size_t points_max = 2000;
 constexpr std::size_t dots_max = 300;
+constexpr double rounding_share = 1e-9;
 
 struct Range {
   double low{0.0};
@@ -47,7 +48,10 @@ Range range_of(const std::vector<Values>& columns) {
     }
   }
   if (!(range.low <= range.high)) return {};
-  if (!(range.low < range.high)) return {range.low - 1.0, range.high + 1.0};
+  // Rounding of a constant is no course.
+  const double size = std::max(std::abs(range.low), std::abs(range.high));
+  if (!(range.high - range.low > rounding_share * size))
+    return {range.low - 1.0, range.high + 1.0};
   return range;
 }
 

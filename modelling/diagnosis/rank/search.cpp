@@ -71,7 +71,8 @@ std::vector<double> values_of(const ShapeParameter& of, double found) {
 
 /// Sets the intervals of 95 %: every value of a shape parameter whose likelihood, the gains fitted
 /// anew, is within reach of the best one's; the gains at these values with their own deviation.
-void set_spread(const Fits& fits, Finding& finding) {
+/// @return whether a gain is known not to be 0, beside the best shape; true where it has none
+bool set_spread(const Fits& fits, Finding& finding) {
   Explanation& found = finding.explanation;
   const Hypothesis& hypothesis = *found.hypothesis;
   const Explanation best = fits.trials(hypothesis, {found.shape}).front();
@@ -83,11 +84,13 @@ void set_spread(const Fits& fits, Finding& finding) {
   };
   finding.shape_ci.assign(found.shape.size(), {});
   finding.gains_ci.assign(found.gains.size(), {});
+  bool is_known = hypothesis.gains.empty();
   if (!hypothesis.gains.empty())
     for (std::size_t output = 0; output < found.gains.size(); ++output)
       for (Eigen::Index i = 0; i < best.gains[output].size(); ++i) {
         const auto [low, high] = gains_reach(best, output, i);
         finding.gains_ci[output].push_back({low, high});
+        is_known = is_known || low > 0.0 || high < 0.0;
       }
   for (std::size_t parameter = 0; parameter < found.shape.size(); ++parameter) {
     const ShapeParameter& of = hypothesis.shape[parameter];
@@ -115,6 +118,7 @@ void set_spread(const Fits& fits, Finding& finding) {
         }
     }
   }
+  return is_known;
 }
 
 class Search {
@@ -261,7 +265,8 @@ class Search {
     });
   }
 
-  /// Each beside all others, with the intervals that this leaves. What others have taken over goes.
+  /// Each beside all others, with the intervals that this leaves. What others have taken over goes,
+  /// and what may have no size at all.
   void settle_together(std::vector<Finding>& findings) {
     for (std::size_t i = 0; i < findings.size();) {
       std::vector<Explanation> others;
@@ -278,7 +283,12 @@ class Search {
         continue;
       }
       fits.refine(findings[i].explanation, Fits::By::likelihood);
-      set_spread(fits, findings[i++]);
+      if (!set_spread(fits, findings[i])) {
+        findings.erase(findings.begin() + static_cast<std::ptrdiff_t>(i));
+        i = 0;
+        continue;
+      }
+      ++i;
     }
   }
 

@@ -36,6 +36,7 @@ struct ReportRun {
   std::vector<Column> after_um{};     ///< of the extended model
   std::vector<Column> signals{};
   std::vector<Column> inputs_K{};
+  bool of_the_model{false};  ///< the model names it as one that it was made from
 };
 
 struct ReportData {
@@ -70,10 +71,11 @@ void add_runs(ReportData& report, const Diagnosis& diagnosis, const MeasuredData
 /// The experiment that tells one explanation from another.
 [[nodiscard]] std::string experiment_between(const Alternative& one, const Alternative& other);
 
-/// One output of a run: measured, model and extended model; under it what they leave, the operating
-/// signals and the temperatures, over one axis of time.
+/// The outputs of a run: measured, model and extended model, and what they leave; under them the
+/// operating signals and the temperatures, over one axis of time.
+/// @param units  one an output
 [[nodiscard]] std::string course_picture(const ReportRun& run, const ReportData& report,
-                                         std::size_t output, const std::string& unit);
+                                         const std::vector<std::string>& units);
 /// What the model leaves over the temperatures that it goes with most.
 [[nodiscard]] std::string scatter_pictures(const ReportRun& run, const ReportData& report,
                                            std::size_t output);

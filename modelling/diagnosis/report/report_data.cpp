@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 
 #include "config/text/units.hpp"
 #include "modelling/diagnosis/data/series.hpp"
@@ -114,6 +115,17 @@ std::vector<std::size_t> named_others(const Diagnosis& diagnosis, const Measured
   return named;
 }
 
+/// "/data/friday.csv@0:3600": "friday.csv"
+std::string file_of(const std::string& run) {
+  return std::filesystem::path(run.substr(0, run.find('@'))).filename().string();
+}
+
+bool is_of_the_model(const ThermalModel& model, const std::string& run) {
+  return model.made_from &&
+         std::any_of(model.made_from->runs.begin(), model.made_from->runs.end(),
+                     [&](const std::string& each) { return file_of(each) == file_of(run); });
+}
+
 }  // namespace
 
 void add_runs(ReportData& report, const Diagnosis& diagnosis, const MeasuredData& data,
@@ -128,6 +140,7 @@ void add_runs(ReportData& report, const Diagnosis& diagnosis, const MeasuredData
     const MeasuredRun& run = data.runs[i];
     const Eigen::Index rows = run.rows() - run.begin;
     ReportRun added{run.name, test, run.time_s.tail(rows), phases_of(run, data)};
+    added.of_the_model = is_of_the_model(data.model, run.name);
     for (const Column& measured : run.measured_um)
       added.measured_um.emplace_back(measured.tail(rows));
     for (const Column& signal : run.signals) added.signals.emplace_back(signal.tail(rows));

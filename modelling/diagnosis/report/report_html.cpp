@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "modelling/diagnosis/report/diagnosis_report.hpp"
+#include "report/html_page.hpp"
 #include "report/svg_plot.hpp"
 
 namespace thermocomp::diagnosis {
@@ -15,18 +16,11 @@ constexpr std::size_t candidates_told = 3;
 /// A share of what the model leaves that is worth an advice.
 constexpr double share_told_min = 0.25;
 
-constexpr const char* head =
-    "<!DOCTYPE html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
-    "content=\"width=device-width\"><title>Diagnosis</title><style>"
-    "body{font:16px/1.5 sans-serif;max-width:960px;margin:2em auto;padding:0 1em;color:#222}"
-    "table{border-collapse:collapse;margin:.6em 0}td,th{border:1px solid #ccc;padding:.2em .6em;"
-    "text-align:right}td:first-child,th:first-child{text-align:left}svg{width:100%;height:auto;"
-    "background:#fafafa;margin:.2em 0}svg text{font:11px sans-serif}svg .title{font-weight:bold}"
-    "svg .share{fill:#fff}.zero{stroke:#888}.grid{stroke:#e2e8f0}.axis{stroke:#888}"
-    ".dots{stroke:#2b6cb0;stroke-width:2}.few{display:flex}.few svg{width:33%}"
-    ".small{font-size:80%;color:#555}summary{cursor:pointer}.wide{overflow-x:auto}"
-    ".zoom4:checked~.wide svg{width:400%}.zoom16:checked~.wide svg{width:1600%}"
-    "</style></head><body>\n";
+/// Beside what every page has.
+constexpr const char* own_style =
+    "<style>svg .share{fill:#fff}.dots{stroke:#2b6cb0;stroke-width:2}.few{display:flex;"
+    "flex-wrap:wrap}.few svg{width:32%;min-width:240px}summary{cursor:pointer;margin:.4em 0}"
+    ".zoom4:checked~.wide svg{width:400%}.zoom16:checked~.wide svg{width:1600%}</style>\n";
 
 std::string fixed(double value, int digits = 2) {
   if (!std::isfinite(value)) return "-";
@@ -35,13 +29,11 @@ std::string fixed(double value, int digits = 2) {
   return text;
 }
 
-std::string row(const std::vector<std::string>& cells, const char* tag = "td") {
-  std::string html = "<tr>";
-  for (const std::string& cell : cells) {
-    html.append("<").append(tag).append(">").append(xml_text(cell));
-    html.append("</").append(tag).append(">");
-  }
-  return html + "</tr>\n";
+using Table = std::vector<std::vector<std::string>>;
+
+std::string folded(const std::string& title, const std::string& html) {
+  if (html.empty()) return "";
+  return "<details><summary>" + xml_text(title) + "</summary>\n" + html + "</details>\n";
 }
 
 struct Figures {
@@ -65,51 +57,62 @@ Figures figures_of(const Column& values, Takes takes) {
   return figures;
 }
 
-std::string verdict_text(const Diagnosis& diagnosis) {
-  if (diagnosis.verdict == "effect") return "The model lacks what is named below.";
-  if (diagnosis.verdict == "none")
-    return "Nothing worth saying: what is left is noise, or too little to act on.";
-  return "The error exceeds noise; no known cause explains it, so none is named.";
-}
-
 std::string unit_text(const Diagnosis& diagnosis, const std::string& output) {
   if (diagnosis.unit != "um") return diagnosis.unit;
-  return output.ends_with("_urad") ? "urad" : "um";
+  return output.ends_with("_urad") ? "µrad" : "µm";
 }
 
-/// "5.7 um".
-std::string with_unit(double value, const std::string& unit) {
-  return figure(value).append(" ").append(unit);
+/// RMS of an output over the test runs, from each run's first value.
+double motion_rms(const ReportData& report, const std::string& output) {
+  const auto at = static_cast<std::size_t>(
+      std::find(report.outputs.begin(), report.outputs.end(), output) - report.outputs.begin());
+  double squares = 0.0;
+  double count = 0.0;
+  for (const ReportRun& run : report.runs) {
+    if (!run.test || at >= run.measured_um.size()) continue;
+    double first = not_a_number;
+    for (const double value : run.measured_um[at]) {
+      if (!std::isfinite(value)) continue;
+      if (!std::isfinite(first)) first = value;
+      squares += (value - first) * (value - first);
+      count += 1.0;
+    }
+  }
+  return std::sqrt(squares / count);
 }
 
-/// "z: the model's error on the test rows is 5.7 um (RMS), with the extended model 3.1 um."
-std::string summary(const Diagnosis& diagnosis) {
-  std::string html = "<ul>";
+/// "z: 1.0 of 44 µm is left on the test rows (2 %), with the extended model 0.80 µm."
+std::string summary(const Diagnosis& diagnosis, const ReportData& report) {
+  std::vector<std::string> all;
   for (const auto& [output, of] : diagnosis.outputs) {
     if (!std::isfinite(of.test_rms_um)) continue;
     const std::string unit = unit_text(diagnosis, output);
+    const double motion = motion_rms(report, output);
     std::string text = name_of_column(output);
-    text.append(": the model's error on the test rows is ");
-    text.append(with_unit(of.test_rms_um, unit)).append(" (RMS)");
+    text.append(": ").append(figure(of.test_rms_um));
+    if (motion > 0) text.append(" of ").append(figure(motion));
+    text.append(" ").append(unit).append(" (RMS) is left on the test rows");
+    if (motion > 0) text.append(" (").append(fixed(100.0 * of.test_rms_um / motion, 0)) += " %)";
     if (of.extended_test_rms_um < of.test_rms_um)
-      text.append(", with the extended model ").append(with_unit(of.extended_test_rms_um, unit));
+      text.append(", with the extended model ")
+          .append(figure(of.extended_test_rms_um))
+          .append(" ")
+          .append(unit);
     else
-      text.append("; nothing was found that makes it smaller");
-    html.append("<li>").append(xml_text(text)).append(".</li>");
+      text += "; nothing was found that makes it smaller";
+    all.push_back(text + ".");
   }
-  return html + "</ul>\n";
+  return html_list(all);
 }
 
 std::string gains_table(const Diagnosis& diagnosis) {
-  std::string html =
-      "<h2>Error before and after, on rows not used to find anything</h2><table>" +
-      row({"", "RMS before", "RMS after", "peak before", "peak after", "of it without a name"},
-          "th");
+  Table rows{{"", "RMS before", "RMS after", "peak before", "peak after", "of it without a name"}};
   for (const auto& [output, of] : diagnosis.outputs)
-    html += row({name_of_column(output) + ", " + unit_text(diagnosis, output),
-                 figure(of.test_rms_um), figure(of.extended_test_rms_um), figure(of.test_peak_um),
-                 figure(of.extended_test_peak_um), fixed(100 * of.unexplained_fraction, 0) + " %"});
-  return html + "</table>\n";
+    rows.push_back({name_of_column(output) + ", " + unit_text(diagnosis, output),
+                    figure(of.test_rms_um), figure(of.extended_test_rms_um),
+                    figure(of.test_peak_um), figure(of.extended_test_peak_um),
+                    fixed(100 * of.unexplained_fraction, 0) + " %"});
+  return html_table(rows);
 }
 
 /// What can be done, and by how much the largest gain of an output makes the error smaller.
@@ -127,8 +130,7 @@ double largest_gain_um(const std::map<std::string, TestGain>& test) {
 
 std::string by(const Diagnosis& diagnosis, double gain_um) {
   if (!(gain_um > 0)) return "";
-  return " (up to " + figure(gain_um) + " " + (diagnosis.unit == "um" ? "um" : diagnosis.unit) +
-         " RMS less)";
+  return " (up to " + figure(gain_um) + " " + unit_text(diagnosis, "") + " RMS less)";
 }
 
 /// Outputs of which a share of the error is above the least that is reported, by name.
@@ -141,7 +143,7 @@ std::string outputs_with(const Diagnosis& diagnosis, Share share) {
   return names;
 }
 
-std::string next_steps(const Diagnosis& diagnosis) {
+std::vector<Advice> next_steps(const Diagnosis& diagnosis) {
   std::vector<Advice> all;
   for (const NamedFinding& finding : diagnosis.findings) {
     const double gain_um = largest_gain_um(finding.test);
@@ -166,6 +168,7 @@ std::string next_steps(const Diagnosis& diagnosis) {
   }
   std::stable_sort(all.begin(), all.end(),
                    [](const Advice& a, const Advice& b) { return a.gain_um > b.gain_um; });
+  if (diagnosis.verdict == "none") return all;  // too little is left to record anything for
   const std::string predictable =
       outputs_with(diagnosis, [](const Headroom& of) { return of.predictable; });
   if (!predictable.empty() && !diagnosis.remainder)
@@ -179,16 +182,22 @@ std::string next_steps(const Diagnosis& diagnosis) {
     all.push_back({0.0, unseen + ": a good part of the error goes with nothing that was recorded. "
                                  "A sensor at a place that has none, or the signal of a pump, fan "
                                  "or cooler, is what would help."});
-  if (all.empty()) return "";
-  std::string html = "<h2>What to do, the largest gain first</h2><ol>";
-  for (const Advice& each : all) html += "<li>" + xml_text(each.text) + "</li>";
-  return html + "</ol>\n";
+  return all;
 }
 
-/// How far the model could get with what was recorded.
-std::string headroom_html(const Diagnosis& diagnosis) {
-  const std::string picture = headroom_picture(diagnosis);
-  return picture.empty() ? picture : "<h2>What the model's error is made of</h2>\n" + picture;
+std::string verdict_text(const Diagnosis& diagnosis, const std::vector<Advice>& steps) {
+  if (diagnosis.verdict == "effect") return "The model lacks what is named below.";
+  if (diagnosis.verdict == "unexplained")
+    return "The error exceeds noise; no known cause explains it, so none is named.";
+  return steps.empty() ? "Nothing worth saying: what is left is noise, or too little to act on."
+                       : "No cause is named; a part of what is left can be predicted.";
+}
+
+std::string steps_html(const std::vector<Advice>& steps) {
+  if (steps.empty()) return "";
+  std::string html = html_heading("What to do, the largest gain first") + "<ol>";
+  for (const Advice& each : steps) html += "<li>" + xml_text(each.text) + "</li>";
+  return html + "</ol>\n";
 }
 
 std::string probability_text(const NamedFinding& finding) {
@@ -205,55 +214,55 @@ std::string probability_text(const NamedFinding& finding) {
 
 std::string finding_html(const NamedFinding& finding, std::size_t number, const std::string& unit) {
   std::string html = "<h3>" + std::to_string(number) + ". " + xml_text(title_of(finding)) +
-                     "</h3><p>" + xml_text(sentence_of(finding)) +
-                     xml_text(probability_text(finding)) + "</p>\n";
-  if (!finding.test.empty()) {
-    html += "<table>" +
-            row({"error on the test rows", "before", "after", "less by", "95 % interval"}, "th");
-    for (const auto& [output, gain] : finding.test)
-      html += row({name_of_column(output) + ", " + unit, figure(gain.before_um),
-                   figure(gain.after_um), fixed(100 * gain.reduction, 0) + " %",
-                   fixed(100 * gain.ci95.low, 0) + " to " + fixed(100 * gain.ci95.high, 0) + " %"});
-    html += "</table>\n";
-  }
+                     "</h3>" + html_paragraph(sentence_of(finding) + probability_text(finding));
+  Table gains{{"error on the test rows", "before", "after", "less by", "95 % interval"}};
+  for (const auto& [output, gain] : finding.test)
+    gains.push_back(
+        {name_of_column(output) + ", " + unit, figure(gain.before_um), figure(gain.after_um),
+         fixed(100 * gain.reduction, 0) + " %",
+         fixed(100 * gain.ci95.low, 0) + " to " + fixed(100 * gain.ci95.high, 0) + " %"});
+  std::string more = html_table(gains);
   for (const Alternative& other : finding.alternatives) {
     if (other.relative_support < support_told_min) continue;
-    html += "<p>It could also be this: " + xml_text(title_of(other)) + " (" +
-            figure(100.0 * other.relative_support) + " % as likely). To tell them apart: " +
-            xml_text(experiment_between({finding.cause, finding.subject, 1.0}, other)) + "</p>\n";
+    more += html_paragraph("It could also be this: " + title_of(other) + " (" +
+                           figure(100.0 * other.relative_support) +
+                           " % as likely). To tell them apart: " +
+                           experiment_between({finding.cause, finding.subject, 1.0}, other));
   }
-  return html + "<p class=\"small\">" + xml_text(finding.cause) + " of " +
-         xml_text(finding.subject) + (finding.family.empty() ? "" : ", family " + finding.family) +
-         ": " + xml_text(finding.evidence) + ".</p>\n";
+  more += html_paragraph(finding.cause + " of " + finding.subject +
+                             (finding.family.empty() ? "" : ", family " + finding.family) + ": " +
+                             finding.evidence + ".",
+                         "small");
+  return html + folded("Gain, and what else it could be", more);
 }
 
 /// What was weighed where nothing is named.
 std::string candidates_html(const Diagnosis& diagnosis) {
-  if (!diagnosis.findings.empty() || diagnosis.weighed.empty()) return "";
-  std::string html =
-      "<h2>What it may be</h2><p>Nothing of this is more likely than all else "
-      "together. The gain on test rows is measured, and decides nothing.</p><table>" +
-      row({"", "probability", "of the error on left-out rows", "error on the test rows",
-           "what would decide"},
-          "th");
+  if (!diagnosis.findings.empty()) return "";
+  Table rows{{"", "probability", "of the error on left-out rows", "error on the test rows",
+              "what would decide"}};
   for (std::size_t i = 0; i < std::min(candidates_told, diagnosis.weighed.size()); ++i) {
     const Candidate& each = diagnosis.weighed[i];
+    if (each.probability < support_told_min) continue;
     std::string gains;
     for (const auto& [output, gain] : each.test)
       gains += (gains.empty() ? "" : ", ") + name_of_column(output) + " " + figure(gain.before_um) +
                " to " + figure(gain.after_um);
-    html += row({title_of(Alternative{each.cause, each.subject, 1.0}),
-                 fixed(100.0 * each.probability, 0) + " %",
-                 fixed(100.0 * each.share_of_remainder, 0) + " %", gains.empty() ? "-" : gains,
-                 each.would_decide});
+    rows.push_back({title_of(Alternative{each.cause, each.subject, 1.0}),
+                    fixed(100.0 * each.probability, 0) + " %",
+                    fixed(100.0 * each.share_of_remainder, 0) + " %", gains.empty() ? "-" : gains,
+                    each.would_decide});
   }
-  return html + "</table>\n";
+  if (rows.size() < 2) return "";
+  return html_heading("What it may be") +
+         html_paragraph("Nothing of this is more likely than all else together. The gain on test "
+                        "rows is measured, and decides nothing.") +
+         html_table(rows);
 }
 
 std::string phases_table(const ReportRun& run, const ReportData& report) {
-  std::string html = "<table>" + row({"phase", "share of rows", "output", "RMS before",
-                                      "peak before", "share of squares", "RMS after"},
-                                     "th");
+  Table table{{"phase", "share of rows", "output", "RMS before", "peak before", "share of squares",
+               "RMS after"}};
   const auto rows = static_cast<double>(run.phases.size());
   for (std::size_t output = 0; output < report.outputs.size(); ++output) {
     const double all = figures_of(run.before_um[output], [](Eigen::Index) { return true; }).rms;
@@ -267,27 +276,26 @@ std::string phases_table(const ReportRun& run, const ReportData& report) {
       const double share =
           static_cast<double>(std::count(run.phases.begin(), run.phases.end(), phase)) / rows;
       const double squares = all > 0 ? share * before.rms * before.rms / (all * all) : 0.0;
-      html += row({phase_name(phase), fixed(100 * share, 0) + " %", report.outputs[output],
+      table.push_back({phase_name(phase), fixed(100 * share, 0) + " %", report.outputs[output],
                    fixed(before.rms), fixed(before.peak), fixed(100 * squares, 0) + " %",
                    fixed(figures_of(run.after_um[output], in_phase).rms)});
     }
   }
-  return html + "</table>\n";
+  return html_table(table);
 }
 
 std::string whiteness_table(const ReportRun& run, const ReportData& report) {
-  std::string html = "<table>" + row({"output", "noise of a value", "noise's share of the variance",
-                                      "residual correlated over", "after: correlated over"},
-                                     "th");
+  Table rows{{"output", "noise of a value", "noise's share of the variance",
+              "residual correlated over", "after: correlated over"}};
   for (std::size_t output = 0; output < report.outputs.size(); ++output) {
     const Whiteness before = whiteness_of(run.time_s, run.before_um[output]);
     const Whiteness after = whiteness_of(run.time_s, run.after_um[output]);
-    html += row({report.outputs[output], fixed(before.noise_um, 3),
-                 fixed(100 * before.noise_share, 1) + " %",
-                 fixed(before.correlation_time_s / 60.0, 0) + " min",
-                 fixed(after.correlation_time_s / 60.0, 0) + " min"});
+    rows.push_back({report.outputs[output], fixed(before.noise_um, 3),
+                    fixed(100 * before.noise_share, 1) + " %",
+                    fixed(before.correlation_time_s / 60.0, 0) + " min",
+                    fixed(after.correlation_time_s / 60.0, 0) + " min"});
   }
-  return html + "</table>\n";
+  return html_table(rows);
 }
 
 /// A picture that can be made wider: no script is needed for that.
@@ -304,50 +312,82 @@ std::string zoomed(const std::string& picture, const std::string& group) {
   return html.append("<div class=\"wide\">").append(picture).append("</div></div>\n");
 }
 
-std::string run_html(const ReportRun& run, const Diagnosis& diagnosis, const ReportData& report,
-                     std::size_t number) {
-  std::string html = "<h2>" + xml_text(run.name) +
-                     (run.test ? " (test: nothing was fitted to these rows)" : " (training)") +
-                     "</h2>";
-  std::string checks;
-  for (std::size_t output = 0; output < report.outputs.size(); ++output) {
-    const std::string unit = unit_text(diagnosis, report.outputs[output]);
-    std::string group = "r";
-    group.append(std::to_string(number)).append("o").append(std::to_string(output));
-    html += zoomed(course_picture(run, report, output, unit), group);
-    checks += "<p>Error of " + xml_text(name_of_column(report.outputs[output])) + ", " + unit +
-              ", over the temperatures that it goes with most:</p>" +
-              scatter_pictures(run, report, output);
-  }
-  return html + "<details><summary>Figures for a closer look</summary>" + checks +
-         phases_table(run, report) + whiteness_table(run, report) + "</details>\n";
+std::string role_text(const ReportRun& run) {
+  if (!run.test) return " (training)";
+  return run.of_the_model ? " (test; the model itself was fitted to this run)"
+                          : " (test: nothing was fitted to these rows)";
+}
+
+std::string closer_look(const ReportRun& run, const Diagnosis& diagnosis,
+                        const ReportData& report) {
+  std::string html;
+  for (std::size_t output = 0; output < report.outputs.size(); ++output)
+    html += html_paragraph("Error of " + name_of_column(report.outputs[output]) + ", " +
+                           unit_text(diagnosis, report.outputs[output]) +
+                           ", over the temperatures that it goes with most:") +
+            scatter_pictures(run, report, output);
+  return html + phases_table(run, report) + whiteness_table(run, report);
+}
+
+/// The first test run in sight, all others folded.
+std::string runs_html(const Diagnosis& diagnosis, const ReportData& report) {
+  std::vector<std::string> units;
+  for (const std::string& output : report.outputs) units.push_back(unit_text(diagnosis, output));
+  std::string html;
+  std::string others;
+  std::size_t number = 0;
+  for (const bool test : {true, false})
+    for (const ReportRun& run : report.runs) {
+      if (run.test != test) continue;
+      const bool first = number == 0;
+      const std::string title = run.name + role_text(run);
+      const std::string course =
+          zoomed(course_picture(run, report, units), "run" + std::to_string(number++));
+      const std::string closer = closer_look(run, diagnosis, report);
+      if (first)
+        html = html_heading(title) + course + folded("Figures for a closer look", closer);
+      else
+        others += folded(title, course + closer);
+    }
+  return html + others;
+}
+
+/// Test runs that the model was fitted to.
+std::string fitted_text(const ReportData& report) {
+  std::string names;
+  for (const ReportRun& run : report.runs)
+    if (run.test && run.of_the_model) names += (names.empty() ? "" : ", ") + run.name;
+  if (names.empty()) return "";
+  return html_paragraph("The model was fitted to " + names +
+                        ": the error there says little of other days. Take a test run that "
+                        "[made_from].runs of the model does not name.");
 }
 
 }  // namespace
 
 std::string report_html(const Diagnosis& diagnosis, const ReportData& report) {
-  std::string html = head;
-  html += "<h1>What the model gets wrong</h1><p>" + verdict_text(diagnosis) + "</p>\n" +
-          summary(diagnosis) + next_steps(diagnosis);
-  html += headroom_html(diagnosis);
-  if (!diagnosis.findings.empty()) html += "<h2>What was found</h2>\n";
+  const std::vector<Advice> steps = next_steps(diagnosis);
+  std::string html = html_begin("What the model gets wrong") + own_style;
+  html += html_paragraph(verdict_text(diagnosis, steps)) + summary(diagnosis, report) +
+          fitted_text(report) + steps_html(steps);
+  if (!diagnosis.findings.empty()) html += html_heading("What was found");
   std::size_t number = 0;
   for (const NamedFinding& finding : diagnosis.findings)
     html += finding_html(
         finding, ++number,
         unit_text(diagnosis, finding.outputs.empty() ? std::string() : finding.outputs.front()));
   html += candidates_html(diagnosis);
-  html += gains_table(diagnosis);
-  std::size_t drawn = 0;
-  for (const bool test : {true, false})
-    for (const ReportRun& run : report.runs)
-      if (run.test == test) html += run_html(run, diagnosis, report, drawn++);
-  html +=
-      "<p class=\"small\">RMS and peak in " +
-      std::string(diagnosis.unit == "um" ? "um (urad for tilts)" : diagnosis.unit) +
-      ". Phases: ten minutes after a change of a signal; heating and cooling by the mean of the "
-      "inputs; else standstill or steady. White noise would be correlated over 0 min.</p>\n";
-  return html + "</body></html>\n";
+  html += folded("What the model's error is made of", headroom_picture(diagnosis));
+  html += folded("Error before and after, on rows not used to find anything",
+                 gains_table(diagnosis));
+  html += runs_html(diagnosis, report);
+  html += html_paragraph(
+      "RMS and peak in " +
+          std::string(diagnosis.unit == "um" ? "µm (µrad for tilts)" : diagnosis.unit) +
+          ". Phases: ten minutes after a change of a signal; heating and cooling by the mean of "
+          "the inputs; else standstill or steady. White noise would be correlated over 0 min.",
+      "small");
+  return html + html_end();
 }
 
 }  // namespace thermocomp::diagnosis

@@ -14,7 +14,9 @@ constexpr std::size_t scatters_max = 3;
 constexpr std::size_t signals_max = 4;
 /// More temperatures than this are drawn without their names.
 constexpr std::size_t named_max = 6;
-constexpr double signal_height = 50.0;
+constexpr double output_height = 130.0;
+constexpr double error_height = 90.0;
+constexpr double signal_height = 40.0;
 constexpr const char* measured_colour = "#222";
 constexpr const char* model_colour = "#c53030";
 constexpr const char* extended_colour = "#2b6cb0";
@@ -44,7 +46,7 @@ std::string unit_of(const std::string& column) {
 }
 
 PlotPanel temperatures_panel(const ReportRun& run, const ReportData& report) {
-  PlotPanel panel{"temperatures, rise", "K", {}, 110.0};
+  PlotPanel panel{"temperatures, rise", "K", {}, error_height};
   for (std::size_t i = 0; i < run.inputs_K.size(); ++i)
     panel.lines.push_back(
         {run.inputs_K.size() <= named_max ? name_of_column(report.inputs[i]) : std::string(),
@@ -54,23 +56,28 @@ PlotPanel temperatures_panel(const ReportRun& run, const ReportData& report) {
 
 }  // namespace
 
-std::string course_picture(const ReportRun& run, const ReportData& report, std::size_t output,
-                           const std::string& unit) {
-  const std::string name = name_of_column(report.outputs[output]);
-  const Column model = run.measured_um[output] - run.before_um[output];
-  const Column extended = run.measured_um[output] - run.after_um[output];
+std::string course_picture(const ReportRun& run, const ReportData& report,
+                           const std::vector<std::string>& units) {
+  std::vector<Column> models;
+  models.reserve(2 * report.outputs.size());  // the panels look into them
   std::vector<PlotPanel> panels;
-  panels.push_back({name,
-                    unit,
-                    {{"measured", measured_colour, all_of(run.measured_um[output])},
-                     {"model", model_colour, all_of(model)},
-                     {"extended model", extended_colour, all_of(extended)}},
-                    170.0});
-  panels.push_back({"error of " + name,
-                    unit,
-                    {{"model", model_colour, all_of(run.before_um[output])},
-                     {"extended model", extended_colour, all_of(run.after_um[output])}},
-                    110.0});
+  for (std::size_t output = 0; output < report.outputs.size(); ++output) {
+    const std::string name = name_of_column(report.outputs[output]);
+    const Column& measured = run.measured_um[output];
+    const Column& model = models.emplace_back(measured - run.before_um[output]);
+    const Column& extended = models.emplace_back(measured - run.after_um[output]);
+    panels.push_back({name,
+                      units[output],
+                      {{"measured", measured_colour, all_of(measured)},
+                       {"model", model_colour, all_of(model)},
+                       {"extended model", extended_colour, all_of(extended)}},
+                      output_height});
+    panels.push_back({"error of " + name,
+                      units[output],
+                      {{"model", model_colour, all_of(run.before_um[output])},
+                       {"extended model", extended_colour, all_of(run.after_um[output])}},
+                      error_height});
+  }
   for (std::size_t i = 0; i < std::min(signals_max, run.signals.size()); ++i)
     panels.push_back({name_of_column(report.signals[i]),
                       unit_of(report.signals[i]),

@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <string_view>
 
+#include "config/runs/model_inputs.hpp"
 #include "config/text/units.hpp"
 #include "modelling/diagnosis/answer/findings.hpp"
 #include "modelling/diagnosis/causes/cause.hpp"
@@ -80,6 +81,7 @@ std::string parameter_words(const std::string& cause, const Parameter& parameter
     if (thousand) scale = squared ? 1e6 : 1e3;
   }
   const bool is_duration = unit == "s";
+  if (unit.starts_with("um")) unit.replace(0, 1, "µ");
   std::string text = says;
   bool first = true;
   for (const auto& [output, value] : parameter.values) {
@@ -105,6 +107,17 @@ const CauseTexts* texts_of(const NamedFinding& finding) {
   if (cause->texts_without_unit && unit_of(finding.subject).suffix.empty())
     return &*cause->texts_without_unit;
   return &cause->texts;
+}
+
+/// How the effects of two subjects are told apart: one moves, the other does not.
+std::string one_alone(const std::string& one, const std::string& other) {
+  const bool can_warm = is_temperature(one) && !is_called_like_a_room(one);
+  const std::string& warmed = can_warm ? one : other;
+  const std::string& stays = can_warm ? other : one;
+  if (!is_temperature(warmed) || is_called_like_a_room(warmed))
+    return "Let " + one + " change for an hour while " + other + " stays, then the other way round.";
+  return "Warm the place of " + warmed + " alone (a heating pad for half an hour) while " + stays +
+         " stays, and read both.";
 }
 
 /// The experiment that the first of them (causes/cause.hpp) asks for.
@@ -162,8 +175,9 @@ std::string what_to_do(const NamedFinding& finding) {
 
 std::string experiment_between(const Alternative& one, const Alternative& other) {
   const Experiment experiment = experiment_of(one.cause, other.cause);
-  if (one.cause == other.cause && experiment != Experiment::of_a_network)
-    return "Warm one of the two places alone (a heating pad for half an hour) and read both.";
+  if (one.cause == other.cause && one.subject != other.subject &&
+      experiment != Experiment::of_a_network)
+    return one_alone(one.subject, other.subject);
   switch (experiment) {
     case Experiment::of_a_network:
       return "Warm up at one speed until nothing changes, then stop and record until nothing "

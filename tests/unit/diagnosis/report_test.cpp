@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -166,20 +167,20 @@ TEST_CASE("a parameter is told in words with its unit, an interval only where it
           "[diagnosis][report]") {
   const Parameter heat{"gain_um_per_unit", {{"z_um", 0.0039628}}, {{"z_um", {0.00396, 0.00397}}}};
   CHECK(parameter_words("missing_heat_source", heat, "spindle_rpm") ==
-        "effect 4.0 um/(1000 rpm) in z");
+        "effect 4.0 µm/(1000 rpm) in z");
   CHECK(parameter_words("missing_heat_source", heat, "x_mm_per_min") ==
-        "effect 0.0040 um/(mm/min) in z");
+        "effect 0.0040 µm/(mm/min) in z");
   const Parameter growth{"gain_um_per_unit2", {{"z_um", 2.5}}, {}};
-  CHECK(parameter_words("speed_growth", growth, "x_mm_per_min") == "effect 2.5 um/(mm/min)^2 in z");
+  CHECK(parameter_words("speed_growth", growth, "x_mm_per_min") == "effect 2.5 µm/(mm/min)^2 in z");
   CHECK(parameter_words("speed_growth", growth, "cos_elevation") ==
-        "effect 2.5 um/cos_elevation^2 in z");
+        "effect 2.5 µm/cos_elevation^2 in z");
   const Parameter lag{"tau_s", {{"", 3162.6}}, {{"", {2800.0, 3500.0}}}};
   CHECK(parameter_words("thermal_lag", lag, "t1_degC") ==
         "time constant 53 min (47 min to 58 min)");
   CHECK(parameter_words("missing_heat_source", {"power", {{"", 2.0}}, {}}, "x") ==
         "with the square of the signal");
   CHECK(parameter_words("displacement_step", {"step_um", {{"", -2.5}}, {}}, "z_um") ==
-        "jump -2.5 um");
+        "jump -2.5 µm");
   CHECK(parameter_words("displacement_step", {"news", {{"", 3.0}}, {}}, "z_um") == "news 3.0");
   CHECK(parameter_words("sensor_loose", {"gain", {{"", 0.5}}, {}}, "t1_degC") ==
         "of its motion left: 0.50");
@@ -201,8 +202,8 @@ TEST_CASE("what to do stands first, the largest gain on top", "[diagnosis][repor
   diagnosis.remainder->test["z_um"] = {12.0, 2.0, 0.83, {0.7, 0.9}};
   diagnosis.remainder->term.bank.gain_um_per_unit["z_um"] = {};
   const std::string html = report_html(diagnosis, one_run());
-  const std::size_t bank = html.find("What can be predicted and has no name (up to 10.0 um");
-  const std::size_t heat = html.find("(up to 4.3 um RMS less). Use the extended model");
+  const std::size_t bank = html.find("What can be predicted and has no name (up to 10.0 µm");
+  const std::size_t heat = html.find("(up to 4.3 µm RMS less). Use the extended model");
   REQUIRE(bank != std::string::npos);
   REQUIRE(heat != std::string::npos);
   CHECK(bank < heat);
@@ -211,6 +212,91 @@ TEST_CASE("what to do stands first, the largest gain on top", "[diagnosis][repor
   const std::string without = report_html(diagnosis, one_run());
   CHECK(without.find("The extended model carries it by readings") == std::string::npos);
   CHECK(without.find("the extended model goes without it") != std::string::npos);
+}
+
+TEST_CASE("what is left is told beside what moved, and folded but for the first test run",
+          "[diagnosis][report]") {
+  ReportData data = one_run();
+  data.runs.push_back(data.runs.front());
+  data.runs.back().name = "second.csv";
+  const std::string html = report_html(with_findings(), data);
+  // 20 sin(0.02 i), i < 120: RMS 15.6
+  CHECK(has(html, "z: 5.1 of 15.6 µm (RMS) is left on the test rows (33 %)"));
+  CHECK(html.find("<h2>" + xml_text(rude)) != std::string::npos);
+  CHECK(has(html, "<details><summary>second.csv (test: nothing was fitted to these rows)"));
+  CHECK(count(html, "<details") == count(html, "</details>"));
+  CHECK_FALSE(has(html, " um"));
+}
+
+TEST_CASE("a test run that the model was fitted to is not called unseen", "[diagnosis][report]") {
+  ReportData data = one_run();
+  data.runs.front().of_the_model = true;
+  const std::string html = report_html(none(), data);
+  CHECK_FALSE(has(html, "nothing was fitted to these rows"));
+  CHECK(has(html, "The model was fitted to " + xml_text(rude)));
+  MeasuredData measured;
+  measured.model.outputs = {"z_um"};
+  measured.model.made_from = MadeFrom{};
+  measured.model.made_from->runs = {"days/friday.csv@0:3600"};
+  for (const char* name : {"friday.csv", "monday.csv"}) {
+    MeasuredRun run;
+    run.name = name;
+    run.time_s = Column::LinSpaced(rows, 0.0, 60.0 * (rows - 1));
+    run.measured_um = {wave(20.0, 0.02)};
+    measured.runs.push_back(run);
+  }
+  const std::vector<Residuals> left{{{wave(1.0, 0.1), wave(1.0, 0.1)}}};
+  ReportData read;
+  add_runs(read, none(), measured, left, left, true);
+  CHECK(read.runs[0].of_the_model);
+  CHECK_FALSE(read.runs[1].of_the_model);
+}
+
+TEST_CASE("nothing is to be done where nothing is worth saying", "[diagnosis][report]") {
+  Diagnosis diagnosis = none();
+  diagnosis.outputs["z_um"].headroom = Headroom{0.1, 0.0, 0.0, 0.9};
+  CHECK_FALSE(has(report_html(diagnosis, one_run()), "What to do"));
+  diagnosis.verdict = "unexplained";
+  const std::string html = report_html(diagnosis, one_run());
+  CHECK(has(html, "What to do"));
+  CHECK_FALSE(has(html, "Nothing worth saying"));
+}
+
+TEST_CASE("what is all but ruled out is not listed as what it may be", "[diagnosis][report]") {
+  Diagnosis diagnosis = none();
+  diagnosis.weighed = {{"speed_growth", "spindle_rpm", {}, 0.3, 0.1},
+                       {"thermal_lag", "t1_degC", {}, 0.04, 0.1}};
+  const std::string html = report_html(diagnosis, one_run());
+  CHECK(has(html, "Growth with speed"));
+  CHECK_FALSE(has(html, "t1_degC"));
+  diagnosis.weighed.erase(diagnosis.weighed.begin());
+  CHECK_FALSE(has(report_html(diagnosis, one_run()), "What it may be"));
+}
+
+TEST_CASE("the experiment that parts two places names them and warms no room",
+          "[diagnosis][report]") {
+  const auto between = [](const char* one, const char* other) {
+    return experiment_between({"missing_temperature", one, 1.0},
+                              {"missing_temperature", other, 0.5});
+  };
+  CHECK(between("bed_degC", "ram_degC").starts_with("Warm the place of bed_degC alone"));
+  CHECK(has(between("bed_degC", "ram_degC"), "while ram_degC stays"));
+  CHECK(between("room_degC", "bed_degC").starts_with("Warm the place of bed_degC alone"));
+  CHECK_FALSE(has(between("spindle_rpm", "x_mm_per_min"), "heating pad"));
+}
+
+TEST_CASE("a constant is drawn flat, whatever its rounding", "[diagnosis][report]") {
+  const std::vector<double> time_s{0.0, 3600.0, 7200.0};
+  const std::vector<double> constant{-150.0, -150.00000000000003, -150.0};
+  const std::string svg = panels_plot(time_s, {{"z", "mm", {{"", "red", constant}}}});
+  const std::size_t at = svg.find(" d=\"M", svg.find("stroke=\"red"));
+  std::vector<std::string> heights;
+  std::istringstream path(svg.substr(at + 5, svg.find('"', at + 5) - at - 5));
+  for (std::string x, y; std::getline(path, x, ' ') && std::getline(path, y, 'L');)
+    heights.push_back(y);
+  REQUIRE(heights.size() == 3);
+  CHECK(heights[0] == heights[1]);
+  CHECK(heights[1] == heights[2]);
 }
 
 TEST_CASE("only what has the unit of a speed is called one", "[diagnosis][report]") {
