@@ -72,6 +72,7 @@ std::string script_element(const std::string& text) {
 
 std::string body_page(const BodyPicture& picture) {
   json data = {{"title", picture.title},
+               {"note", picture.note},
                {"nodes_mm", numbers(picture.nodes_mm)},
                {"triangles", picture.triangles},
                {"states", json::array()},

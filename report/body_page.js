@@ -183,8 +183,10 @@ function measureGroup() {
   if (range[0] === range[1]) range[1] = range[0] + 1;
   factor = largest > 0 ? shownOfSize * size_mm / (1e-3 * largest) : 0;
   factor = factor > 0 ? Number(factor.toPrecision(1)) : 0;
-  place('low').textContent = range[0].toPrecision(3) + ' ' + quantity.unit;
-  place('high').textContent = range[1].toPrecision(3) + ' ' + quantity.unit;
+  // What is nothing beside the range is rounding.
+  const text = value => Math.abs(value) < 1e-3 * (range[1] - range[0]) ? '0' : value.toPrecision(3);
+  place('low').textContent = text(range[0]) + ' ' + quantity.unit;
+  place('high').textContent = text(range[1]) + ' ' + quantity.unit;
   place('factor').textContent = factor > 0 ? 'displacement drawn \u00d7 ' + factor.toLocaleString('en') : 'nothing moves';
 }
 
@@ -233,10 +235,11 @@ function choose() {
   quantity = quantities[place('quantity').value];
   clearTimeout(liveTimer);
   if (place('group').value === '') return followMachine();
+  const before = shown;
   shown = groups.get(place('group').value);
   const time = place('time');
   time.max = shown.length - 1;
-  time.value = Math.min(time.value, time.max);
+  if (shown !== before) time.value = time.max;  // the end: there it is warmest
   place('times').hidden = shown.length < 2;
   measureGroup();
   drawChosen();
@@ -290,6 +293,7 @@ function play() {
 // ------------------------------------------------------------------ start
 
 place('title').textContent = document.title = body.title;
+place('note').textContent = body.note;
 if (location.protocol.startsWith('http') && oneWarm.length) place('group').append(new Option('the machine now', ''));
 for (const name of groups.keys()) place('group').append(new Option(name, name));
 for (const [key, each] of Object.entries(quantities)) place('quantity').append(new Option(each.name, key));

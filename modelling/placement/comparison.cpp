@@ -14,6 +14,9 @@ namespace thermocomp::placement {
 
 namespace {
 
+/// The field rebuilt from the modes.
+constexpr const char* rebuilt_field = "qr_reconstruction";
+
 using Estimator = std::function<std::vector<Numbers>(const std::vector<Field>&)>;
 
 MethodResult judge(const PlacementProblem& problem, std::string name, std::vector<Index> sensors,
@@ -122,7 +125,7 @@ Comparison compare_placements(const PlacementProblem& problem, const TendencyOpt
   comparison.methods.push_back(judge_sensors(problem, "qr_pivoting", place_by_qr(problem)));
   const Reconstruction rebuilt = reconstruct_by_qr(problem);
   comparison.methods.push_back(judge(
-      problem, "qr_reconstruction", {},
+      problem, rebuilt_field, {},
       [&](const std::vector<Field>& fields) { return estimates_um(problem, fields, rebuilt); }));
   progress("sensors at random");
   comparison.methods.push_back(random_median(problem));
@@ -179,6 +182,11 @@ std::string sensors_text(const PlacementProblem& problem, const MethodResult& re
   return text;
 }
 
+/// Over the load cases that were left out, else over those used.
+ErrorFigures figures(const PlacementProblem& problem, const MethodResult& result) {
+  return problem.left_out.empty() ? result.used : result.left_out;
+}
+
 Json figures_json(const ErrorFigures& figures) {
   return {{"rms_um", figures.rms_um}, {"peak_um", figures.peak_um}};
 }
@@ -223,20 +231,22 @@ Json run_json(const PlacementProblem& problem, const Field& field, const Tendenc
 
 }  // namespace
 
+std::string remaining_text(const PlacementProblem& problem, const Comparison& comparison) {
+  const ErrorFigures left = figures(problem, comparison.best(problem));
+  return line("They leave %.2f um RMS (%.2f um at most) of %.2f um, over the load cases that",
+              left.rms_um, left.peak_um, figures(problem, comparison.uncompensated).rms_um) +
+         (problem.left_out.empty() ? " they were chosen for." : " took no part in the choice.");
+}
+
 std::string recommendation_text(const PlacementProblem& problem, const Comparison& comparison) {
   const MethodResult& best = comparison.best(problem);
-  const bool left_out = !problem.left_out.empty();
-  const auto figures = [&](const MethodResult& result) {
-    return left_out ? result.left_out : result.used;
-  };
-  std::string text = sensors_text(problem, best);
-  text +=
-      line("They leave %.2f um RMS (%.2f um at most) of %.2f um, over the load cases that",
-           figures(best).rms_um, figures(best).peak_um, figures(comparison.uncompensated).rms_um);
-  text += left_out ? " took no part in the choice.\n" : " they were chosen for.\n";
-  text += "Others:";
-  for (const MethodResult& result : comparison.methods)
-    if (&result != &best) text += line(" %s %.2f um;", result.name.c_str(), figures(result).rms_um);
+  std::string text = sensors_text(problem, best) + remaining_text(problem, comparison);
+  text += "\nOthers:";
+  for (const MethodResult& result : comparison.methods) {
+    if (&result == &best) continue;
+    text += line(" %s %.2f um", result.name.c_str(), figures(problem, result).rms_um);
+    text += result.name == rebuilt_field ? " (not the daemon's model);" : ";";
+  }
   text.back() = '.';
   return text + "\n`thermocomp place --all` tells how each went.\n";
 }

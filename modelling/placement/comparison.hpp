@@ -38,6 +38,9 @@ inline constexpr int random_draws = 100;
                                             const TendencyOptions& options,
                                             const structure::Progress& progress);
 
+/// "They leave 2.35 um RMS ...": of the best sensors.
+[[nodiscard]] std::string remaining_text(const PlacementProblem& problem,
+                                         const Comparison& comparison);
 /// For a person: the best sensors, and what they leave.
 [[nodiscard]] std::string recommendation_text(const PlacementProblem& problem,
                                               const Comparison& comparison);

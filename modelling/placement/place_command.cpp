@@ -27,8 +27,11 @@ struct Options {
 /// Every field of the load cases with its displacement, and the sensors that are recommended.
 void write_pictures(const Options& options, const structure::StructureSpec& spec,
                     const structure::Structure& structure, const structure::Statics& statics,
-                    const PlacementProblem& problem, const MethodResult& best) {
+                    const PlacementProblem& problem, const Comparison& comparison) {
+  const MethodResult& best = comparison.best(problem);
   structure::SurfacePicture picture(spec, structure);
+  picture.set_title("Places of the sensors, " + spec.file.stem().string(),
+                    remaining_text(problem, comparison));
   picture.leave_out_sensors();
   for (std::size_t b = 0; b < best.sensors.size(); ++b)
     picture.add_sensor(problem.blocks[b].name, problem.nodes_m[best.sensors[b]]);
@@ -63,7 +66,7 @@ int run(const Options& options) {
   const PlacementProblem problem = make_problem(spec, structure, statics, std::move(fields));
   const Comparison comparison = compare_placements(problem, options.tendency, progress);
   if (!options.page.empty() || !options.vtu.empty())
-    write_pictures(options, spec, structure, statics, problem, comparison.best(problem));
+    write_pictures(options, spec, structure, statics, problem, comparison);
   cli::write_file("-", options.json  ? comparison_json(problem, comparison)
                        : options.all ? comparison_text(problem, comparison)
                                      : recommendation_text(problem, comparison));
@@ -87,7 +90,7 @@ void add_place_command(CLI::App& app, std::function<int()>& action) {
       {"mean", Start::mean}, {"median", Start::median}, {"centroid", Start::centroid}};
   sub->add_option("--start", options->tendency.start,
                   "with which block temperatures the patterns begin: mean, median or centroid")
-      ->transform(CLI::CheckedTransformer(starts));
+      ->transform(CLI::CheckedTransformer(starts).description("mean|median|centroid"));
   sub->add_option("--threshold-um", options->tendency.threshold_um,
                   "RMS error at which the patterns end")
       ->check(CLI::Range(0.0, 1e6));

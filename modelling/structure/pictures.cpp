@@ -305,6 +305,11 @@ void SurfacePicture::leave_out_sensors() {
   std::erase_if(picture_.points, [](const BodyPoint& point) { return point.is_sensor; });
 }
 
+void SurfacePicture::set_title(const std::string& title, const std::string& note) {
+  picture_.title = title;
+  picture_.note = note;
+}
+
 /// Outputs that are taken at one point are one point.
 void SurfacePicture::add_point(const std::string& name, bool is_sensor, const Vec3& at_m) {
   const BodyPoint point{name, is_sensor, {1e3 * at_m[0], 1e3 * at_m[1], 1e3 * at_m[2]}};

@@ -45,6 +45,8 @@ class SurfacePicture {
                  std::span<const double> displacement_m);
   void add_sensor(const std::string& name, const Vec3& at_m);
   void leave_out_sensors();
+  /// In place of the structure's name.
+  void set_title(const std::string& title, const std::string& note);
   [[nodiscard]] std::string page() const { return body_page(picture_); }
 
  private:

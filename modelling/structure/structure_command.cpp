@@ -26,6 +26,18 @@ namespace thermocomp::structure {
 
 namespace {
 
+/// printf into a string.
+template <class... Values>
+std::string line(const char* format, Values... values) {
+  char text[256];
+  // The formats are literals of this file.
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wformat-nonliteral"
+  std::snprintf(text, sizeof text, format, values...);
+#pragma GCC diagnostic pop
+  return text;
+}
+
 struct Options {
   std::string structure;
   std::string model;
@@ -34,6 +46,7 @@ struct Options {
   std::string page;
   std::string plant;
   bool plant_parts{false};
+  bool all{false};
   SolverChoice solver;
 };
 
@@ -112,9 +125,10 @@ int run(const Options& options) {
   }
   cli::write_file(options.model, write_model(model));
   progress.say("done");
-  const std::string report = structure_report(structure, statics, model);
-  std::fprintf(options.model == "-" ? stderr : stdout, "%speak memory %.0f MB\n", report.c_str(),
-               peak_memory_MB());
+  std::string report = structure_report(structure, statics, model, options.all);
+  if (options.all) report += line("peak memory %.0f MB\n", peak_memory_MB());
+  if (options.model != "-") report.append(options.model).append(": written\n");
+  std::fputs(report.c_str(), options.model == "-" ? stderr : stdout);
   return 0;
 }
 
@@ -137,11 +151,13 @@ void add_structure_command(CLI::App& app, std::function<int()>& action) {
       "the machine's body for thermocomp-sim: a reduced model of heat and displacement");
   sub->add_flag("--plant-parts", options->plant_parts,
                 "into the same file: each film, joint and part, for thermocomp diagnose --thermal");
+  sub->add_flag("--all", options->all,
+                "print the rows along the guideways, nodes, singular values and memory too");
   const std::map<std::string, Backend> backends{{"cholmod", Backend::cholmod},
                                                 {"petsc", Backend::petsc}};
   sub->add_option("--solver", options->solver.backend,
                   "cholmod (default): one factorisation; petsc: for meshes past this memory")
-      ->transform(CLI::CheckedTransformer(backends));
+      ->transform(CLI::CheckedTransformer(backends).description("cholmod|petsc"));
   sub->add_option("--ranks", options->solver.ranks, "MPI ranks of petsc")
       ->check(CLI::Range(1, 256))
       ->default_str("2");
@@ -152,36 +168,29 @@ namespace {
 
 using Rows = std::vector<std::vector<double>>;
 
-/// printf into a string.
-template <class... Values>
-std::string line(const char* format, Values... values) {
-  char text[256];
-  // The formats are literals of this file.
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wformat-nonliteral"
-  std::snprintf(text, sizeof text, format, values...);
-#pragma GCC diagnostic pop
-  return text;
+/// A coefficient; what rounding leaves of 0 is 0.
+std::string coefficient(double value) {
+  constexpr double rounding = 1e-6;
+  return std::fabs(value) < rounding ? "0" : line("%.4g", value);
 }
 
-std::string row_text(const std::string& title, const std::string& output,
-                     const std::vector<double>& row, const ThermalModel& model) {
-  const double sum = std::accumulate(row.begin(), row.end(), 0.0);
-  double magnitude = 0.0;
-  for (const double value : row) magnitude += std::fabs(value);
-  const std::string unit(unit_of(output).symbol);
-  std::string text = title;
-  text.append(line(": %.4g %s/K when all is warmer by the same\n", sum, unit.c_str()));
-  for (std::size_t i = 0; i < row.size(); ++i) {
-    const double share = magnitude > 0.0 ? 100.0 * std::fabs(row[i]) / magnitude : 0.0;
-    text.append("  ").append(model.inputs[i]);
-    text.append(line(" %.5g %s/K (%.1f %%)\n", row[i], unit.c_str(), share));
+/// Blocks down, rows of the matrix across.
+std::string table_text(const std::vector<std::string>& inputs,
+                       const std::vector<std::string>& names, const Rows& rows) {
+  std::string text = line("%-24s", "per K");
+  for (const std::string& name : names) text += line(" %12s", name.c_str());
+  for (std::size_t i = 0; i < inputs.size(); ++i) {
+    text += line("\n%-24s", inputs[i].c_str());
+    for (const std::vector<double>& row : rows) text += line(" %12s", coefficient(row[i]).c_str());
   }
-  return text;
+  text += line("\n%-24s", "all alike");
+  for (const std::vector<double>& row : rows)
+    text += line(" %12s", coefficient(std::accumulate(row.begin(), row.end(), 0.0)).c_str());
+  return text + "\n";
 }
 
 /// Greatest over least singular value, and how many count.
-std::string conditioning(const Rows& rows) {
+std::string conditioning(const Rows& rows, bool all) {
   Eigen::MatrixXd matrix(static_cast<Eigen::Index>(rows.size()),
                          static_cast<Eigen::Index>(rows.front().size()));
   for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
@@ -190,39 +199,41 @@ std::string conditioning(const Rows& rows) {
     }
   }
   const Eigen::VectorXd singular = Eigen::JacobiSVD<Eigen::MatrixXd>(matrix).singularValues();
-  std::string text = "singular values of all rows:";
-  for (const double value : singular) text.append(line(" %.3g", value));
-  return text.append(line("\ncondition number: %.3g\n",
+  std::string text = all ? "singular values of all rows:" : "";
+  for (Eigen::Index i = 0; i < singular.size() && all; ++i)
+    text.append(line(" %.3g", singular[i]));
+  if (all) text += "\n";
+  return text.append(line("condition number of all rows: %.3g\n",
                           singular[0] / std::max(singular[singular.size() - 1], 1e-300)));
 }
 
 }  // namespace
 
 std::string structure_report(const Structure& structure, const Statics& statics,
-                             const ThermalModel& model) {
+                             const ThermalModel& model, bool all) {
   std::string text = line("%zu nodes, %zu elements, %u unknowns; ", structure.mesh.nodes_m.size(),
                           structure.mesh.elements.size(), structure.reduction.free_size());
   text += statics.solver().report();
   std::vector<std::size_t> nodes(structure.block_names.size(), 0);
   for (const Index block : structure.block_of_node) ++nodes[block];
-  for (std::size_t i = 0; i < nodes.size(); ++i) {
+  for (std::size_t i = 0; i < nodes.size() && all; ++i) {
     text.append("block ").append(structure.block_names[i]).append(line(": %zu nodes\n", nodes[i]));
   }
-  Rows all = model.matrix_um_per_K;
-  for (std::size_t i = 0; i < model.outputs.size(); ++i) {
-    text += row_text(model.outputs[i], model.outputs[i], model.matrix_um_per_K[i], model);
-  }
+  text += table_text(model.inputs, model.outputs, model.matrix_um_per_K);
+  Rows every = model.matrix_um_per_K;
   for (const GuidewaySpec& guideway : model.guideways) {
+    std::vector<std::string> positions;
+    for (const double position_mm : guideway.positions_mm)
+      positions.push_back(line("at %g mm", position_mm));
     for (const auto& [output, rows] : guideway.rows_um_per_K) {
-      for (std::size_t i = 0; i < rows.size(); ++i) {
-        std::string name = output + " on guideway " + guideway.name;
-        name.append(line(" at %g mm", guideway.positions_mm[i]));
-        text += row_text(name, output, rows[i], model);
-        all.push_back(rows[i]);
-      }
+      every.insert(every.end(), rows.begin(), rows.end());
+      if (!all) continue;
+      text.append(output).append(" on guideway ").append(guideway.name).append("\n");
+      text += table_text(model.inputs, positions, rows);
     }
   }
-  return text + conditioning(all);
+  if (!all && !model.guideways.empty()) text += "the rows along the guideways: --all\n";
+  return text + conditioning(every, all);
 }
 
 }  // namespace thermocomp::structure

@@ -41,8 +41,9 @@ struct Structure {
     const StructureSpec& spec, const Structure& structure,
     const std::vector<std::vector<double>>& sensitivities_m_per_K);
 
-/// What a person wants to know of the result: size, conditioning, what each block contributes.
+/// What a person wants to know of the result: size, what each block contributes, conditioning.
+/// @param all  rows along the guideways, nodes of each block and singular values too
 [[nodiscard]] std::string structure_report(const Structure& structure, const Statics& statics,
-                                           const ThermalModel& model);
+                                           const ThermalModel& model, bool all = false);
 
 }  // namespace thermocomp::structure
