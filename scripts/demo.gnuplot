@@ -41,7 +41,22 @@ x_colour = "#1f6fb4"
 y_colour = "#d95f02"
 z_colour = "#1b9e77"
 
+# One scale for what is left without and with compensation.
+low = 0
+high = 0
+set xrange [*:*]
+do for [axis in "x y z"] {
+  stats truth using (column(axis."_error_um")):(column(axis."_error_um")-column(axis."_offset_um")) nooutput
+  low = STATS_min_x < low ? STATS_min_x : low
+  low = STATS_min_y < low ? STATS_min_y : low
+  high = STATS_max_x > high ? STATS_max_x : high
+  high = STATS_max_y > high ? STATS_max_y : high
+}
+
+set xrange [0:hours]
+
 set multiplot layout 4,1
+set yrange [low:high]
 set ylabel "displacement, um"
 set title "Tool against work since the start of the shift, without compensation" offset 0,1
 plot truth using (column("time_s")/3600):(column("x_error_um")-column("x_offset_um")) \
@@ -66,7 +81,9 @@ set yrange [*:*]
 set title "Temperatures"
 set ylabel "degC"
 set xlabel "hours of the shift"
-plot for [place in "bed_front bed_rear table saddle column_left column_right head spindle_front spindle_rear"] \
-  truth using (column("time_s")/3600):place."_degC" with lines lw 1.5 \
-  title system("echo ".place." | tr _ ' '")
+places = "bed_front bed_rear table saddle column_left column_right head spindle_front spindle_rear"
+colours = "#1f6fb4 #6baed6 #1b9e77 #a6761d #e7298a #f5a6c8 #555555 #d95f02 #7b3fa0"
+plot for [i = 1:words(places)] \
+  truth using (column("time_s")/3600):word(places, i)."_degC" with lines lw 1.5 lc rgb word(colours, i) \
+  title system("echo ".word(places, i)." | tr _ ' '")
 unset multiplot

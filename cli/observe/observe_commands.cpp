@@ -104,12 +104,12 @@ void end_watch(int) {
 }
 
 void show(const Status& status, const TruthRow* truth, const AxisTrends& trends, bool terminal,
-          bool first) {
+          bool with_header) {
   if (terminal) {
     std::cout << terminal_code("[H") << terminal_code("[J")
               << watch_screen(status, truth, true, &trends);
   } else {
-    if (first) std::cout << watch_header(status, truth);
+    if (with_header) std::cout << watch_header(status, truth);
     std::cout << watch_line(status, truth);
   }
   std::cout.flush();
@@ -131,7 +131,9 @@ void watch_until_end(const GlobalOptions& global, const WatchOptions& options) {
   if (!options.truth.empty()) truth.emplace(options.truth);
   const auto patience =
       std::chrono::milliseconds(static_cast<std::int64_t>(1000.0 * options.period_s) + 5000);
-  for (bool first = true; !over();) {
+  bool first = true;
+  bool has_truth = false;  // the file may be written later than the first status
+  while (!over()) {
     json notification;
     try {
       notification = client.next(options.for_s > 0.0 ? std::min(patience, remaining()) : patience);
@@ -143,8 +145,9 @@ void watch_until_end(const GlobalOptions& global, const WatchOptions& options) {
     const TruthRow* row = truth ? truth->newest() : nullptr;
     const auto status = part_from<Status>(notification.value("params", json::object()));
     trends.add(status);
-    show(status, row, trends, terminal, first);
+    show(status, row, trends, terminal, first || has_truth != (row != nullptr));
     first = false;
+    has_truth = row != nullptr;
   }
 }
 

@@ -157,6 +157,7 @@ void TruthFile::take_line(const std::string& line) {
 namespace {
 
 constexpr int column_width = 9;
+constexpr double begun_s = 5.0;
 
 std::string reasons_text(const Status& status) {
   std::string result;
@@ -307,7 +308,9 @@ std::string watch_line(const Status& status, const TruthRow* truth) {
     }
     result += " |" + without + " |" + with;
   }
-  const std::string reasons = reasons_text(status);
+  // What is missing in the first seconds is on its way.
+  const bool just_begun = status.mode == Mode::starting && status.uptime_s < begun_s;
+  const std::string reasons = just_begun ? "" : reasons_text(status);
   return result + (reasons.empty() ? "" : "  " + reasons) + '\n';
 }
 

@@ -187,7 +187,7 @@ TEST_CASE("a silent module is one problem, and names what is lost with it", "[cl
       .sensors = {{.name = "head", .blocks = {"head"}, .fault = Fault::open_circuit}}};
   list = troubles(status, &answer);
   REQUIRE(list.size() == 2);
-  CHECK(list[1].what == "sensor head: thermocouple broken");
+  CHECK(list[1].what == "sensor head: sensor wire broken");
   status.sensors_bad = {"head"};                 // those of the module are good still
   CHECK(troubles(status, &answer).size() == 2);  // a lost input that nothing explains, and head
   CHECK_THAT(troubles(status, &answer)[0].what, !Contains("silent"));
@@ -334,6 +334,18 @@ TEST_CASE("a watch line shows temperatures, offsets and the simulated truth", "[
   const std::string line = watch_line(good_status(), &truth);
   CHECK_THAT(line,
              Contains("22.50") && Contains("+3.10") && Contains("-6.50") && Contains("-0.50"));
+}
+
+TEST_CASE("in its first seconds a watch line says 'starting' and no more", "[cli][watch]") {
+  Status status = good_status();
+  status.mode = Mode::starting;
+  status.reasons =
+      static_cast<std::uint32_t>(Reason::block_lost) | static_cast<std::uint32_t>(Reason::no_reference);
+  status.uptime_s = 0.4;
+  const std::string begun = watch_line(status, nullptr);
+  CHECK_THAT(begun, Contains("starting"));
+  status.uptime_s = 60.0;
+  CHECK(watch_line(status, nullptr).size() > begun.size() + 10);
 }
 
 TEST_CASE("durations are for people", "[cli]") {
