@@ -21,7 +21,7 @@ void ask_for_buses(InitDraft& draft, Questions& questions) {
     const bool is_first = draft.buses.empty();
     std::string answer;
     questions.ask_until(
-        is_first ? std::string("Bus of the thermocouple modules: ") + link_forms
+        is_first ? std::string("Bus of the sensors' modules: ") + link_forms
                  : "Another bus? Enter: no more",
         is_first ? "rtu:/dev/ttyUSB0:19200:even" : "", [&](const std::string& text) {
           answer = text;
@@ -271,7 +271,7 @@ void ask_for_rest(InitDraft& draft, bool has_controller, Questions& questions,
   if (!has_controller) ask_for_controller(draft, questions);
   if (draft.axes.empty())
     questions.ask_until("Axes that get an offset", "z",
-                        [&](const std::string& text) { draft.axes = parse_words(text); });
+                        [&](const std::string& text) { draft.axes = parse_axes(text); });
 }
 
 }  // namespace thermocomp::cli

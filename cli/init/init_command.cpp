@@ -98,7 +98,7 @@ InitDraft draft_of(const InitOptions& options, const fs::path& folder) {
   for (const std::string& text : options.signals)
     draft.controller.signals.push_back(parse_signal(text));
   draft.controller.dry_run = options.dry_run;
-  draft.axes = parse_words(options.axes);
+  draft.axes = parse_axes(options.axes);
   take_model(draft, options, folder);
   // The machine's own daemon has its files where the package puts them.
   if (!folder.string().starts_with("/etc/")) draft.own_folder = folder.string();
@@ -193,7 +193,7 @@ void tell_next(const InitDraft& draft, const std::string& file) {
             << "  thermocomp check " << file << "\n"
             << "  " << (is_own ? "thermocompd " + file : "systemctl start thermocompd") << "\n"
             << "  " << tool
-            << " sensors     # warm each thermocouple by hand: its line must move\n";
+            << " sensors     # warm each sensor by hand: its line must move\n";
   const bool is_dry = draft.controller.dry_run && draft.controller.kind != "dry_run";
   const std::string_view model =
       draft.model_inputs.empty()

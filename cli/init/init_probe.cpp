@@ -147,9 +147,18 @@ std::vector<std::string> preset_lines(const fs::path& folder, const std::string&
         lines[name] = preset_line(entry.path());
     }
   }
+  // The makers' words for the same sensors.
+  const std::vector<std::string> platinum{"pt100", "pt1000", "rtd"};
+  std::vector<std::string> wanted{lower(word)};
+  if (std::find(platinum.begin(), platinum.end(), wanted.front()) != platinum.end())
+    wanted = platinum;
   std::vector<std::string> found;
   for (const auto& [name, line] : lines) {
-    if (!line.empty() && lower(line).find(lower(word)) != std::string::npos) found.push_back(line);
+    const std::string text = lower(line);
+    if (std::any_of(wanted.begin(), wanted.end(), [&](const std::string& each) {
+          return !text.empty() && text.find(each) != std::string::npos;
+        }))
+      found.push_back(line);
   }
   return found;
 }

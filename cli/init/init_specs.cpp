@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <optional>
@@ -112,6 +113,29 @@ void parse_registers(const std::vector<std::string>& parts, const std::string& t
 
 }  // namespace
 
+namespace {
+
+bool is_host(const std::string& text) {
+  return std::all_of(text.begin(), text.end(), [](unsigned char c) {
+    return std::isalnum(c) != 0 || c == '.' || c == '-' || c == '_';
+  });
+}
+
+}  // namespace
+
+std::vector<std::string> parse_axes(const std::string& text) {
+  const std::vector<std::string> axes = parse_words(text);
+  for (const std::string& axis : axes) {
+    const bool is_axis =
+        std::string_view("xyzabcuvw").find(axis.front()) != std::string_view::npos &&
+        axis.find_first_not_of("0123456789", 1) == std::string::npos;
+    if (!is_axis)
+      throw Failure(axis + ": must be an axis of the machine: x, y, z, a, b, c, u, v or w, with a "
+                           "number where there are several (z2)");
+  }
+  return axes;
+}
+
 std::variant<ModbusTcp, ModbusRtu> parse_link(const std::string& text) {
   constexpr std::array<std::string_view, 4> forms{"tcp", "udp", "rtu_over_tcp", "rtu"};
   std::vector<std::string> parts = split(text, ':');
@@ -120,6 +144,8 @@ std::variant<ModbusTcp, ModbusRtu> parse_link(const std::string& text) {
   if (parts.size() < 2 || parts[1].empty())
     throw Failure("\"" + text + "\": must be " + link_forms);
   if (parts[0] != "rtu") {
+    if (!is_host(parts[1]))
+      throw Failure("\"" + parts[1] + "\" is no host: must be letters, digits, ., - and _");
     ModbusTcp tcp{parts[1], 502, parts[0] == "rtu_over_tcp", parts[0] == "udp"};
     if (parts.size() > 2) tcp.port = whole_number(parts[2], 1, 65535, "port of " + text);
     if (parts.size() > 3) throw Failure(text + ": must be " + parts[0] + ":HOST[:PORT]");

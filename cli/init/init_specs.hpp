@@ -23,6 +23,8 @@ inline constexpr const char* link_forms =
 [[nodiscard]] std::vector<int> parse_numbers(const std::string& text);
 /// "x,y, z" -> x y z; blanks separate too.
 [[nodiscard]] std::vector<std::string> parse_words(const std::string& text);
+/// "x,z2" -> x z2. @throws Failure  where one is no letter of an axis with or without a number
+[[nodiscard]] std::vector<std::string> parse_axes(const std::string& text);
 
 /// "3=wago_750_458", "3=wago_750_458:1-4", "2/7=icpdas_m7018" (second bus),
 /// "3=input:int16:0.1:0-7:32767" (no preset: table, encoding, degC a count, addresses and, where it

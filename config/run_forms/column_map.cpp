@@ -31,6 +31,7 @@ ColumnMap parse_column_map(const std::string& text, const std::string& name) {
   const TomlTable root = document.root();
   ColumnMap map;
   map.file = name;
+  static_cast<void>(root.integer("format", 1, 1, 1));
   if (root.has("separator"))
     map.separator = root.choice<char>(
         "separator", {{",", ','}, {";", ';'}, {"|", '|'}, {"tab", '\t'}, {"blank", ' '}});

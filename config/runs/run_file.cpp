@@ -257,6 +257,17 @@ std::optional<std::size_t> RunFile::find(std::string_view column_name) const {
   return static_cast<std::size_t>(found - columns.begin());
 }
 
+namespace {
+
+/// Offsets and what a controller applied are none.
+bool has_displacement(const std::vector<std::string>& columns) {
+  return std::any_of(columns.begin(), columns.end(), [](const std::string& column) {
+    return is_output(column) && !column.ends_with("_offset_um") && !column.ends_with("_applied_um");
+  });
+}
+
+}  // namespace
+
 const std::vector<double>& RunFile::column(std::string_view column_name) const {
   const auto index = find(column_name);
   if (!index) {
@@ -265,6 +276,9 @@ const std::vector<double>& RunFile::column(std::string_view column_name) const {
     const std::string position = std::string(column_name.substr(0, stem)) + "_mm";
     if (is_output(column_name) && find(position))
       rule += "; there is " + position + ", a position, which --columns can make a displacement";
+    else if (is_output(column_name) && !has_displacement(columns))
+      rule = "nothing was measured in this file: `thermocomp measured AXIS UM` reports what an "
+             "indicator shows, a column *_um of your own holds what was measured beside";
     throw ConfigurationError({{this->name, 0, std::string(column_name), "(missing)", rule}});
   }
   return values[*index];
