@@ -232,7 +232,7 @@ TEST_CASE("what happens again and again is one line, without what it explains", 
   snapshot.events = std::make_shared<const std::vector<Event>>(events);
   const json list = page_events(snapshot, 10);
   REQUIRE(list.size() == 2);
-  CHECK(list[0]["text"] == "sensor head: thermocouple broken");
+  CHECK(list[0]["text"] == "sensor head: sensor wire broken");
   CHECK(list[1]["text"] == "device bed_module: not_connected: 3 times, 6 s in all");
   CHECK(list[1]["wall_s"] == 202.0);
 }

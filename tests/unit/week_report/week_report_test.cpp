@@ -187,7 +187,7 @@ TEST_CASE("a bus takes its sensors with it in one line, and a broken one has its
   const std::vector<std::string> lines = advice(week);
   REQUIRE(lines.size() == 3);
   CHECK_THAT(lines[0], Contains("Bus cabinet: no answer, 1 time, 11 min 40 s in all."));
-  CHECK_THAT(lines[1], Contains("Sensor oil: thermocouple broken, 1 time, 1 h 6 min"));
+  CHECK_THAT(lines[1], Contains("Sensor oil: sensor wire broken, 1 time, 1 h 6 min"));
   CHECK_THAT(lines[2], Contains("Sensors oil, bed, column: the unit does not answer, 1 time") ||
                            Contains("Sensors bed, column, oil: the unit does not answer, 1 time"));
 }
