@@ -28,7 +28,7 @@ struct BodyPoint {
 
 struct BodyPicture {
   std::string title;
-  std::string note;  ///< a sentence under the title; empty: none
+  std::string note;              ///< a sentence under the title; empty: none
   std::vector<double> nodes_mm;  ///< shape (3 nodes)
   /// Numbers of nodes, counterclockwise as seen from outside; shape (3 triangles).
   std::vector<std::uint32_t> triangles;

@@ -50,8 +50,7 @@ Range range_of(const std::vector<Values>& columns) {
   if (!(range.low <= range.high)) return {};
   // Rounding of a constant is no course.
   const double size = std::max(std::abs(range.low), std::abs(range.high));
-  if (!(range.high - range.low > rounding_share * size))
-    return {range.low - 1.0, range.high + 1.0};
+  if (!(range.high - range.low > rounding_share * size)) return {range.low - 1.0, range.high + 1.0};
   return range;
 }
 

@@ -192,8 +192,7 @@ void tell_next(const InitDraft& draft, const std::string& file) {
   std::cout << "\nNext:\n"
             << "  thermocomp check " << file << "\n"
             << "  " << (is_own ? "thermocompd " + file : "systemctl start thermocompd") << "\n"
-            << "  " << tool
-            << " sensors     # warm each sensor by hand: its line must move\n";
+            << "  " << tool << " sensors     # warm each sensor by hand: its line must move\n";
   const bool is_dry = draft.controller.dry_run && draft.controller.kind != "dry_run";
   const std::string_view model =
       draft.model_inputs.empty()

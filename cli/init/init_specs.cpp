@@ -130,8 +130,9 @@ std::vector<std::string> parse_axes(const std::string& text) {
         std::string_view("xyzabcuvw").find(axis.front()) != std::string_view::npos &&
         axis.find_first_not_of("0123456789", 1) == std::string::npos;
     if (!is_axis)
-      throw Failure(axis + ": must be an axis of the machine: x, y, z, a, b, c, u, v or w, with a "
-                           "number where there are several (z2)");
+      throw Failure(axis +
+                    ": must be an axis of the machine: x, y, z, a, b, c, u, v or w, with a "
+                    "number where there are several (z2)");
   }
   return axes;
 }

@@ -103,18 +103,6 @@ void end_watch(int) {
   ::_exit(exit_success);
 }
 
-void show(const Status& status, const TruthRow* truth, const AxisTrends& trends, bool terminal,
-          bool with_header) {
-  if (terminal) {
-    std::cout << terminal_code("[H") << terminal_code("[J")
-              << watch_screen(status, truth, true, &trends);
-  } else {
-    if (with_header) std::cout << watch_header(status, truth);
-    std::cout << watch_line(status, truth);
-  }
-  std::cout.flush();
-}
-
 void watch_until_end(const GlobalOptions& global, const WatchOptions& options) {
   const bool terminal = stdout_is_terminal();
   if (terminal) std::signal(SIGINT, end_watch);
@@ -131,8 +119,7 @@ void watch_until_end(const GlobalOptions& global, const WatchOptions& options) {
   if (!options.truth.empty()) truth.emplace(options.truth);
   const auto patience =
       std::chrono::milliseconds(static_cast<std::int64_t>(1000.0 * options.period_s) + 5000);
-  bool first = true;
-  bool has_truth = false;  // the file may be written later than the first status
+  WatchLog log;
   while (!over()) {
     json notification;
     try {
@@ -145,9 +132,12 @@ void watch_until_end(const GlobalOptions& global, const WatchOptions& options) {
     const TruthRow* row = truth ? truth->newest() : nullptr;
     const auto status = part_from<Status>(notification.value("params", json::object()));
     trends.add(status);
-    show(status, row, trends, terminal, first || has_truth != (row != nullptr));
-    first = false;
-    has_truth = row != nullptr;
+    if (terminal)
+      std::cout << terminal_code("[H") << terminal_code("[J")
+                << watch_screen(status, row, true, &trends);
+    else
+      std::cout << log.next(status, row);
+    std::cout.flush();
   }
 }
 

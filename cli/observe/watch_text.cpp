@@ -314,4 +314,11 @@ std::string watch_line(const Status& status, const TruthRow* truth) {
   return result + (reasons.empty() ? "" : "  " + reasons) + '\n';
 }
 
+std::string WatchLog::next(const Status& status, const TruthRow* truth) {
+  const bool has_truth = truth != nullptr;
+  std::string lines = has_truth_ == has_truth ? "" : watch_header(status, truth);
+  has_truth_ = has_truth;
+  return lines + watch_line(status, truth);
+}
+
 }  // namespace thermocomp::cli

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -77,5 +78,14 @@ class TruthFile {
 /// Two lines: what the columns of watch_line() are.
 [[nodiscard]] std::string watch_header(const Status& status, const TruthRow* truth);
 [[nodiscard]] std::string watch_line(const Status& status, const TruthRow* truth);
+
+/// Lines for a log, below a heading that stands again where the truth appears or goes.
+class WatchLog {
+ public:
+  [[nodiscard]] std::string next(const Status& status, const TruthRow* truth);
+
+ private:
+  std::optional<bool> has_truth_;  ///< below the last heading; empty: before the first
+};
 
 }  // namespace thermocomp::cli

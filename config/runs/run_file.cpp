@@ -277,8 +277,9 @@ const std::vector<double>& RunFile::column(std::string_view column_name) const {
     if (is_output(column_name) && find(position))
       rule += "; there is " + position + ", a position, which --columns can make a displacement";
     else if (is_output(column_name) && !has_displacement(columns))
-      rule = "nothing was measured in this file: `thermocomp measured AXIS UM` reports what an "
-             "indicator shows, a column *_um of your own holds what was measured beside";
+      rule =
+          "nothing was measured in this file: `thermocomp measured AXIS UM` reports what an "
+          "indicator shows, a column *_um of your own holds what was measured beside";
     throw ConfigurationError({{this->name, 0, std::string(column_name), "(missing)", rule}});
   }
   return values[*index];

@@ -89,13 +89,15 @@ void check_signals(const TomlTable& root, const EstimatorConfig& config, const T
     std::string rule = model_file;
     rule += " needs this signal";
     if (has_controller)
-      rule.append(" from the controller: add a [[controller.signal]], or fit without it: fit "
-                  "--columns FILE with ignore = [\"")
+      rule.append(
+              " from the controller: add a [[controller.signal]], or fit without it: fit "
+              "--columns FILE with ignore = [\"")
           .append(signal)
           .append("\"]");
     else
-      rule += ", and kind = \"dry_run\" has none: give the controller's own kind and dry_run = "
-              "true, or until there is one a model that needs no signal";
+      rule +=
+          ", and kind = \"dry_run\" has none: give the controller's own kind and dry_run = "
+          "true, or until there is one a model that needs no signal";
     root.problem("controller.signal", signal, rule);
   }
 }

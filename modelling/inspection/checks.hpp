@@ -18,12 +18,6 @@ struct Suspicion {
 };
 using Suspicions = std::vector<Suspicion>;
 
-/// From how many seconds on a stretch without a value is a gap.
-[[nodiscard]] double gap_s_min(const RunFile& run);
-/// Rows of the first value after each gap of the column, be it that rows or its values are missing.
-[[nodiscard]] std::vector<std::size_t> ends_of_gaps(const RunFile& run,
-                                                    const std::vector<double>& column);
-
 /// Rows, step, gaps; times that jump although nothing on the machine did (`gap`, `clock`).
 [[nodiscard]] RunSampling sampling_of(const RunFile& run);
 void check_clock(const RunFile& run, std::size_t index, const RunSampling& sampling,

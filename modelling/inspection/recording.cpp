@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "config/text/units.hpp"
-#include "modelling/inspection/checks.hpp"
+#include "modelling/inspection/gaps.hpp"
 
 namespace thermocomp::inspection {
 namespace {

@@ -200,8 +200,7 @@ std::string conditioning(const Rows& rows, bool all) {
   }
   const Eigen::VectorXd singular = Eigen::JacobiSVD<Eigen::MatrixXd>(matrix).singularValues();
   std::string text = all ? "singular values of all rows:" : "";
-  for (Eigen::Index i = 0; i < singular.size() && all; ++i)
-    text.append(line(" %.3g", singular[i]));
+  for (Eigen::Index i = 0; i < singular.size() && all; ++i) text.append(line(" %.3g", singular[i]));
   if (all) text += "\n";
   return text.append(line("condition number of all rows: %.3g\n",
                           singular[0] / std::max(singular[singular.size() - 1], 1e-300)));

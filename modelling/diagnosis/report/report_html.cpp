@@ -19,7 +19,8 @@ constexpr double share_told_min = 0.25;
 /// Beside what every page has.
 constexpr const char* own_style =
     "<style>svg .share{fill:#fff}.dots{stroke:#2b6cb0;stroke-width:2}.few{display:flex;"
-    "flex-wrap:wrap}.few svg{width:32%;min-width:240px}summary{cursor:pointer;margin:.4em 0}"
+    "flex-wrap:wrap}.few svg{width:32%;min-width:240px}summary{cursor:pointer;margin:.4em "
+    "0}summary h3{display:inline}"
     ".zoom4:checked~.wide svg{width:400%}.zoom16:checked~.wide svg{width:1600%}</style>\n";
 
 std::string fixed(double value, int digits = 2) {
@@ -186,7 +187,10 @@ std::vector<Advice> next_steps(const Diagnosis& diagnosis) {
 }
 
 std::string verdict_text(const Diagnosis& diagnosis, const std::vector<Advice>& steps) {
-  if (diagnosis.verdict == "effect") return "The model lacks what is named below.";
+  if (diagnosis.verdict == "effect")
+    return std::all_of(diagnosis.findings.begin(), diagnosis.findings.end(), fails_on_test_runs)
+               ? "What is named below holds for the training runs; the test runs speak against it."
+               : "The model lacks what is named below.";
   if (diagnosis.verdict == "unexplained")
     return "The error exceeds noise; no known cause explains it, so none is named.";
   return steps.empty() ? "Nothing worth saying: what is left is noise, or too little to act on."
@@ -213,8 +217,9 @@ std::string probability_text(const NamedFinding& finding) {
 }
 
 std::string finding_html(const NamedFinding& finding, std::size_t number, const std::string& unit) {
-  std::string html = "<h3>" + std::to_string(number) + ". " + xml_text(title_of(finding)) +
-                     "</h3>" + html_paragraph(sentence_of(finding) + probability_text(finding));
+  std::string html = number == 1 ? "<details open>" : "<details>";
+  html += "<summary><h3>" + std::to_string(number) + ". " + xml_text(title_of(finding)) +
+          "</h3></summary>" + html_paragraph(sentence_of(finding) + probability_text(finding));
   Table gains{{"error on the test rows", "before", "after", "less by", "95 % interval"}};
   for (const auto& [output, gain] : finding.test)
     gains.push_back(
@@ -233,7 +238,7 @@ std::string finding_html(const NamedFinding& finding, std::size_t number, const 
                              (finding.family.empty() ? "" : ", family " + finding.family) + ": " +
                              finding.evidence + ".",
                          "small");
-  return html + folded("Gain, and what else it could be", more);
+  return html + folded("Gain, and what else it could be", more) + "</details>\n";
 }
 
 /// What was weighed where nothing is named.
@@ -255,8 +260,9 @@ std::string candidates_html(const Diagnosis& diagnosis) {
   }
   if (rows.size() < 2) return "";
   return html_heading("What it may be") +
-         html_paragraph("Nothing of this is more likely than all else together. The gain on test "
-                        "rows is measured, and decides nothing.") +
+         html_paragraph(
+             "Nothing of this is more likely than all else together. The gain on test "
+             "rows is measured, and decides nothing.") +
          html_table(rows);
 }
 
@@ -277,8 +283,8 @@ std::string phases_table(const ReportRun& run, const ReportData& report) {
           static_cast<double>(std::count(run.phases.begin(), run.phases.end(), phase)) / rows;
       const double squares = all > 0 ? share * before.rms * before.rms / (all * all) : 0.0;
       table.push_back({phase_name(phase), fixed(100 * share, 0) + " %", report.outputs[output],
-                   fixed(before.rms), fixed(before.peak), fixed(100 * squares, 0) + " %",
-                   fixed(figures_of(run.after_um[output], in_phase).rms)});
+                       fixed(before.rms), fixed(before.peak), fixed(100 * squares, 0) + " %",
+                       fixed(figures_of(run.after_um[output], in_phase).rms)});
     }
   }
   return html_table(table);
@@ -378,8 +384,8 @@ std::string report_html(const Diagnosis& diagnosis, const ReportData& report) {
         unit_text(diagnosis, finding.outputs.empty() ? std::string() : finding.outputs.front()));
   html += candidates_html(diagnosis);
   html += folded("What the model's error is made of", headroom_picture(diagnosis));
-  html += folded("Error before and after, on rows not used to find anything",
-                 gains_table(diagnosis));
+  html +=
+      folded("Error before and after, on rows not used to find anything", gains_table(diagnosis));
   html += runs_html(diagnosis, report);
   html += html_paragraph(
       "RMS and peak in " +

@@ -115,7 +115,8 @@ std::string one_alone(const std::string& one, const std::string& other) {
   const std::string& warmed = can_warm ? one : other;
   const std::string& stays = can_warm ? other : one;
   if (!is_temperature(warmed) || is_called_like_a_room(warmed))
-    return "Let " + one + " change for an hour while " + other + " stays, then the other way round.";
+    return "Let " + one + " change for an hour while " + other +
+           " stays, then the other way round.";
   return "Warm the place of " + warmed + " alone (a heating pad for half an hour) while " + stays +
          " stays, and read both.";
 }

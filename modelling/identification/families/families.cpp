@@ -366,9 +366,10 @@ void add_warnings(const MeasuredTests& tests, FamiliesFit& fit) {
     if (is_unfit(chosen.left_out_rms_um[o], none.left_out_rms_um[o]))
       fit.warnings.push_back(
           tests.outputs[o] +
-          printed(": %.0f %% of no model's RMS is left on what was left out, and a model fit for use "
-                  "leaves less than half. Next: thermocomp diagnose",
-                  100.0 * chosen.left_out_rms_um[o] / none.left_out_rms_um[o]));
+          printed(
+              ": %.0f %% of no model's RMS is left on what was left out, and a model fit for use "
+              "leaves less than half. Next: thermocomp diagnose",
+              100.0 * chosen.left_out_rms_um[o] / none.left_out_rms_um[o]));
   for (const auto& group : fit.together) {
     std::string names;
     for (const std::string& name : group) names += (names.empty() ? "" : ", ") + name;

@@ -115,6 +115,19 @@ def assert_compensates(config):
         assert run("--socket", sock, "status").stdout.startswith("Compensating    : yes")
 
 
+def test_what_is_no_bus_no_axis_and_another_word_for_a_sensor(foreign, folder):
+    modules, plc = foreign
+    answers = [f"tcp:127.0.0.1:{modules}", "?pt100", "",  # no host of this name
+               "?pt100", "?rtd", "wago_750_458", NAMES, "holding:float32/CDAB:1:100,102", "",
+               f"tcp:127.0.0.1:{plc}", "yes", "none", "spindle", "z"]
+    status, shown = converse(["init", folder / "thermocompd.toml"], answers)
+    assert status == 0, shown
+    assert '"?pt100" is no host' in shown and "spindle: must be an axis" in shown
+    lists = [part.split("Module of")[0].split("\n", 1)[1]
+             for part in shown.split("presets:")[1:3]]
+    assert lists[0] == lists[1] and "pt100" in lists[0].lower() and "rtd" in lists[0].lower()
+
+
 def test_asked_on_a_terminal(foreign, folder):
     modules, plc = foreign
     config = folder / "thermocompd.toml"

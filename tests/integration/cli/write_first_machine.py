@@ -68,8 +68,8 @@ def model_outputs(folder):
     for day, seed in {"monday": 1, "tuesday": 2, "friday": 5}.items():
         text += said(folder, "simulate", "machine.toml", "--seed", seed, "-o", f"{day}.csv")
     text += "\n" + said(folder, "fit", "monday.csv", "tuesday.csv", "--outputs", "z_um", "-o",
-                        "model.toml")
-    text += "\n" + said(folder, "predict", "--model", "model.toml", "friday.csv", "-o",
+                        "fitted.toml")
+    text += "\n" + said(folder, "predict", "--model", "fitted.toml", "friday.csv", "-o",
                         "predicted.csv")
     return text
 

@@ -336,11 +336,22 @@ TEST_CASE("a watch line shows temperatures, offsets and the simulated truth", "[
              Contains("22.50") && Contains("+3.10") && Contains("-6.50") && Contains("-0.50"));
 }
 
+TEST_CASE("the heading of a watch stands again where the truth appears", "[cli][watch]") {
+  const thermocomp::cli::TruthRow truth{{"time_s", "z_um"}, {0, 1}, {10, -5.5}};
+  thermocomp::cli::WatchLog log;
+  const std::string plain = watch_header(good_status(), nullptr);
+  CHECK(log.next(good_status(), nullptr) == plain + watch_line(good_status(), nullptr));
+  CHECK(log.next(good_status(), nullptr) == watch_line(good_status(), nullptr));
+  CHECK(log.next(good_status(), &truth) ==
+        watch_header(good_status(), &truth) + watch_line(good_status(), &truth));
+  CHECK(log.next(good_status(), &truth) == watch_line(good_status(), &truth));
+}
+
 TEST_CASE("in its first seconds a watch line says 'starting' and no more", "[cli][watch]") {
   Status status = good_status();
   status.mode = Mode::starting;
-  status.reasons =
-      static_cast<std::uint32_t>(Reason::block_lost) | static_cast<std::uint32_t>(Reason::no_reference);
+  status.reasons = static_cast<std::uint32_t>(Reason::block_lost) |
+                   static_cast<std::uint32_t>(Reason::no_reference);
   status.uptime_s = 0.4;
   const std::string begun = watch_line(status, nullptr);
   CHECK_THAT(begun, Contains("starting"));

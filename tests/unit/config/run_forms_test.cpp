@@ -250,6 +250,24 @@ TEST_CASE("a map is read strictly", "[config][run]") {
   }
 }
 
+TEST_CASE("a map may say its format, as every other file", "[config][run]") {
+  CHECK(parse_column_map("format = 1\nignore = [\"x\"]", "map.toml").ignored ==
+        std::vector<std::string>{"x"});
+  CHECK(problems_of([] { return parse_column_map("format = 2", "map.toml"); }).size() == 1);
+}
+
+TEST_CASE("a displacement that nobody measured is said to be missing, with what to do",
+          "[config][run]") {
+  const auto rule_of = [](const std::string& more) {
+    const auto problems = problems_of(
+        [&] { return read("time_s,bed_degC,z_offset_um" + more + "\n0,20,1,2\n").column("z_um"); });
+    REQUIRE(problems.size() == 1);
+    return problems.front().rule;
+  };
+  CHECK_THAT(rule_of(",z_applied_um"), Catch::Contains("thermocomp measured"));
+  CHECK_THAT(rule_of(",x_um"), !Catch::Contains("thermocomp measured"));
+}
+
 TEST_CASE("a map that leaves a unit out is told the name with it", "[config][run]") {
   const auto problems = problems_of([&] {
     return read("Time [s];Temp. t1 [°C];Temp. t7 [°C]\n0;20,5;21\n",
