@@ -21,11 +21,10 @@
 
 namespace thermocomp {
 
-/// Main's thread only; nothing waits. What an operator was told survives a restart: a command is
-/// called done only when it is on disk (where that takes longer than a client waits, the answer
-/// says so), and one that the cycle did not take in time never happens.
-/// Configuration, reports and state change together, in poll(), when the cycle has gone over to a
-/// new parts.
+/// Main's thread only; nothing waits. What was confirmed to an operator survives a restart: a
+/// command is called done only when it is on disk (where that takes longer than a client waits, the
+/// answer says so), and one that the cycle did not take in time never happens. Configuration,
+/// reports and state change together, in poll(), when the cycle has gone over to a new parts.
 class Operations {
  public:
   /// All of them outlive this.
@@ -81,7 +80,7 @@ class Operations {
     DaemonConfig next;
     bool is_overdue_told{false};
     std::optional<std::filesystem::path> candidate;
-    bool is_asked{false};  ///< by a client, who is told what comes of it
+    bool is_asked{false};  ///< by a client, who gets the outcome
     std::int64_t user{-1};
   };
 

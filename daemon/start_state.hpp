@@ -1,5 +1,5 @@
 /// The state with which the daemon starts, by the state file or else by the history, and what the
-/// operator must be told about it.
+/// operator must know about it.
 #pragma once
 
 #include <filesystem>

@@ -110,7 +110,7 @@ bool Supervisor::turn() {
     throw std::runtime_error(std::string("poll: ") + std::strerror(errno));
   const bool stopping = take_signals();
   parts_.operations.poll();
-  // What was before a command is told before it, what comes of it after it.
+  // What was before a command is reported before it, what comes of it after it.
   if (!parts_.operations.is_busy() || Clock::now() >= next_note_) note_report();
   parts_.server.handle(0ms);
   if (Clock::now() >= next_tick_) tick();

@@ -16,9 +16,9 @@ struct StepTime {
   bool first{false};  ///< nothing was stepped before, not even by the estimator adopted from
 };
 
-/// What the controller tells. Of a silent one: what it told last.
+/// What the controller reports. Of a silent one: what it reported last.
 struct Signals {
-  bool online{false};    ///< the controller is there and what it told is fresh
+  bool online{false};    ///< the controller is there and its report is fresh
   bool complete{false};  ///< every value that the model or disable_signal needs is known
   std::span<const double> of_model;  ///< shape (signal_columns)
   bool watches_cutting{false};       ///< there is a cutting_signal
@@ -43,7 +43,7 @@ struct Temperatures {
   bool all_good{false};
   bool complete{false};      ///< each is measured or estimated
   bool jumped{false};        ///< a value contradicts what was, and nothing confirms it
-  bool suspected{false};     ///< a sensor is, that lies plausibly
+  bool suspected{false};     ///< a sensor is, that is plausibly wrong
   bool weighed_down{false};  ///< ... and is left out of its blocks
 };
 

@@ -1,6 +1,6 @@
-/// The types that drivers, estimator and daemon share: what a reading is, what the controller told,
-/// what is sent to it. Everything here is plain data of fixed size, so that it can be copied
-/// through wait-free slots on the real-time thread.
+/// The types that drivers, estimator and daemon share: what a reading is, what the controller
+/// reported, what is sent to it. Everything here is plain data of fixed size, so that it can be
+/// copied through wait-free slots on the real-time thread.
 #pragma once
 
 #include <array>
@@ -65,7 +65,7 @@ inline constexpr std::uint32_t epochs_of_a_link = 1u << 20;
   return a % epochs_of_a_link == b % epochs_of_a_link;
 }
 
-/// What the controller last told. Values it does not report are NaN.
+/// What the controller last reported. Values it does not report are NaN.
 struct ControllerState {
   nanoseconds taken_at{};
   /// Changes each time the link is (re)established or pauses: a command of another epoch was

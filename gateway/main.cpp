@@ -97,7 +97,7 @@ class Gateway {
     watch_alarms(*snapshot);
   }
 
-  /// Judged by a clock that nobody sets; told with the time of day.
+  /// Judged by a clock that nobody sets; printed with the time of day.
   void watch_alarms(const Snapshot& snapshot) {
     const double now_s =
         std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();

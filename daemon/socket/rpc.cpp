@@ -145,7 +145,7 @@ const RpcDispatcher::Method& RpcDispatcher::find(const PeerAccess& access,
                                                  const std::string& name) const {
   const auto method = methods_.find(name);
   if (method == methods_.end()) {
-    // Whoever may do nothing is not told what there is.
+    // Whoever may do nothing does not learn what there is.
     if (!access.any()) throw RpcError(rpc::not_permitted, "not permitted");
     throw RpcError(rpc::method_not_found, "there is no method of this name");
   }

@@ -71,7 +71,7 @@ using RpcPending = std::function<std::optional<nlohmann::json>()>;
 /// Begins what was asked for.
 using RpcSlowHandler = std::function<RpcPending(const nlohmann::json& params)>;
 
-/// What a client wants to be told, and how often.
+/// What a client subscribes to, and how often.
 struct Subscription {
   std::vector<std::string> methods;  ///< each once, reading methods only
   std::chrono::nanoseconds period{};

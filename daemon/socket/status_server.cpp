@@ -61,7 +61,7 @@ struct StatusServer::Parts {
   std::deque<ClientId> ready;     ///< have a whole request; each one's turn comes
   std::vector<ClientId> waiting;  ///< their answer takes its time
   Alarms resting;                 ///< the same, but over their rate until then
-  Alarms subscribers;             ///< when they are to be told next
+  Alarms subscribers;             ///< when their next notification is due
   std::vector<ClientId> broken;
   AccessGroups groups;
   std::shared_ptr<AccessGroups> groups_found;  ///< the thread's while it is busy

@@ -57,7 +57,7 @@ struct SocketLimits {
 /// `subscribe` {"methods": ["status", ...], "period_s": 1.0}: the results of these reading methods
 /// (default: status) are sent as notifications {"method": NAME, "params": RESULT} every period
 /// (0.1..60 s) until the client disconnects or calls it again. A client that does not read in time
-/// is told later how many it missed: {"method": "missed", "params": {"notifications": N}}.
+/// learns later how many it missed: {"method": "missed", "params": {"notifications": N}}.
 class StatusServer {
  public:
   /// Binds and listens. A socket file nobody listens on any more is replaced. Raises the process'

@@ -38,17 +38,18 @@ bool EventJournal::fault(Event fault) {
   const auto known = outages_.find(fault.subject);
   if (known != outages_.end() && is_over(known->second, at.monotonic)) outages_.erase(known);
   Outage& outage = outages_.try_emplace(fault.subject).first->second;
-  if (outage.told.empty()) outage.since = at.monotonic;
+  if (outage.reported.empty()) outage.since = at.monotonic;
   outage.newest = fault;
   const bool is_back = std::exchange(outage.away_since, std::nullopt).has_value();
   const bool was_ended = std::exchange(outage.is_end_told, false);
   const bool is_known =
-      std::any_of(outage.told.begin(), outage.told.end(),
-                  [&fault](const Event& told) { return is_same_fault(told, fault); });
+      std::any_of(outage.reported.begin(), outage.reported.end(),
+                  [&fault](const Event& known) { return is_same_fault(known, fault); });
   const bool begins_to_return = is_back && was_ended && !outage.comes_and_goes;
-  if (!begins_to_return && (is_known || outage.told.size() >= faults_of_outage_max)) return false;
+  if (!begins_to_return && (is_known || outage.reported.size() >= faults_of_outage_max))
+    return false;
   if (begins_to_return) outage.comes_and_goes = true;
-  if (!is_known) outage.told.push_back(fault);
+  if (!is_known) outage.reported.push_back(fault);
   fault.comes_and_goes = begins_to_return;
   add(at, std::move(fault));
   return true;

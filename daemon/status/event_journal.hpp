@@ -15,7 +15,7 @@
 
 namespace thermocomp {
 
-/// Main's thread only. Every change is one event; the same fault told again is none. A fault that
+/// Main's thread only. Every change is one event; the same fault again is none. A fault that
 /// returns within `returns_within` of its end comes and goes: that is one outage, which ends once
 /// it has stayed away for so long.
 class EventJournal {
@@ -30,10 +30,10 @@ class EventJournal {
   static constexpr std::size_t faults_of_outage_max = 8;
 
   explicit EventJournal(Now now = system_now) : now_(std::move(now)) {}
-  /// Is told every event from now on, such as the history's writer.
+  /// Is called with every event from now on, such as the history's writer.
   void tell(std::function<void(const Event&)> listener) { listener_ = std::move(listener); }
 
-  /// The subject has this fault from now on. Each kind of fault is told once in an outage, which
+  /// The subject has this fault from now on. Each kind of fault is one event in an outage, which
   /// counts from the first.
   /// @param fault  its subject, code, detail and value; the journal sets the rest
   /// @return whether it became an event
@@ -45,7 +45,7 @@ class EventJournal {
   /// Ends the outages whose faults have stayed away for long enough; often.
   /// @return the events
   std::vector<Event> settle();
-  /// An outage that has begun and of which no end is told yet.
+  /// An outage that has begun and whose end is no event yet.
   [[nodiscard]] bool lasts(const Subject& subject) const;
   /// Such a one whose faults come and go.
   [[nodiscard]] bool comes_and_goes(const Subject& subject) const;
@@ -67,13 +67,13 @@ class EventJournal {
   struct Outage {
     std::chrono::nanoseconds since{};  ///< monotonic: a set clock must not change a duration
     Event newest;                      ///< fault
-    std::vector<Event> told;           ///< faults that became events
+    std::vector<Event> reported;       ///< faults that became events
     std::optional<std::chrono::nanoseconds> away_since;  ///< none: it has a fault now
     std::chrono::nanoseconds hold{};
     bool is_end_told{false};
     bool comes_and_goes{false};
   };
-  /// Its end is told, and what comes now is another outage.
+  /// Its end is an event, and what comes now is another outage.
   [[nodiscard]] static bool is_over(const Outage& outage, std::chrono::nanoseconds now);
   [[nodiscard]] const Outage* find(const Subject& subject) const;
   Event end_of(Outage& outage);

@@ -91,7 +91,7 @@ void EventLog::note_ended_outages() {
 }
 
 void EventLog::note_mode(const Report& report, const std::string& mode) {
-  const std::uint32_t told = std::exchange(reasons_, 0);
+  const std::uint32_t before = std::exchange(reasons_, 0);
   bool may_return = false;
   for (std::size_t i = 0; i < reasons_count; ++i) {
     const auto bit = std::uint32_t{1} << i;
@@ -104,9 +104,9 @@ void EventLog::note_mode(const Report& report, const std::string& mode) {
     if (is_given || journal_.lasts(subject)) reasons_ |= bit;
     may_return = may_return || (!is_given && journal_.comes_and_goes(subject));
   }
-  // A mode that comes and goes with its reason is told once the reason stays away.
-  if (may_return && (reasons_ & ~told) == 0) return;
-  if (first_ || report.mode != mode_ || reasons_ != told) {
+  // A mode that comes and goes with its reason is an event once the reason stays away.
+  if (may_return && (reasons_ & ~before) == 0) return;
+  if (first_ || report.mode != mode_ || reasons_ != before) {
     const bool good = report.mode == Mode::compensating && reasons_ == 0;
     spdlog::log(good ? spdlog::level::info : spdlog::level::warn, "mode {}, reasons: {}", mode,
                 reason_names(reasons_));
@@ -131,7 +131,7 @@ void EventLog::note_sensors(const Report& report, const EstimatorConfig& config)
   suspected_.resize(report.sensors.size(), false);
   for (std::size_t i = 0; i < report.sensors.size(); ++i) {
     const SensorReport& sensor = report.sensors[i];
-    // One that settles ends what was told before only once it counts.
+    // One that settles ends what was reported before only once it counts.
     const bool settles = sensor.fault == Fault::unconfirmed && !sensor.jumped;
     if (sensor.fault != faults_[i] && !settles) {
       const Subject subject{SubjectKind::sensor, config.sensors[i].name};

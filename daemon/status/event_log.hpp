@@ -60,7 +60,7 @@ class EventLog {
   bool first_{true};
   nanoseconds settled_at_{};  ///< of the reports
   Mode mode_{Mode::starting};
-  std::uint32_t reasons_{0};  ///< told, and not yet over
+  std::uint32_t reasons_{0};  ///< reported, and not yet over
   std::vector<bool> suspected_;
   std::vector<Fault> faults_;
   std::vector<bool> clipping_;

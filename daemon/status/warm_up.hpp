@@ -24,7 +24,7 @@ class TemperatureTrend {
   /// warming.
   static constexpr nanoseconds window = std::chrono::minutes(30);
   static constexpr nanoseconds pace = std::chrono::seconds(5);
-  /// Until there are a few: a machine that jumps is told from the first seconds on.
+  /// Until there are a few: a machine that jumps shows it from the first seconds on.
   static constexpr nanoseconds first_pace = std::chrono::seconds(1);
   static constexpr std::size_t first_rows = 60;
 
@@ -40,7 +40,7 @@ class TemperatureTrend {
   /// began 3 h after the last change of speed, and above 4.2 K/h in 95 % of those in the first hour
   /// after a rise.
   static constexpr double even_rate_K_per_h_max = 3.0;
-  /// A smaller change cannot be told from the steps of a module with 0.1 K.
+  /// A smaller change cannot be distinguished from the steps of a module with 0.1 K.
   static constexpr double change_K_min = 0.3;
 
   [[nodiscard]] bool is_due(nanoseconds now) const noexcept;
@@ -71,7 +71,7 @@ struct RemainingDrift {
 ///
 /// all a_k of one sign, by least squares over the last 240, 120, 60, 30 or 20 min: the longest of
 /// them in which the curve leaves less than a tenth of the bound, so that a change of load, after
-/// which another end is approached, is told by its misfit. The slowest is used only where the
+/// which another end is approached, shows in its misfit. The slowest is used only where the
 /// others leave much more. How well it does: docs/measurements.md. Main's thread only; time is an
 /// argument.
 class WarmUp {

@@ -1,4 +1,4 @@
-/// What systemd is told: readiness, status, watchdog. Silent where the daemon is not a service.
+/// What is sent to systemd: readiness, status, watchdog. Silent where the daemon is not a service.
 #pragma once
 
 #include <chrono>

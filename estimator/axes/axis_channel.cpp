@@ -143,7 +143,7 @@ void AxisChannel::start_without_read_back(const AxisInput& input, nanoseconds aw
   const double register_um = input.applied_um;
   if (!std::isfinite(register_um)) {
     if (!start_.no_registers) begin_corridor(start_.by);
-    // Whether it restarted, and what it applies since, cannot be told any more.
+    // Whether it restarted, and what it applies since, is not known any more.
     if (!is_same_link(state_.epoch, first_epoch) && away > lag_max)
       start_.by = StartEvidence::unknown;
     start_.unknown = start_.by == StartEvidence::unknown;

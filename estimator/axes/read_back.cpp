@@ -59,7 +59,7 @@ constexpr double share_of_mismatch = 0.35;
 constexpr double sure_share_of_mismatch = 0.1;
 /// Below so little sent a factor says nothing.
 constexpr double sent_um_min = 0.2;
-/// A sign that flips while running is told from a coincidence from here on.
+/// A sign that flips while running is no coincidence from here on.
 constexpr double negative_um_min = 3.0;
 /// What was sent must have changed by so much, and by so much of the mismatch, before a factor is
 /// no coincidence.
@@ -87,11 +87,11 @@ std::string factor_text(const Mismatch& mismatch) {
   else
     std::snprintf(text.data(), text.size(), "reads back %.3g times what is sent: check scale%s",
                   mismatch.size, mismatch.size < 0.0 ? " and sign" : "");
-  std::string told = text.data();
-  if (!mismatch.or_constant) return told;
+  std::string words = text.data();
+  if (!mismatch.or_constant) return words;
   std::snprintf(text.data(), text.size(), "; or constant %+.1f um: check the offset's zero",
                 mismatch.read_um - mismatch.sent_um);
-  return told.append(text.data());
+  return words.append(text.data());
 }
 
 }  // namespace

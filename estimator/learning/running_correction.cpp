@@ -198,7 +198,7 @@ void RunningCorrection::learn_two_phases(double displacement_um, double model_um
   // Without the correction the model is d = rest + p1 + p2.
   const bool by_model = state_.phase == 1 && config_.first_gain == FirstGain::eq_34;
   const double denominator_um = state_.phase == 2 ? p2_um : by_model ? model_um : p1_um;
-  // A gain must not be told from next to nothing.
+  // A gain does not follow from next to nothing.
   if (!(std::abs(denominator_um) >= config_.contribution_um_min)) {
     ++state_.refused;
     return;

@@ -1,5 +1,5 @@
 /// The displacement along the travel of axes whose controller interpolates by itself, and what it
-/// is at the nodes that the controller is told.
+/// is at the nodes that the controller gets.
 #pragma once
 
 #include <cstddef>

@@ -61,7 +61,7 @@ struct ModeInput {
   bool controller_online{false};
   bool axes_synced{false};          ///< what the controller applies is known of each axis
   bool controller_written{false};   ///< offsets that were sent lately are known to have been taken
-  bool controller_disables{false};  ///< by its switch, as last told
+  bool controller_disables{false};  ///< by its switch, as last reported
 };
 
 /// The rule, the first that holds:

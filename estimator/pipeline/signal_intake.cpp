@@ -40,7 +40,7 @@ SignalIntake::SignalIntake(const EstimatorConfig& config, const ThermalModel& mo
       cycle_end_(switch_index(config, config.compensation.cycle_end_signal, "cycle_end_signal")),
       stale_after_(to_nanoseconds(config.compensation.controller_stale_after_s)),
       of_model_(model_signals_.size(), not_a_number) {
-  state_.told.fill(not_a_number);
+  state_.last.fill(not_a_number);
 }
 
 Signals SignalIntake::step(nanoseconds now, const ControllerState& controller) noexcept {
@@ -50,21 +50,21 @@ Signals SignalIntake::step(nanoseconds now, const ControllerState& controller) n
   signals.complete = state_.online ? take(controller) : model_signals_.empty();
   signals.of_model = of_model_;
   signals.watches_cutting = cutting_.has_value();
-  signals.cutting = told(cutting_);
-  signals.disable = told(disable_);
-  signals.cycle_end = told(cycle_end_);
+  signals.cutting = last_value(cutting_);
+  signals.disable = last_value(disable_);
+  signals.cycle_end = last_value(cycle_end_);
   return signals;
 }
 
 /// @return whether all that is needed is known
 bool SignalIntake::take(const ControllerState& controller) noexcept {
   for (std::size_t i = 0; i < names_.size(); ++i)
-    state_.told[i] = std::abs(controller.signals[i]) <= signal_magnitude_max ? controller.signals[i]
+    state_.last[i] = std::abs(controller.signals[i]) <= signal_magnitude_max ? controller.signals[i]
                                                                              : not_a_number;
   // A switch whose position is unknown is neither on nor off: hold.
-  bool complete = !disable_ || std::isfinite(told(disable_));
+  bool complete = !disable_ || std::isfinite(last_value(disable_));
   for (std::size_t i = 0; i < model_signals_.size(); ++i) {
-    of_model_[i] = state_.told[model_signals_[i]];
+    of_model_[i] = state_.last[model_signals_[i]];
     complete = complete && std::isfinite(of_model_[i]);
   }
   return complete;
@@ -73,7 +73,7 @@ bool SignalIntake::take(const ControllerState& controller) noexcept {
 void SignalIntake::adopt(const SignalIntake& previous, const std::vector<int>& plan) noexcept {
   take_by_plan(plan, previous.of_model_, of_model_);
   // Not whether the controller is there: the next step says that.
-  if (names_ == previous.names_) state_.told = previous.state_.told;
+  if (names_ == previous.names_) state_.last = previous.state_.last;
 }
 
 }  // namespace thermocomp

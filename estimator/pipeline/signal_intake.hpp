@@ -21,7 +21,7 @@ namespace thermocomp {
 class SignalIntake {
  public:
   struct State {
-    std::array<double, signals_max> told{};  ///< order of the configuration
+    std::array<double, signals_max> last{};  ///< order of the configuration
     bool online{false};
   };
 
@@ -29,21 +29,21 @@ class SignalIntake {
   SignalIntake(const EstimatorConfig& config, const ThermalModel& model);
 
   [[nodiscard]] Signals step(nanoseconds now, const ControllerState& controller) noexcept;
-  /// Of the model's signals, as last told.
+  /// Of the model's signals, as last reported.
   [[nodiscard]] std::span<const double> of_model() const noexcept { return of_model_; }
 
   /// @param plan  from plan_names() for the model's signals
   void adopt(const SignalIntake& previous, const std::vector<int>& plan) noexcept;
-  void visit_told(StateArchive& archive) {
-    auto& [told, online] = state_;
-    archive(told, online);
+  void visit_last(StateArchive& archive) {
+    auto& [last, online] = state_;
+    archive(last, online);
   }
   void visit_of_model(StateArchive& archive) { archive(of_model_); }
 
  private:
   [[nodiscard]] bool take(const ControllerState& controller) noexcept;
-  [[nodiscard]] double told(std::optional<std::size_t> signal) const noexcept {
-    return signal ? state_.told[*signal] : not_a_number;
+  [[nodiscard]] double last_value(std::optional<std::size_t> signal) const noexcept {
+    return signal ? state_.last[*signal] : not_a_number;
   }
 
   const std::vector<std::string> names_;

@@ -90,29 +90,32 @@ void Stages::step(nanoseconds now, std::span<const Reading> readings,
   StepTime time{now, 0.0, !record.stepped};
   if (record.stepped) time.dt_s = to_seconds(now - record.now);
 
-  const Signals told = signals.step(now, controller);
+  const Signals controller_signals = signals.step(now, controller);
   Temperatures temps = sensing.step(now, readings);
-  const ReferenceState straight = reference.step(now, temps, told);
+  const ReferenceState reference_state = reference.step(now, temps, controller_signals);
   // A suspicion alone never ends the compensation.
-  if (temps.weighed_down && !prediction.would_serve(sensing.lost(), straight, told))
+  if (temps.weighed_down &&
+      !prediction.would_serve(sensing.lost(), reference_state, controller_signals))
     temps = sensing.use_all(now);
   const Displacement displacement =
-      prediction.step(now, temps, straight, told, sensing.lost(), learned);
-  const Mode what = mode.step({time, displacement.known, told.online, axes.synced(),
-                               controller.written, told.disable >= 0.5});
+      prediction.step(now, temps, reference_state, controller_signals, sensing.lost(), learned);
+  const Mode mode_now =
+      mode.step({time, displacement.known, controller_signals.online, axes.synced(),
+                 controller.written, controller_signals.disable >= 0.5});
   const std::span<const double> compensated_um =
-      cycle_update.step(now, displacement, what == Mode::compensating, temps, straight, told,
-                        prediction.model(), learned);
-  const Targets where = targets.step(what, compensated_um, displacement, told);
-  axes.step(time, where, told, controller, command);
+      cycle_update.step(now, displacement, mode_now == Mode::compensating, temps, reference_state,
+                        controller_signals, prediction.model(), learned);
+  const Targets axis_targets =
+      targets.step(mode_now, compensated_um, displacement, controller_signals);
+  axes.step(time, axis_targets, controller_signals, controller, command);
 
   record = {record.cycle + 1,
             true,
             now,
             time.dt_s,
             displacement.known,
-            reasons_of(told, controller.written, temps, straight, displacement, mode.state(), where,
-                       axes)};
+            reasons_of(controller_signals, controller.written, temps, reference_state, displacement,
+                       mode.state(), axis_targets, axes)};
 }
 
 void Stages::plan_adoption(const Stages& previous) {
@@ -147,7 +150,7 @@ void Stages::visit_state(StateArchive& archive) {
   learned.visit_learned(archive);
   prediction.visit_domain(archive);
   archive(cycle, stepped, now, dt_s);
-  signals.visit_told(archive);
+  signals.visit_last(archive);
   reference.visit_temperatures(archive);
   signals.visit_of_model(archive);
   reference.visit_signals(archive);

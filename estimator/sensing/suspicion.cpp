@@ -84,7 +84,7 @@ Suspicion::Suspicion(const EstimatorConfig& config, const ThermalModel& model)
       check_(model),
       changes_K_(names_.size(), not_a_number),
       input_changes_K_(inputs_.size(), not_a_number),
-      lies_K_(inputs_.size(), not_a_number),
+      errors_K_(inputs_.size(), not_a_number),
       misfit_K_(names_.size(), 0.0),
       creeps_(names_.size(), 0),
       corrected_(inputs_.size() + names_.size()) {
@@ -194,26 +194,28 @@ void Suspicion::look_for_jumps(nanoseconds now) noexcept {
   for (std::size_t i = 0; i < names_.size(); ++i) changes_K_[i] = jump_K(i);
   join_changes();
   const NeighbourCheck::Answer answer = check_.find(input_changes_K_, jump_asked);
-  std::array<Liar, NeighbourCheck::wrong_max> liars;
-  for (std::size_t i = 0; i < answer.count; ++i) liars[i] = liar_of(answer.wrong[i]);
+  std::array<Suspect, NeighbourCheck::wrong_max> suspects;
+  for (std::size_t i = 0; i < answer.count; ++i) suspects[i] = suspect_of(answer.wrong[i]);
   for (std::size_t i = 0; i < answer.count; ++i) {
-    const Liar& liar = liars[i];
+    const Suspect& suspect = suspects[i];
     // A step within one of the lines gives their meeting a size that is none.
-    if (!liar.found || !(misfit_K_[liar.sensor] <= misfit_share * std::abs(liar.size_K))) continue;
-    if (held_K(liar, answer) / liar.size_K >= held_share)
-      begin(liar, now - static_cast<int>(line_ticks) * tick_period);
+    if (!suspect.found || !(misfit_K_[suspect.sensor] <= misfit_share * std::abs(suspect.size_K)))
+      continue;
+    if (held_K(suspect, answer) / suspect.size_K >= held_share)
+      begin(suspect, now - static_cast<int>(line_ticks) * tick_period);
   }
 }
 
 /// How far the level has moved, less what the others say: next to nothing after a spike.
-double Suspicion::held_K(const Liar& liar, const NeighbourCheck::Answer& answer) noexcept {
+double Suspicion::held_K(const Suspect& suspect, const NeighbourCheck::Answer& answer) noexcept {
   for (std::size_t i = 0; i < names_.size(); ++i)
     changes_K_[i] = level_K(i, 0) - level_K(i, line_ticks);
   join_changes();
   for (std::size_t i = 0; i < answer.count; ++i)
-    if (answer.wrong[i].input != liar.input) input_changes_K_[answer.wrong[i].input] = not_a_number;
-  const double own_K = check_.remainder_K(liar.input, input_changes_K_);
-  return changes_K_[liar.sensor] - (input_changes_K_[liar.input] - own_K);
+    if (answer.wrong[i].input != suspect.input)
+      input_changes_K_[answer.wrong[i].input] = not_a_number;
+  const double own_K = check_.remainder_K(suspect.input, input_changes_K_);
+  return changes_K_[suspect.sensor] - (input_changes_K_[suspect.input] - own_K);
 }
 
 void Suspicion::look_for_creep(nanoseconds now, std::size_t levels_back) noexcept {
@@ -226,10 +228,10 @@ void Suspicion::look_for_creep(nanoseconds now, std::size_t levels_back) noexcep
   const NeighbourCheck::Answer answer =
       check_.find(input_changes_K_, {60.0 * ticks_ago, 1.0, creep_sd_limit});
   for (std::size_t i = 0; i < answer.count; ++i) {
-    const Liar liar = liar_of(answer.wrong[i]);
-    if (!liar.found) continue;
-    creeps_[liar.sensor] = 1;
-    if (state_.creep_ticks[liar.sensor] >= creep_ticks_min) begin(liar, now);
+    const Suspect suspect = suspect_of(answer.wrong[i]);
+    if (!suspect.found) continue;
+    creeps_[suspect.sensor] = 1;
+    if (state_.creep_ticks[suspect.sensor] >= creep_ticks_min) begin(suspect, now);
   }
 }
 
@@ -246,8 +248,8 @@ void Suspicion::join_changes() noexcept {
   }
 }
 
-/// The sensor of the input that lies, where it is one.
-Suspicion::Liar Suspicion::liar_of(const NeighbourCheck::Wrong& wrong) const noexcept {
+/// The sensor of the input that is wrong, where it is one.
+Suspicion::Suspect Suspicion::suspect_of(const NeighbourCheck::Wrong& wrong) const noexcept {
   const double expected_K = input_changes_K_[wrong.input] - wrong.size_K;
   double sum_K = 0.0;
   double largest_K = 0.0;
@@ -268,32 +270,32 @@ Suspicion::Liar Suspicion::liar_of(const NeighbourCheck::Wrong& wrong) const noe
   return {found, named, wrong.input, largest_K, wrong.sd_K};
 }
 
-void Suspicion::begin(const Liar& liar, nanoseconds since) noexcept {
-  const std::size_t sensor = liar.sensor;
-  const std::size_t input = liar.input;
+void Suspicion::begin(const Suspect& suspect, nanoseconds since) noexcept {
+  const std::size_t sensor = suspect.sensor;
+  const std::size_t input = suspect.input;
   if (state_.suspected[sensor] != 0) return;  // of two inputs
-  // Until now it was among the neighbours that other lies were measured by.
+  // Until now it was among the neighbours that other errors were measured by.
   for (std::size_t other = 0; other < inputs_.size(); ++other) {
     if (other == input) continue;
     for (const std::size_t earlier : inputs_[other]) {
       if (state_.suspected[earlier] == 0 || believed(other) > 0) continue;
       for (std::size_t i = 0; i < inputs_.size(); ++i)
-        lies_K_[i] = believed(i) > 0 ? 0.0 : not_a_number;
-      lies_K_[input] = liar.size_K / static_cast<double>(believed(input));
-      lies_K_[other] = 0.0;
-      const double taken_K = check_.remainder_K(other, lies_K_);
+        errors_K_[i] = believed(i) > 0 ? 0.0 : not_a_number;
+      errors_K_[input] = suspect.size_K / static_cast<double>(believed(input));
+      errors_K_[other] = 0.0;
+      const double taken_K = check_.remainder_K(other, errors_K_);
       if (std::isfinite(taken_K)) state_.size_K[earlier] -= taken_K;
     }
   }
   ++state_.count;
   state_.suspected[sensor] = 1;
-  state_.size_K[sensor] = state_.found_K[sensor] = liar.size_K;
+  state_.size_K[sensor] = state_.found_K[sensor] = suspect.size_K;
   state_.since[sensor] = since;
   state_.agreed_ticks[sensor] = 0;
   state_.missing_ticks[sensor] = 0;
   if (!may_weigh_down_) return;
   state_.weighed_down[sensor] = 1;
-  correct(sensor, liar.sd_K);
+  correct(sensor, suspect.sd_K);
 }
 
 /// Sensors of the input that are not suspected.

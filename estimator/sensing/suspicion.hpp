@@ -47,7 +47,7 @@ class Suspicion {
   [[nodiscard]] std::span<const std::uint8_t> weighed_down() const noexcept {
     return state_.weighed_down;
   }
-  /// What an input is when the lies of its sensors are taken away.
+  /// What an input is when the errors of its sensors are taken away.
   struct Corrected {
     std::size_t input{0};
     double temp_degC{not_a_number};
@@ -117,16 +117,17 @@ class Suspicion {
   /// Of changes_K_, one per sensor, those of the inputs: the mean over sensors that are not
   /// suspected.
   void join_changes() noexcept;
-  struct Liar {
+  struct Suspect {
     bool found{false};
     std::size_t sensor{0};
     std::size_t input{0};
     double size_K{0.0};
     double sd_K{0.0};
   };
-  [[nodiscard]] Liar liar_of(const NeighbourCheck::Wrong& wrong) const noexcept;
-  [[nodiscard]] double held_K(const Liar& liar, const NeighbourCheck::Answer& answer) noexcept;
-  void begin(const Liar& liar, nanoseconds since) noexcept;
+  [[nodiscard]] Suspect suspect_of(const NeighbourCheck::Wrong& wrong) const noexcept;
+  [[nodiscard]] double held_K(const Suspect& suspect,
+                              const NeighbourCheck::Answer& answer) noexcept;
+  void begin(const Suspect& suspect, nanoseconds since) noexcept;
   void end(std::size_t sensor) noexcept;
   void forget(std::size_t sensor) noexcept;
   /// The first input that the sensor belongs to; the number of inputs: to none.
@@ -144,7 +145,7 @@ class Suspicion {
 
   std::vector<double> changes_K_;        ///< scratch, one per sensor
   std::vector<double> input_changes_K_;  ///< scratch, one per input
-  std::vector<double> lies_K_;           ///< scratch, one per input
+  std::vector<double> errors_K_;         ///< scratch, one per input
   std::vector<double> misfit_K_;         ///< scratch, one per sensor: rms about its lines
   std::vector<std::uint8_t> creeps_;     ///< scratch, one per sensor
   std::vector<Corrected> corrected_;

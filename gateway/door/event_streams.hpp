@@ -12,7 +12,7 @@ struct MHD_Response;    // NOLINT(readability-identifier-naming)
 
 namespace thermocomp::gateway {
 
-/// What all pages are told at one time.
+/// What is sent to all pages at one time.
 struct StreamFrame {
   std::uint64_t number{0};  ///< rises with each
   std::string text;         ///< one event, in the form of the protocol: the whole state

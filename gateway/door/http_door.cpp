@@ -24,7 +24,7 @@ constexpr std::size_t body_bytes_max = 4096;
 constexpr std::size_t header_bytes_max = std::size_t{16} * 1024;
 constexpr unsigned silence_s_max = 10;
 
-/// Nothing but what this gateway serves itself, in nobody's frame, and told to nobody.
+/// Nothing but what this gateway serves itself, in nobody's frame, and without a referrer.
 constexpr const char* own_files_only =
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' "
     "data:; connect-src 'self'; manifest-src 'self'; base-uri 'none'; form-action 'none'; "

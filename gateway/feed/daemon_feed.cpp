@@ -104,14 +104,14 @@ void DaemonFeed::Parts::follow() {
   const json subscription = {{"methods", {"status", "sensors"}}, {"period_s", period_s}};
   static_cast<void>(client.call("subscribe", subscription, silence_max));
   while (!stops) {
-    json told = client.next(silence_max);
-    const std::string method = told.value("method", std::string());
+    json notification = client.next(silence_max);
+    const std::string method = notification.value("method", std::string());
     if (method == "status") {
-      next.status = part_from<Status>(told["params"]);
+      next.status = part_from<Status>(notification["params"]);
       has_status = true;
     }
     if (method == "sensors" && has_status) {  // else the pair is not whole yet
-      next.sensors = part_from<SensorsAnswer>(told["params"]);
+      next.sensors = part_from<SensorsAnswer>(notification["params"]);
       take_sensors(client);
     }
   }

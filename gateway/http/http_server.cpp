@@ -124,12 +124,12 @@ void HttpServer::Parts::tell_history(HttpExchange& exchange) {
 }
 
 GatewayFigures HttpServer::Parts::figures() {
-  GatewayFigures told;
-  told.pages = streams.count();
-  told.requests = door.requests();
-  told.refused = door.refused();
-  if (add_figures) add_figures(told);
-  return told;
+  GatewayFigures counts;
+  counts.pages = streams.count();
+  counts.requests = door.requests();
+  counts.refused = door.refused();
+  if (add_figures) add_figures(counts);
+  return counts;
 }
 
 HttpServer::HttpServer(const GatewaySettings& settings, DaemonFeed& feed, const PageFiles& files,

@@ -204,7 +204,7 @@ void MqttPublisher::show(const SnapshotPointer& snapshot) {
   const bool is_due = !(passed_s >= 0.0 && passed_s < parts_->settings.mqtt.period_s - early_s);
   if (is_due) parts_->said_at_s = snapshot->wall_s;
   for (std::size_t i = 0; i < states.size(); ++i) {
-    // The status, which comes first, is told at once; numbers wait for their period.
+    // The status, which comes first, is sent at once; numbers wait for their period.
     if (i > 0 && !is_due) return;
     nlohmann::json& said = parts_->said[states[i].topic];
     if (said == states[i].state) continue;

@@ -303,18 +303,18 @@ async function loadHistory() {
   try {
     const points = Math.max(200, Math.min(900, Math.round(window.innerWidth)));
     const answer = await fetch('/api/history?from=-' + range.seconds + '&points=' + points);
-    const told = await answer.json();
+    const history = await answer.json();
     if (mine !== asked) return;
-    if (!answer.ok) throw new Error(told.error);
-    const names = Object.keys(told.columns);
+    if (!answer.ok) throw new Error(history.error);
+    const names = Object.keys(history.columns);
     columns = names;
-    table = told.columns.time_s.map((time_s, i) =>
-      names.map((name, c) => c === 0 ? new Date(time_s * 1000) : told.columns[name][i]));
+    table = history.columns.time_s.map((time_s, i) =>
+      names.map((name, c) => c === 0 ? new Date(time_s * 1000) : history.columns[name][i]));
     while (table.length > 2 && table[table.length - 1].every((value, c) => c === 0 || value === null)) table.pop();
-    probings = told.probings;
-    modes = told.modes;
-    marks = told.events;
-    spacing_s = told.span_s;
+    probings = history.probings;
+    modes = history.modes;
+    marks = history.events;
+    spacing_s = history.span_s;
     setText(place('history-note'), '');
     drawAll();
   } catch (error) {

@@ -92,8 +92,8 @@ struct ShdrAdapter::Parts {
 
   // Only of the thread.
   std::list<Agent> agents;
-  ShdrStates told;
-  double told_wall_s{0.0};
+  ShdrStates sent;
+  double sent_wall_s{0.0};
 };
 
 ShdrAdapter::Parts::Parts(const ShdrSettings& settings_in) : settings(settings_in) {
@@ -142,7 +142,7 @@ void ShdrAdapter::Parts::take_agent() {
     return;
   }
   agents.push_back({fd, "", "", false, Clock::now()});
-  agents.back().out = shdr_lines({}, told, told_wall_s);
+  agents.back().out = shdr_lines({}, sent, sent_wall_s);
 }
 
 /// An agent pings once a heartbeat; who has been silent for two gives its place to a new one.
@@ -166,9 +166,9 @@ void ShdrAdapter::Parts::take_snapshot() {
   }
   if (!snapshot) return;
   ShdrStates now = shdr_states(*snapshot);
-  const std::string lines = shdr_lines(told, now, snapshot->wall_s);
-  told = std::move(now);
-  told_wall_s = snapshot->wall_s;
+  const std::string lines = shdr_lines(sent, now, snapshot->wall_s);
+  sent = std::move(now);
+  sent_wall_s = snapshot->wall_s;
   for (Agent& agent : agents) {
     agent.out += lines;
     if (agent.out.size() > unread_bytes_max) agent.is_lost = true;

@@ -18,7 +18,7 @@ struct GatewayFigures {
   std::uint64_t mqtt_dropped{0};  ///< messages that the buffer had no room for
 };
 
-/// While the daemon is away only `thermocomp_up` (0) and the gateway's own figures are told: a
+/// While the daemon is away only `thermocomp_up` (0) and the gateway's own figures are given: a
 /// value that nobody measures must end, not stand still.
 [[nodiscard]] std::string metrics_text(const Snapshot& snapshot, const GatewayFigures& figures);
 

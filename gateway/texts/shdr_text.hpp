@@ -13,7 +13,7 @@
 
 namespace thermocomp::gateway {
 
-/// What is told of one data item; a condition has as many entries as it has reasons.
+/// What is sent of one data item; a condition has as many entries as it has reasons.
 using ShdrStates = std::map<std::string, std::vector<std::string>>;
 
 /// Data items: `avail`; `temp_<sensor>` [degC]; `offset_<axis>`, `displacement_<axis>` [mm or deg];

@@ -179,7 +179,7 @@ HistoryReader::HistoryReader(const std::filesystem::path& file) {
     parts_->damage.push_back({0, std::string("some segments cannot be read: ") + error.what()});
     try {
       parts_->read(" ORDER BY id DESC", found);
-    } catch (const DatabaseError&) {  // told already
+    } catch (const DatabaseError&) {  // reported already
     }
     if (found.empty()) throw;
   }

@@ -69,8 +69,8 @@ class RecordCursor {
 class HistoryReader {
  public:
   /// Opens for reading only and takes note of the segments there are now. An impossible segment (or
-  /// one that overlaps the one in front of it) is left out and told by damage(); an impossible wall
-  /// time, from a clock that was set wrong, is replaced by what the segments beside it say.
+  /// one that overlaps the one in front of it) is left out and reported by damage(); an impossible
+  /// wall time, from a clock that was set wrong, is replaced by what the segments beside it say.
   /// @throws HistoryError naming the file: missing, no history, of an unknown version, or so
   ///                      damaged that nothing can be taken from it
   explicit HistoryReader(const std::filesystem::path& file);

@@ -48,7 +48,7 @@ std::string comment_at(double time_s, const std::string& what) {
 }
 
 /// Says when a row's wall time is worth a comment: the first, one an hour, and one that does not
-/// follow from the last that was told.
+/// follow from the last that was written.
 class WallComments {
  public:
   /// @return empty: nothing to tell

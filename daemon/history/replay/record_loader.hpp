@@ -12,7 +12,7 @@ namespace thermocomp::cli {
 [[nodiscard]] bool is_history(const std::string& file);
 
 /// RUN.csv[@T0:T1] by `loader`, or a history (with @T0:T1 as well, seconds since its start) as
-/// `thermocomp export` gives it; what of it is damaged is told on stderr.
+/// `thermocomp export` gives it; what of it is damaged is printed on stderr.
 /// @throws ConfigurationError, HistoryError
 [[nodiscard]] RunFile load_record(const std::string& argument, RunLoader& loader);
 

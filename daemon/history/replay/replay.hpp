@@ -56,9 +56,9 @@ ReplaySummary replay_to_csv(const std::filesystem::path& history, std::ostream& 
 
 struct ExportSummary {
   std::uint64_t rows{0};
-  std::uint64_t gaps{0};  ///< between rows of the file, each told by a comment line
+  std::uint64_t gaps{0};  ///< between rows of the file, each named by a comment line
   std::vector<std::string> columns;
-  std::vector<HistoryDamage> damage;  ///< what could not be taken, each told by a comment line
+  std::vector<HistoryDamage> damage;  ///< what could not be taken, each named by a comment line
 };
 /// The column of a run file that holds a sensor's readings: `<sensor>_degC`.
 [[nodiscard]] std::string sensor_column(const std::string& sensor);

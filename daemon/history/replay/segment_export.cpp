@@ -337,7 +337,7 @@ void SegmentExport::tell_faults() {
   for (std::size_t i = 0; i < faults_told_.size(); ++i) {
     const Fault fault = fault_of(i);
     if (fault == faults_told_[i]) continue;
-    // A value that settles is the end of what was told before, once it counts.
+    // A value that settles is the end of what was written before, once it counts.
     if (fault == Fault::unconfirmed && !report_.sensors[i].jumped) continue;
     const bool is_first_value = faults_told_[i] == Fault::never_read && fault == Fault::none;
     faults_told_[i] = fault;

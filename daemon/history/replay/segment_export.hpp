@@ -19,7 +19,7 @@ namespace thermocomp {
 struct ExportPlaces {
   static constexpr std::size_t none = static_cast<std::size_t>(-1);
   std::vector<std::size_t> inputs;  ///< temperatures of the model; none with ExportContent::sensors
-  std::vector<std::size_t> sensors;  ///< none: the sensor is told by its block's input
+  std::vector<std::size_t> sensors;  ///< none: the sensor is known by its block's input
   std::vector<std::size_t> signals;
   std::vector<std::size_t> displacement;  ///< by axis; none where nothing was probed
   std::vector<std::size_t> offsets;
@@ -107,7 +107,7 @@ class SegmentExport {
   std::vector<Fault> faults_told_;
   std::vector<std::string> happened_;
   std::vector<ExportedProbing> probings_;
-  std::string not_followed_;  ///< why the estimator is not stepped any more, until it is told
+  std::string not_followed_;  ///< why the estimator is not stepped any more, until it is reported
 };
 
 }  // namespace thermocomp

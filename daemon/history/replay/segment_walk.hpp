@@ -54,7 +54,7 @@ class HistoryClock {
 /// The setups of all segments, each parsed once.
 class ParsedSetups {
  public:
-  /// What cannot be parsed is told by of().
+  /// What cannot be parsed is reported by of().
   ParsedSetups(const HistoryReader& reader, const SetupParser& parser);
   /// @throws HistoryError when the segment's configuration is missing or cannot be used
   [[nodiscard]] const ReplaySetup& of(const SegmentInfo& segment) const;

@@ -397,15 +397,15 @@ struct Dice {
 };
 
 /// Up to four sensors that jump, creep or work loose, for a while each; some that break.
-class Liars {
+class WrongSensors {
  public:
-  explicit Liars(std::uint64_t seed) : dice_{seed} {
-    for (auto& each : liars_)
+  explicit WrongSensors(std::uint64_t seed) : dice_{seed} {
+    for (auto& each : wrong_)
       each = {static_cast<std::size_t>(dice_(0.0, 5.999)), dice_(0.0, 4.0),
               hour_s * dice_(17.0, 27.0), hour_s * dice_(0.1, 6.0), dice_(-6.0, 6.0)};
   }
   double operator()(std::size_t sensor, double temp_degC, double time_s) const {
-    for (const auto& each : liars_) {
+    for (const auto& each : wrong_) {
       const double since_s = time_s - each.begin_s;
       if (each.sensor != sensor || since_s < 0.0 || since_s > each.lasts_s) continue;
       if (each.kind < 1.0)
@@ -421,7 +421,7 @@ class Liars {
   }
 
  private:
-  struct Liar {
+  struct WrongSensor {
     std::size_t sensor{0};
     double kind{0.0};
     double begin_s{0.0};
@@ -429,7 +429,7 @@ class Liars {
     double size_K{0.0};
   };
   Dice dice_;
-  std::array<Liar, 4> liars_{};
+  std::array<WrongSensor, 4> wrong_{};
 };
 
 }  // namespace
@@ -444,14 +444,14 @@ TEST_CASE("whatever lies and breaks, suspicion keeps slew and bound and ends no 
   const bool smooth = dice(0.0, 1.0) < 0.5;
   for (SensorConfig& sensor : config.sensors)
     if (smooth) sensor.smoothing.form = SmoothingForm::sliding_line;
-  const Liars liars(seed + 1000);
+  const WrongSensors wrong(seed + 1000);
   Shop weighs(config);
   config.compensation.suspected_sensors = SuspectedPolicy::off;
   Shop believes(config);
   const LimiterConfig limits = config.axes[0].limiter;
   while (weighs.time_s < 30.0 * hour_s) {
-    weighs.step(liars);
-    believes.step(liars);
+    weighs.step(wrong);
+    believes.step(wrong);
     REQUIRE(std::isfinite(weighs.command.offset_um[0]));
     REQUIRE(std::abs(weighs.command.offset_um[0]) <= limits.offset_um_max + 1e-9);
     // What breaks may end it; what is suspected may not.
