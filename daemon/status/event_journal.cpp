@@ -44,7 +44,7 @@ bool EventJournal::fault(Event fault) {
   const bool was_ended = std::exchange(outage.is_end_told, false);
   const bool is_known =
       std::any_of(outage.reported.begin(), outage.reported.end(),
-                  [&fault](const Event& known) { return is_same_fault(known, fault); });
+                  [&fault](const Event& each) { return is_same_fault(each, fault); });
   const bool begins_to_return = is_back && was_ended && !outage.comes_and_goes;
   if (!begins_to_return && (is_known || outage.reported.size() >= faults_of_outage_max))
     return false;

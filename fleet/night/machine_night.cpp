@@ -117,8 +117,7 @@ std::string subject_text(const nlohmann::json& answer) {
   return "more is left than of its sisters";
 }
 
-/// Whether the last night before that was judged was unusual too. One night alone is unusual by
-/// chance some times a year; two in a row are less than once.
+/// Whether the last night before that was judged was unusual too: one alone happens by chance.
 bool was_unusual(pqxx::connection& store, const MachineNight& night) {
   pqxx::nontransaction work(store);
   const pqxx::result before = work.exec_params(
@@ -282,7 +281,7 @@ int write_run(pqxx::connection& store, const MachineNight& night, const fs::path
   return probed;
 }
 
-std::string work_off(pqxx::connection& store, const MachineNight& night) {
+NightOutcome work_off(pqxx::connection& store, const MachineNight& night) {
   const auto began = std::chrono::steady_clock::now();
   const WorkFolder folder;
   {
@@ -291,11 +290,11 @@ std::string work_off(pqxx::connection& store, const MachineNight& night) {
     work.commit();
   }
   Result result;
-  std::string told = "no series yet";
+  std::string text = "no series yet";
   const fs::path run = folder / (night.night + ".csv");
   if (write_run(store, night, run) < probings_min) {
     result.state = "empty";
-    told = "hardly anything was probed";
+    text = "hardly anything was probed";
   } else {
     run_modelling(
         {"series", "--machine", night.name, run.string(), "-o", folder / "statistics.toml"},
@@ -311,7 +310,7 @@ std::string work_off(pqxx::connection& store, const MachineNight& night) {
       result.departure[kind] = verdict.answer;
       result.probability = std::min(result.probability.value_or(1.0), verdict.probability);
       if (verdict.departs)
-        told = std::string("from its ") + (kind == "sisters" ? kind : "own past") + ", " +
+        text = std::string("from its ") + (kind == "sisters" ? kind : "own past") + ", " +
                subject_text(verdict.answer);
       is_judged = true;
       is_unusual = is_unusual || verdict.departs;
@@ -319,13 +318,13 @@ std::string work_off(pqxx::connection& store, const MachineNight& night) {
     if (is_judged) {
       result.departs = is_unusual && was_unusual(store, night);
       result.departure["unusual"] = is_unusual;
-      told = !is_unusual ? "as usual" : (*result.departs ? "DEPARTS " : "unusual, ") + told;
+      text = !is_unusual ? "as usual" : (*result.departs ? "DEPARTS " : "unusual, ") + text;
     }
     if (result.departs.value_or(false)) result.diagnosis = diagnosed(store, night, folder, run);
   }
   result.took_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
   write(store, night, result);
-  return told;
+  return {result.departs.value_or(false), text};
 }
 
 void note_failure(pqxx::connection& store, const MachineNight& night, const std::string& why) {

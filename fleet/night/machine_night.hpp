@@ -39,9 +39,12 @@ int run_modelling(const std::vector<std::string>& arguments, const std::filesyst
 int write_run(pqxx::connection& store, const MachineNight& night,
               const std::filesystem::path& file);
 
-/// Compares, and writes the result. @return one line for people
-/// @throws std::exception: nothing was written
-std::string work_off(pqxx::connection& store, const MachineNight& night);
+struct NightOutcome {
+  bool departs{false};
+  std::string text;  ///< one line for people
+};
+/// Compares, and writes the result. @throws std::exception: nothing was written
+NightOutcome work_off(pqxx::connection& store, const MachineNight& night);
 /// That it failed, and why; the next run tries again.
 void note_failure(pqxx::connection& store, const MachineNight& night, const std::string& why);
 

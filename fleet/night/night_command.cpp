@@ -37,21 +37,21 @@ void work_off_some(const std::string& conninfo, const std::vector<MachineNight>&
   pqxx::connection store = open_store(conninfo);
   for (std::size_t i = tally.next++; i < nights.size(); i = tally.next++) {
     const MachineNight& night = nights[i];
-    std::string told;
+    NightOutcome outcome;
     bool has_failed = false;
     try {
-      told = work_off(store, night);
+      outcome = work_off(store, night);
     } catch (const std::exception& error) {
       has_failed = true;
-      told = std::string("failed: ") + error.what();
+      outcome.text = std::string("failed: ") + error.what();
       note_failure(store, night, error.what());
     }
     const std::scoped_lock lock(tally.printing);
     ++tally.done;
     tally.failed += has_failed;
-    tally.departing += told.starts_with("DEPARTS");
+    tally.departing += outcome.departs;
     std::printf("%zu/%zu %s %s: %s\n", tally.done, all, night.night.c_str(), night.name.c_str(),
-                told.c_str());
+                outcome.text.c_str());
     std::fflush(stdout);
   }
 }

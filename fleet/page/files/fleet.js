@@ -38,9 +38,9 @@ const unitOf = column => {
 
 async function ask(path) {
   const answer = await fetch(path);
-  const told = await answer.json();
-  if (!answer.ok) throw new Error(told.error);
-  return told;
+  const value = await answer.json();
+  if (!answer.ok) throw new Error(value.error);
+  return value;
 }
 
 function title(parts, summary) {
@@ -177,7 +177,7 @@ function showMachine(machine, verdict) {
     events.append(line);
   }
   const night = machine.night;
-  const told = night ? 'night of ' + night.night + ': ' + (night.error || whatDeparts(night) ||
+  const words = night ? 'night of ' + night.night + ': ' + (night.error || whatDeparts(night) ||
     (night.departs ? 'departs from its sisters' : night.departs === false ? 'as its sisters' : 'not compared')) : 'no night yet';
   const findings = make('ol');
   for (const finding of (night && night.diagnosis) || [])
@@ -189,7 +189,7 @@ function showMachine(machine, verdict) {
   right.append(section('What happened', events));
   two.append(left, right);
   view.replaceChildren(section('Verdict', make('p', verdict ? verdict.verdict : '', {class: 'verdict ' + (verdict ? verdict.level : '')}),
-                               make('p', told), findings),
+                               make('p', words), findings),
                        section('Places: its curve beside its sisters', columns.length ? places
                          : make('p', 'nothing was sent yet', {class: 'note'})), two);
 }
@@ -223,15 +223,15 @@ function pathOf(curve, x, y) {
   return text;
 }
 
-function chart(told, name, column, cursor) {
+function chart(shown, name, column, cursor) {
   const width = view.clientWidth - 32;
   const height = window.innerWidth <= 700 ? 256 : 352;
   const svg = draw('svg', {viewBox: '0 0 ' + width + ' ' + height, role: 'img', 'aria-label': placeName(column) + ' of ' + name + ' and its sisters'});
-  const all = told.curves.flatMap(curve => curve.mean.filter(isNumber));
+  const all = shown.curves.flatMap(curve => curve.mean.filter(isNumber));
   if (!all.length) return make('p', 'nothing was recorded in this time', {class: 'note'});
   const low = all.reduce((a, b) => Math.min(a, b));
   const high = Math.max(all.reduce((a, b) => Math.max(a, b)), low + 0.1);
-  const points = span[1] / told.step_s;
+  const points = span[1] / shown.step_s;
   const x = point => 48 + (width - 56) * (point + 0.5) / points;
   const y = value => 8 + (height - 32) * (high - value) / (high - low);
   const across = ticks(low, high, 5);
@@ -242,21 +242,21 @@ function chart(told, name, column, cursor) {
   const count = width < 500 ? 3 : 8;
   for (let i = 0; i <= count; ++i)
     svg.append(draw('text', {x: 48 + (width - 56) * i / count, y: height - 6, 'text-anchor': i === 0 ? 'start' : i === count ? 'end' : 'middle'},
-                    timeText(told.from_s + span[1] * i / count)));
-  for (const curve of told.curves)  // its own is the last, above all
+                    timeText(shown.from_s + span[1] * i / count)));
+  for (const curve of shown.curves)  // its own is the last, above all
     svg.append(draw('path', {d: pathOf(curve, x, y), class: curve.name === name ? 'own' : ''}));
   const line = draw('line', {class: 'cursor', y1: 8, y2: height - 24, visibility: 'hidden'});
   svg.append(line);
   svg.addEventListener('pointermove', event => {
     const at = (event.clientX - svg.getBoundingClientRect().left) * width / svg.getBoundingClientRect().width;
     const point = Math.round((at - 48) / (width - 56) * points - 0.5);
-    const values = told.curves.map(curve => [curve.name, curve.mean[curve.at.indexOf(point)]]).filter(([, value]) => isNumber(value));
+    const values = shown.curves.map(curve => [curve.name, curve.mean[curve.at.indexOf(point)]]).filter(([, value]) => isNumber(value));
     line.setAttribute('visibility', values.length ? 'visible' : 'hidden');
     line.setAttribute('x1', x(point));
     line.setAttribute('x2', x(point));
     const own = values.find(([each]) => each === name);
     const sisters = values.filter(([each]) => each !== name).map(([, value]) => value).sort((a, b) => a - b);
-    cursor.textContent = values.length ? clock(told.from_s + told.step_s * (point + 0.5)) + ': ' +
+    cursor.textContent = values.length ? clock(shown.from_s + shown.step_s * (point + 0.5)) + ': ' +
       (own ? fixed(own[1], 2) : '\u2013') + ' ' + unitOf(column) + (sisters.length ? ', sisters ' + fixed(sisters[0], 2) + ' to ' +
       fixed(sisters[sisters.length - 1], 2) + ', median ' + fixed(sisters[Math.floor(sisters.length / 2)], 2) : '') : '';
   });
@@ -265,7 +265,7 @@ function chart(told, name, column, cursor) {
 
 async function showPlace(name, column, mine) {
   title([[name, link(name)], [placeName(column)]], 'sisters in grey');
-  const told = await ask('/api/curves?name=' + encodeURIComponent(name) + '&column=' + encodeURIComponent(column) +
+  const shown = await ask('/api/curves?name=' + encodeURIComponent(name) + '&column=' + encodeURIComponent(column) +
                          '&seconds=' + span[1]);
   if (mine !== asked) return;
   const bar = make('nav', null, {'aria-label': 'time shown'});
@@ -275,10 +275,10 @@ async function showPlace(name, column, mine) {
     bar.append(button);
   }
   const cursor = make('p', '', {id: 'cursor'});
-  const own = told.curves.find(curve => curve.name === name);
-  const sisters = told.curves.length - (own ? 1 : 0);
+  const own = shown.curves.find(curve => curve.name === name);
+  const sisters = shown.curves.length - (own ? 1 : 0);
   view.replaceChildren(section(placeName(column) + ' [' + unitOf(column) + '] of ' + name + (own ? '' : ' (nothing recorded)') +
-                               ' beside ' + sisters + ' sisters', bar, chart(told, name, column, cursor), cursor));
+                               ' beside ' + sisters + ' sisters', bar, chart(shown, name, column, cursor), cursor));
 }
 
 // ------------------------------------------------------------------ which of them
