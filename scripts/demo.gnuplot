@@ -72,7 +72,7 @@ plot truth using (column("time_s")/3600):"x_error_um" with lines lw 1.5 lc rgb x
      truth using (column("time_s")/3600):"y_error_um" with lines lw 1.5 lc rgb y_colour title "y", \
      truth using (column("time_s")/3600):"z_error_um" with lines lw 1.5 lc rgb z_colour title "z"
 
-set title "Head on the column's guideway: the position that the daemon reads, and the rows of its matrix go by"
+set title "Height of the head on the column, which the daemon reads: the model depends on it"
 set ylabel "mm"
 set yrange [0:500]
 plot truth using (column("time_s")/3600):"z_mm" with lines lw 1.5 lc rgb "#555555" title "z"
