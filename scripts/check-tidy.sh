@@ -15,8 +15,8 @@ sed -e 's/ -Winvalid-pch//; s/ -fpch-preprocess//; s/ -include [^ ]*cmake_pch\.h
 
 folders=("$@")
 if ((${#folders[@]} == 0)); then
-  folders=(estimator drivers config status report daemon simulator cli gateway linuxcnc modelling docs
-    bench tests)
+  folders=(estimator drivers config status report daemon simulator cli gateway fleet linuxcnc modelling
+    docs bench tests)
 fi
 pattern="$PWD/($(IFS='|' && echo "${folders[*]%/}"))(/.*\.cpp)?$"
 

@@ -127,7 +127,7 @@ std::vector<std::string> parse_axes(const std::string& text) {
   const std::vector<std::string> axes = parse_words(text);
   for (const std::string& axis : axes) {
     const bool is_axis =
-        std::string_view("xyzabcuvw").find(axis.front()) != std::string_view::npos &&
+        std::string_view("xyzabcuvwXYZABCUVW").find(axis.front()) != std::string_view::npos &&
         axis.find_first_not_of("0123456789", 1) == std::string::npos;
     if (!is_axis)
       throw Failure(axis +

@@ -69,4 +69,4 @@ def test_without_a_network_one_line_says_what_to_do(system):
 def test_bad_use_is_status_2(system):
     answer = set_up(system, "nosuch")
     assert answer.returncode == 2
-    assert answer.stderr == "usage: setup.sh build|modelling|petsc|demo|test|bench\n"
+    assert answer.stderr == "usage: setup.sh build|modelling|petsc|demo|demo_fleet|test|bench\n"
