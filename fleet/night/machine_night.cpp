@@ -273,9 +273,9 @@ int write_run(pqxx::connection& store, const MachineNight& night, const fs::path
     out << at_s - rows.begin()->first;
     for (const std::string& column : columns) out << ',' << values[column];
     out << '\n';
-    probed +=
-        !outputs.empty() && std::all_of(outputs.begin(), outputs.end(),
-                                        [&](const auto& name) { return !values[name].empty(); });
+    probed += !outputs.empty() &&
+              std::all_of(outputs.begin(), outputs.end(),
+                          [&values = values](const auto& name) { return !values[name].empty(); });
   }
   if (!out.flush()) throw std::runtime_error(file.string() + ": could not be written");
   return probed;
@@ -334,6 +334,41 @@ void note_failure(pqxx::connection& store, const MachineNight& night, const std:
   write(store, night, result);
 }
 
+namespace {
+
+/// A machine with enough nights before this one.
+struct Ready {
+  int machine{0};
+  bool has_past{false};
+  std::vector<std::string> runs;
+  std::string statistics;
+};
+
+/// Writes their runs and statistics into the folder.
+std::vector<Ready> ready_machines(pqxx::connection& store, const WorkFolder& folder,
+                                  const std::string& type, const pqxx::result& machines,
+                                  const pqxx::result& days) {
+  std::vector<Ready> ready;
+  for (const pqxx::row& machine : machines) {
+    MachineNight each{machine[0].as<int>(), machine[1].as<std::string>(), type, ""};
+    Ready of_machine{each.machine, machine[2].as<bool>(), {}, folder / (each.name + ".toml")};
+    for (const pqxx::row& day : days) {
+      each.night = day[0].as<std::string>();
+      const fs::path file = folder / (each.name + "_" + each.night + ".csv");
+      if (write_run(store, each, file) >= probings_min) of_machine.runs.push_back(file);
+    }
+    if (of_machine.runs.size() < nights_of_series) continue;
+    std::vector<std::string> arguments{"series", "--machine", each.name, "-o",
+                                       of_machine.statistics};
+    arguments.insert(arguments.end(), of_machine.runs.begin(), of_machine.runs.end());
+    run_modelling(arguments, folder / "log");
+    ready.push_back(std::move(of_machine));
+  }
+  return ready;
+}
+
+}  // namespace
+
 void make_series(pqxx::connection& store, const std::string& type, const std::string& night) {
   pqxx::nontransaction work(store);
   const bool is_there = !work.exec_params(
@@ -352,28 +387,7 @@ void make_series(pqxx::connection& store, const std::string& type, const std::st
   work.commit();
   if (is_there) return;
   const WorkFolder folder;
-  struct Ready {
-    int machine{0};
-    bool has_past{false};
-    std::vector<std::string> runs;
-    std::string statistics;
-  };
-  std::vector<Ready> ready;
-  for (const pqxx::row& machine : machines) {
-    MachineNight each{machine[0].as<int>(), machine[1].as<std::string>(), type, ""};
-    Ready of_machine{each.machine, machine[2].as<bool>(), {}, folder / (each.name + ".toml")};
-    for (const pqxx::row& day : days) {
-      each.night = day[0].as<std::string>();
-      const fs::path file = folder / (each.name + "_" + each.night + ".csv");
-      if (write_run(store, each, file) >= probings_min) of_machine.runs.push_back(file);
-    }
-    if (of_machine.runs.size() < nights_of_series) continue;
-    std::vector<std::string> arguments{"series", "--machine", each.name, "-o",
-                                       of_machine.statistics};
-    arguments.insert(arguments.end(), of_machine.runs.begin(), of_machine.runs.end());
-    run_modelling(arguments, folder / "log");
-    ready.push_back(std::move(of_machine));
-  }
+  const std::vector<Ready> ready = ready_machines(store, folder, type, machines, days);
   if (std::ssize(ready) <= machines_min) return;
   const auto keep = [&](const char* kind, const Ready* machine, std::size_t count,
                         const std::string& file) {
