@@ -83,7 +83,7 @@ Offer read_offer(const fs::path& file) {
           flag_of(read, "withdrawn")};
 }
 
-/// What was decided here about the newest release, step by step; the uplink reports it.
+/// The decisions about the newest release, one a step; the uplink sends them to the store.
 class Steps {
  public:
   explicit Steps(fs::path file) : file_(std::move(file)) {
@@ -182,7 +182,7 @@ class Admission {
     order.takes_back = takes_back;
     return signer_of(order, signature, settings_.approvers);
   }
-  /// Of what was found done: by a signed order before this program was interrupted, or by hand.
+  /// Who did what this program finds done: a signed order before an interruption, or an operator.
   [[nodiscard]] std::string done_by(bool takes_back) const {
     const std::string name = signer(takes_back);
     return name.empty() ? "by an operator at the machine" : "as ordered by " + name;

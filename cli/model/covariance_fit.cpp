@@ -240,7 +240,7 @@ void set_growth(CovarianceFit& fit, const std::vector<Half>& halves, double run_
       return small_sample * std::sqrt(parts.variance_K2(part, i) / variance_K2(i));
     };
     fit.growth.scatter_factor.push_back(factor(0));
-    // Of an input that never moved no error is known.
+    // An input that never moved shows no error.
     fit.growth.drift_factor.push_back(std::max(1.0, factor(1)));
     const double scatter = fit.growth.scatter_factor.back();
     const double drift = fit.growth.drift_factor.back();

@@ -308,7 +308,7 @@ std::string watch_line(const Status& status, const TruthRow* truth) {
     }
     result += " |" + without + " |" + with;
   }
-  // What is missing in the first seconds is on its way.
+  // In the first seconds the first readings are still on their way.
   const bool just_begun = status.mode == Mode::starting && status.uptime_s < begun_s;
   const std::string reasons = just_begun ? "" : reasons_text(status);
   return result + (reasons.empty() ? "" : "  " + reasons) + '\n';

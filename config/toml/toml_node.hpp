@@ -21,7 +21,7 @@
 
 namespace thermocomp::detail {
 
-/// Of these the first hundred are reported; what comes after so many is not looked for.
+/// The reader keeps so many problems and reports the first hundred; it looks for no more.
 inline constexpr std::size_t kept_problems_max = 10'000;
 
 struct TomlState {
