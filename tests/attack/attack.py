@@ -24,14 +24,10 @@ import time
 import traceback
 
 import attacks_daemon  # noqa: F401
-import attacks_files  # noqa: F401
-import attacks_history  # noqa: F401
 import attacks_link  # noqa: F401
 import attacks_linuxcnc  # noqa: F401
 import attacks_read_back  # noqa: F401
 import attacks_sensors  # noqa: F401
-import attacks_socket  # noqa: F401
-import attacks_state  # noqa: F401
 import rig as rig_module
 from registry import ALL
 

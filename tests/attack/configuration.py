@@ -149,15 +149,6 @@ output = "z_um"
 offset_um_max = {bound}
 rate_um_per_s_max = {rate}
 """
-DRY_RUN = """[controller]
-name = "none"
-kind = "dry_run"
-[[axis]]
-name = "z"
-output = "z_um"
-offset_um_max = {bound}
-rate_um_per_s_max = {rate}
-"""
 PIEZO = """[controller]
 name = "amplifier"
 kind = "piezo_tcp"
@@ -183,7 +174,7 @@ enabled_at_first_start = true
 mismatch_um = 2.0
 mismatch_after_s = 1.0
 {compensation}[history]
-file = "{history}"
+file = "{folder}/history.db"
 commit_s = 0.2
 offsets_period_s = 0.02
 {more}[socket]

@@ -180,9 +180,7 @@ class Machine:
                 text.SENSOR_TABLE.format(encoding=self.thermocouples.encoding,
                                     scale=self.thermocouples.scale))
 
-    def controller_text(self, choices, dry_run):
-        if dry_run:
-            return text.DRY_RUN.format(**choices)
+    def controller_text(self, choices):
         if self.link == "can":
             return text.CAN_CONTROLLER.format(**choices)
         if self.link == "can_travel":
@@ -195,12 +193,11 @@ class Machine:
                                      um=[um for _, um in CURVE], **choices)
         return text.MODBUS_CONTROLLER.format(kind="modbus_" + self.link, **choices)
 
-    def config(self, folder, socket, history=None, unit=1, dry_run=False, **other):
+    def config(self, folder, socket, unit=1, **other):
         """The text of a daemon's configuration whose files are in `folder`."""
-        choices = self.choices | {"folder": folder, "socket": socket, "unit": unit,
-                                  "history": history or folder / "history.db"} | other
+        choices = self.choices | {"folder": folder, "socket": socket, "unit": unit} | other
         return (text.HEAD.format(**choices) + self.sensor_text() + text.REST.format(**choices) +
-                self.controller_text(choices, dry_run) + text.TAIL.format(**choices))
+                self.controller_text(choices) + text.TAIL.format(**choices))
 
     def wants_um(self, offset_um):
         """The column is so warm that this is the offset (with the reference of the start)."""

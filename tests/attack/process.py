@@ -33,7 +33,7 @@ class Daemon:
         folder.mkdir(exist_ok=True)
         self.socket = socket
         self.config = folder / "thermocompd.toml"
-        self.history = pathlib.Path(other.get("history", folder / "history.db"))
+        self.history = folder / "history.db"
         self.state = folder / "state.json"
         self.log = folder / "thermocompd.log"
         self.unit = unit
@@ -42,7 +42,6 @@ class Daemon:
         self.ends_expected = False
         self.running = []  # [from, until or None] in which the watchdog must be fed
         self.environment = {}
-        self.limit_as = None
         self.write_config()
 
     def write_config(self, **other):
@@ -54,21 +53,17 @@ class Daemon:
         self.config.write_text(text)
         return text
 
-    def start(self, wait=True, may_refuse=False):
-        """`wait`: until it says that it is ready; False is returned when it ends before."""
+    def start(self, may_refuse=False):
+        """Until it says that it is ready; False when it ends before."""
         self.rig.manager.ready.clear()
         environment = os.environ | {"NOTIFY_SOCKET": str(self.rig.manager.path),
                                     "WATCHDOG_USEC": str(int(1e6 * WATCHDOG_S))}
         environment |= self.environment
         command = [str(self.rig.bin / "thermocompd"), str(self.config)]
-        if self.limit_as:
-            command = ["prlimit", f"--as={self.limit_as}", *command]
         self.ends_expected = may_refuse
         with self.log.open("ab") as log:
             self.process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log,
                                             stderr=log, cwd=self.folder, env=environment)
-        if not wait:
-            return True
         ready = eventually(lambda: self.rig.manager.ready.is_set() or not self.alive())
         if not (ready and self.alive()):
             if not self.alive() and self.process.returncode not in (1, 2):
@@ -153,13 +148,6 @@ class Daemon:
             good = False
         self.rig.machine.axis.begin_anew(self.unit)
         return good
-
-    def memory_MB(self):
-        """Resident."""
-        for line in pathlib.Path(f"/proc/{self.process.pid}/status").read_text().splitlines():
-            if line.startswith("VmRSS:"):
-                return int(line.split()[1]) / 1024
-        return 0.0
 
     def cpu_s(self):
         """Processor time used."""

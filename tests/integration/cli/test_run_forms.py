@@ -57,61 +57,16 @@ def with_time(rows, text):
     return [[text(row[0]), *row[1:]] for row in rows]
 
 
-def semicolons(rows):
-    return joined(UNITS, [[row[0], *map(comma, row[1:])] for row in rows], ";")
-
-
-def tabs(rows):
-    header = ["t in s", "T1 °C", "T2 / °C", "Drehzahl (rpm)", "z / µm"]
-    return joined(header, rows, "\t")
-
-
-def byte_order_mark(rows):
-    return joined(UNITS, rows, ",", "\r\n", "\ufeff")
-
-
-def iso(rows):
-    header = ["time", *UNITS[1:]]
-    return joined(header, with_time(rows, lambda s: moment(s).isoformat() + "Z"))
-
-
 def german_dates(rows):
     header = ["Zeit", *UNITS[1:]]
     own = with_time(rows, lambda s: moment(s).strftime("%d.%m.%Y %H:%M:%S"))
     return joined(header, [[row[0], *map(comma, row[1:])] for row in own], ";").encode("latin-1")
 
 
-def day_fractions(rows):
-    zero = datetime.datetime(1899, 12, 30)
-    own = with_time(rows, lambda s: f"{(moment(s) - zero) / datetime.timedelta(days=1):.9f}")
-    return joined(["date", *UNITS[1:]], own)
-
-
-def row_of_units(rows):
-    header = ["Zeit", "T1", "T2", "Drehzahl", "z"]
-    return joined(header, [["s", "°C", "°C", "1/min", "µm"], *rows], ";")
-
-
-def date_and_clock(rows):
-    header = ["Datum", "Uhrzeit", *UNITS[1:]]
-    own = [[moment(row[0]).strftime("%d.%m.%Y"), moment(row[0]).strftime("%H:%M:%S"), *row[1:]]
-           for row in rows]
-    return joined(header, own, ";")
-
-
 def minutes_and_kelvin(rows):
     header = ["t (min)", "T1 [°F]", "T2 [°C]", "Drehzahl [U/min]", "z [nm]"]
     return joined(header, [[row[0] / 60, row[1] * 1.8 + 32, row[2], row[3], row[4] * 1000]
                            for row in rows])
-
-
-def ends_of_lines(rows):
-    return joined(UNITS, rows, ";", "\n", "sep=;\n", ";") + ";;;;;\n"
-
-
-def quoted(rows):
-    header = [f'"{name}"' for name in UNITS]
-    return joined(header, [[f'"{comma(value)}"' for value in row] for row in rows], ",")
 
 
 def without_units(rows):
@@ -137,19 +92,10 @@ def named(header):
 # How rows are written, the map (None: the file says everything itself), and words of what was
 # understood. A name that is not ours is mapped, so that answers can be laid beside each other.
 FORMS = {
-    "semicolons": (semicolons, NAMED, ["separator ';', decimal comma", "T1 [°C]"]),
-    "tabs": (tabs, named(["T1 °C", "T2 / °C", "Drehzahl (rpm)", "z / µm"]), ["separator 'tab'"]),
-    "byte_order_mark": (byte_order_mark, NAMED, ["separator ','", "'z (µm)' is z_um"]),
-    "iso": (iso, NAMED, ["year-month-day", "2026-03-14 22:30:00"]),
     "german_dates": (german_dates, NAMED, ["day.month.year", "Latin-1"]),
-    "day_fractions": (day_fractions, NAMED, ["numbers [day], seconds after the first row (46095.9375)"]),
-    "row_of_units": (row_of_units, mapped(), ["'T1' is t1_degC"]),
-    "date_and_clock": (date_and_clock, NAMED, ["'Datum'", "'Uhrzeit'"]),
     "minutes_and_kelvin": (minutes_and_kelvin,
                            named(["T1 [°F]", "T2 [°C]", "Drehzahl [U/min]", "z [nm]"]),
                            ["min", "°F"]),
-    "ends_of_lines": (ends_of_lines, NAMED, ["separator ';'"]),
-    "quoted": (quoted, NAMED, ["decimal comma"]),
     "without_units": (without_units, mapped('time = "Zeit"', 'time_unit = "s"'),
                       ["'Drehzahl' is spindle_rpm"]),
 }
@@ -217,30 +163,8 @@ def slashes(rows):
     return joined(["Zeit", *UNITS[1:]], own)
 
 
-def thousands(rows):
-    return joined(UNITS, [[row[0], "20,125", "19,250", row[3], f"{row[4]:.0f}"] for row in rows],
-                  ";")
-
-
-def two_times(rows):
-    own = [[moment(row[0]).isoformat(), moment(row[0] + 9).isoformat(), *row[1:]] for row in rows]
-    return joined(["start", "end", *UNITS[1:]], own)
-
-
-def no_unit_of_time(rows):
-    return joined(["Zeit", *UNITS[1:]], rows)
-
-
-def no_unit(rows):
-    return joined(["Zeit in s", "T1", *UNITS[2:]], rows)
-
-
 @pytest.mark.parametrize("write, asked", [
-    (thousands, ['decimal = ","', 'thousands = ","']),
     (slashes, ['date_order = "day.month.year" or "month.day.year"']),
-    (two_times, ["time = "]),
-    (no_unit_of_time, ["time_unit = "]),
-    (no_unit, ['"T1" = ']),
 ], ids=lambda value: getattr(value, "__name__", ""))
 @pytest.mark.parametrize("command", ["fit", "diagnose"])
 def test_what_may_mean_two_things_is_asked_for(write, asked, command, tmp_path):

@@ -231,24 +231,6 @@ def test_an_open_circuit_shows_its_code_and_status_and_ends(simulate):
     assert ask(link, 3, read_request(2, 0, 1)) == bytes([2, 1, 0])
 
 
-def test_an_open_circuit_without_a_code_is_not_a_number(simulate):
-    link = simulate(MACHINE + event("open_circuit", "b")).connect("cabinet")
-    assert ask(link, 4, read_request(3, 0, 2))[2:] == bytes.fromhex("7fc00000")
-
-
-def test_a_spike_adds_to_one_channel_only(simulate):
-    link = simulate(MACHINE + event("spike", "a", "change_K = 8.0")).connect("cabinet")
-    assert room_of(link) == 2925
-    assert struct.unpack(">f", ask(link, 4, read_request(3, 0, 2))[2:])[0] == 21.25
-
-
-def test_a_drift_grows(simulate):
-    text = MACHINE + event("drift", "a", "rate_K_per_h = 3600.0")
-    link = simulate(text).connect("cabinet")
-    first = room_of(link)
-    eventually(lambda: room_of(link) > first + 20, "0.2 K more")
-
-
 def test_an_exception_is_the_one_in_the_script_and_only_of_its_device(simulate):
     code = random.Random(1).choice([4, 5, 6])
     link = simulate(MACHINE + event("exception", "module", f"code = {code}")).connect("cabinet")
@@ -355,23 +337,6 @@ def test_a_controller_that_was_off_has_forgotten_its_offset(simulate):
     assert applied(link) == 700
 
 
-def test_a_controller_rejects_misapplies_and_loses_its_offset_by_the_script(simulate):
-    link = simulate(MACHINE + event("reject", "cnc")).connect("cnc")
-    write_offset(link, 500)
-    assert applied(link) == 0
-    link = simulate(MACHINE + event("misapply", "cnc", "change_um = 2.5")).connect("cnc")
-    write_offset(link, 500)
-    assert applied(link) == 750
-    simulator = simulate(MACHINE + event("rehome", "cnc", at_s=0.2), STANDING)
-    link = simulator.connect("cnc")
-    write_offset(link, 500)
-    assert applied(link) == 500
-    begin(simulator)
-    eventually(lambda: applied(link) == 0, "the axes were homed")
-    time.sleep(0.1)
-    assert applied(link) == 0
-
-
 def test_junk_and_vanishing_clients_disturb_nobody(simulate):
     simulator = simulate(MACHINE)
     good = simulator.connect("cabinet")
@@ -413,14 +378,6 @@ def test_a_client_that_never_reads_is_put_out(simulate):
         for _ in range(2000):
             greedy.sendall(request(3, read_request(4, 0, 9)) * 1000)
     assert room_of(simulator.connect("cabinet")) == 2125
-
-
-def test_a_request_in_pieces_is_one_request(simulate):
-    link = simulate(MACHINE).connect("cabinet")
-    for byte in request(3, read_request(4, 0, 1), 77):
-        link.sendall(bytes([byte]))
-        time.sleep(0.01)
-    assert answer(link)[0] == 77
 
 
 def test_a_slow_line_takes_the_time_of_its_bytes(simulate):

@@ -9,7 +9,6 @@ import re
 import socket
 import sqlite3
 import subprocess
-import time
 
 from lab import eventually
 from plain_devices import PlainController, PlainModule
@@ -257,15 +256,6 @@ def stop_and_forget():
 def start(mode="compensating"):
     run("systemctl", "start", UNIT)
     return wait_for_mode(mode)
-
-
-def committed_rows():
-    base = sqlite3.connect(HISTORY)
-    try:
-        assert base.execute("PRAGMA integrity_check").fetchone() == ("ok",)
-        return base.execute("SELECT sum(count) FROM chunk").fetchone()[0] or 0
-    finally:
-        base.close()
 
 
 def committed_chunks():

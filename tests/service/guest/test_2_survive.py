@@ -74,29 +74,6 @@ def test_a_restart_on_the_way_goes_on_from_where_the_axis_is(running):
     running.settled_at(9.0)
 
 
-def test_kill_9_loses_nothing_that_was_committed(running):
-    reference = [each["reference_degC"] for each in service.status()["inputs"]]
-    restarts, orders = service.restarts(), running.count()
-    rows = []
-    for _ in range(3):
-        rows.append(service.committed_rows())
-        os.kill(service.main_pid(), signal.SIGKILL)
-        eventually(lambda: service.restarts() == restarts + len(rows) and service.active(),
-                   "started again")
-        running.warm_by(6.0)  # cooler: to take this for straight would be wrong
-        service.wait_for_mode("compensating")
-        assert service.committed_rows() >= rows[-1]
-        assert [each["reference_degC"] for each in service.status()["inputs"]] == reference
-        running.settled_at(9.0)
-    service.assert_slewed(running.orders_since(orders))
-    print(f"committed rows at the kills {rows}, at the end {service.committed_rows()}; "
-          f"largest step {service.largest_step_um(running.orders_since(orders)):.3f} um")
-    out = service.FILES / "out.csv"
-    said = run("thermocomp", "replay", service.HISTORY, "-o", out).stderr
-    print(said.strip())
-    assert ", 0 differ" in said
-
-
 def test_kill_9_leaves_the_operators_switch_as_it_was(running):
     run("thermocomp", "disable")
     os.kill(service.main_pid(), signal.SIGKILL)
@@ -105,31 +82,6 @@ def test_kill_9_leaves_the_operators_switch_as_it_was(running):
     service.wait_for_mode("disabled")
     run("thermocomp", "enable")
     running.settled_at(9.0)
-
-
-def test_reload_takes_over_without_a_jump_and_a_bad_file_changes_nothing(running):
-    pid, orders = service.main_pid(), running.count()
-    service.write_config(running.config().replace("offset_um_max = 60.0", "offset_um_max = 5.0"))
-    run("systemctl", "reload", UNIT)
-    service.wait_for_offset(5.0)
-    service.CONFIG.write_text("broken = ")
-    run("systemctl", "reload", UNIT)
-    eventually(lambda: "reload refused" in service.journal(), "the refusal is logged")
-    assert service.active()
-    service.write_config(running.config())
-    run("systemctl", "reload", UNIT)
-    running.settled_at(9.0)
-    assert service.main_pid() == pid
-    service.assert_slewed(running.orders_since(orders))
-
-
-def test_a_stop_holds(running):
-    orders = running.count()
-    run("systemctl", "stop", UNIT)
-    assert show("Result") == "success"
-    time.sleep(0.3)
-    assert running.controller.applied_um() == pytest.approx(9.0, abs=0.01)
-    assert stayed_at(running.orders_since(orders) or [(0, 9.0)], 9.0)
 
 
 def test_a_stop_ramps_to_zero_where_that_is_configured(running):

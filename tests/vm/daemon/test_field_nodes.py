@@ -114,25 +114,21 @@ rate_um_per_s_max = 100.0
 """
 
 
-def event_text(table, kind, channel=None):
-    numbered = f"channel = {channel}\n" if channel else ""
-    return f'[[{table}.event]]\nkind = "{kind}"\n' + numbered
-
-
-def canopen_machine(*event):
+def canopen_machine():
     return ('format = 1\n[[canopen_node]]\nname = "cantrans"\ninterface = "vcan0"\nnode = 5\n'
             'cob_id = 0x195\nperiod_s = 0.05\n'
             '[[canopen_node.channel]]\ncolumn = "front_degC"\n'
-            '[[canopen_node.channel]]\ncolumn = "back_degC"\n' +
-            (event_text("canopen_node", *event) if event else ""))
+            '[[canopen_node.channel]]\ncolumn = "back_degC"\n')
 
 
-def j1939_machine(*event, address=0x80):
+def j1939_machine(open_circuit=None, address=0x80):
+    """`open_circuit`: the channel that shows the error code."""
     return ('format = 1\n[[j1939_node]]\nname = "axtc"\ninterface = "vcan1"\n'
             f'address = {address}\nj1939_name = {NAME}\n'
             '[[j1939_node.channel]]\ncolumn = "front_degC"\npgn = 0xFF10\nstart_byte = 3\n'
             '[[j1939_node.channel]]\ncolumn = "back_degC"\npgn = 0xFF11\nstart_byte = 21\n' +
-            (event_text("j1939_node", *event) if event else ""))
+            (f'[[j1939_node.event]]\nkind = "open_circuit"\nchannel = {open_circuit}\n'
+             if open_circuit else ""))
 
 
 class Watch:
@@ -224,11 +220,6 @@ def nodes(tmp_path_factory):
         lab.end()
 
 
-def heal(nodes, name):
-    nodes.again(name, canopen_machine() if name == "canopen" else j1939_machine())
-    nodes.become(CANOPEN if name == "canopen" else J1939, "none", f"{name} is well again")
-
-
 def test_a_rebooted_node_is_set_up_again(nodes):
     before = nodes.unit("modules")["requests"]
     nodes.switch_off("canopen")
@@ -237,30 +228,6 @@ def test_a_rebooted_node_is_set_up_again(nodes):
     nodes.switch_on("canopen", canopen_machine())
     nodes.become(CANOPEN, "none", "it is read again")
     assert nodes.unit("modules")["requests"] > before
-
-
-@pytest.mark.parametrize("kind, channel, sensors", [("open_circuit", 1, ("front",)),
-                                                    ("short_circuit", 2, ("back", "polled"))])
-def test_emergency_messages_become_the_fault_of_their_channel(nodes, kind, channel, sensors):
-    nodes.again("canopen", canopen_machine(kind, channel))
-    nodes.become(sensors, kind, kind)
-    nodes.become([name for name in CANOPEN if name not in sensors], "none", "the others are well")
-    nodes.says("modules", "emergency 0x5030 device hardware")
-    heal(nodes, "canopen")
-
-
-def test_a_lost_heartbeat_is_a_lost_node(nodes):
-    nodes.again("canopen", canopen_machine("heartbeat_loss"))
-    nodes.says("modules", "no heartbeat")
-    nodes.become(CANOPEN, "no_answer", "its frames alone are not enough")
-    heal(nodes, "canopen")
-
-
-def test_an_sdo_abort_is_told_by_name(nodes):
-    nodes.again("canopen", canopen_machine("sdo_abort"))
-    nodes.become(CANOPEN, "device_error", "not set up: no temperature")
-    nodes.says("modules", "0x08000000 general error")
-    heal(nodes, "canopen")
 
 
 def test_a_second_node_of_the_same_number_is_noticed(nodes):
@@ -272,10 +239,11 @@ def test_a_second_node_of_the_same_number_is_noticed(nodes):
 
 
 def test_j1939_error_code_silence_and_another_address(nodes):
-    nodes.again("j1939", j1939_machine("open_circuit", 1))
+    nodes.again("j1939", j1939_machine(open_circuit=1))
     nodes.become(("single",), "open_circuit", "the standard's error code")
     nodes.become(("packets",), "none", "the other channel is well")
-    heal(nodes, "j1939")  # a fault that is not renewed stays that fault
+    nodes.again("j1939", j1939_machine())  # a fault that is not renewed stays that fault
+    nodes.become(J1939, "none", "it is well again")
     nodes.switch_off("j1939")
     nodes.become(J1939, "stale", "nothing is renewed")
     nodes.switch_on("j1939", j1939_machine(address=0x90))

@@ -80,12 +80,6 @@ def test_disabling_and_enabling_ramp_at_the_slew_rate(machine, lab):
     assert falls_at_the_slew_rate(times_s, offsets_um, 12.0, 0.0)
 
 
-def test_status_of_no_daemon_is_unreachable(machine):
-    status, _, said = machine.daemon.cli("status")
-    assert status == 2 and len(said.strip().splitlines()) == 1
-    assert str(machine.daemon.socket) in said
-
-
 def test_a_broken_configuration_is_not_taken_over(machine):
     daemon = machine.start()
     machine.warm_by(5.0)
@@ -101,15 +95,6 @@ def test_a_broken_configuration_is_not_taken_over(machine):
     assert daemon.status()["mode"] == "compensating"
     machine.warm_by(7.0)
     daemon.wait_for_offset(7.0, 0.05)
-
-
-def test_a_broken_model_is_not_taken_over(machine):
-    daemon = machine.start()
-    machine.model.write_text(MODEL.replace("[[3.0, -1.5]]", "[[3.0]]"))
-    line = 1 + MODEL.splitlines().index("matrix_um_per_K = [[3.0, -1.5]]")
-    status, _, said = daemon.cli("reload")
-    assert status == 1 and f"model.toml:{line}: " in said, said
-    assert daemon.status()["mode"] == "compensating"
 
 
 def test_another_bus_needs_a_restart_and_is_said_so(machine):
@@ -166,19 +151,6 @@ def test_the_switch_at_the_controller_works_without_a_terminal(machine):
     assert_slewed(machine.controller.orders())
 
 
-def test_proving_moves_one_axis_out_and_back(machine, lab):
-    daemon = machine.start()
-    status, out, said = daemon.cli("prove", "z", "4")
-    assert status == 0 and "axis z: moved and came back" in out, (out, said)
-    eventually(lambda: machine.controller.applied_um() == 0.0, "it came back")
-    assert max(offset_um for _, offset_um in machine.controller.orders()) == 4.0
-    assert daemon.cli("prove", "z", "11")[0] == 1
-    assert daemon.cli("prove", "nosuch", "1")[0] in (1, 2)
-    times_s, offsets_um = recorded(machine, lab)
-    assert_slewed_exactly(times_s, offsets_um)
-    assert max(offsets_um) == 4.0
-
-
 def test_only_a_latched_axis_is_released(machine, lab):
     daemon = machine.start()
     status, _, said = daemon.cli("release", "z")
@@ -206,18 +178,6 @@ def test_only_a_latched_axis_is_released(machine, lab):
     eventually(lambda: daemon.axis()["driven"] and daemon.axis()["mismatch"] is None, "driven again")
     machine.warm_by(3.0)
     daemon.wait_for_offset(3.0, 0.05)
-    recorded(machine, lab)
-
-
-def test_measured_and_cycle_end_are_noted(machine, lab):
-    daemon = machine.start()
-    status, out, _ = daemon.cli("measured", "z", "3.25")
-    assert status == 0 and "3.25" in out
-    assert daemon.axis()["measured"] == 3.25
-    assert daemon.cli("cycle-end")[0] == 0
-    assert daemon.status()["cycle_ends"] == 1
-    with pytest.raises(Refused, match="nosuch"):
-        daemon.call("measured", axis="nosuch", value_um=1.0)
     recorded(machine, lab)
 
 
