@@ -42,8 +42,6 @@ part "faults at 100 Hz" \
 part "attacks" "$python" tests/attack/attack.py --bin "$bin" --seed "$SEED" --jobs 4 --minutes 45
 part "attacks on CAN" tests/vm/run_with_can.sh --timeout 1500 env TMPDIR=/dev/shm \
   "$python" tests/attack/attack.py --bin "$bin" --seed "$SEED" --links can,can_travel --minutes 15
-part "attacks on LinuxCNC" tests/attack/run_linuxcnc.sh \
-  "$python" tests/attack/attack.py --bin "$bin" --seed "$SEED"
 for benchmark in $(bench/run.sh); do
   part "bench $benchmark" bench/run.sh "$benchmark"
 done

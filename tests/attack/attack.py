@@ -25,7 +25,6 @@ import traceback
 
 import attacks_daemon  # noqa: F401
 import attacks_link  # noqa: F401
-import attacks_linuxcnc  # noqa: F401
 import attacks_read_back  # noqa: F401
 import attacks_sensors  # noqa: F401
 import rig as rig_module
@@ -41,11 +40,7 @@ def run_one(name, link, seed, programs, keep):
     """In a process of its own: one try, its result as the last line."""
     attack = ALL[name]
     result = None
-    if link == "linuxcnc":
-        from linuxcnc_rig import LinuxCncRig as Rig
-    else:
-        from rig import Rig
-    rig = Rig(programs, link, seed, **attack.choices)
+    rig = rig_module.Rig(programs, link, seed, **attack.choices)
     try:
         try:
             attack.run(rig)

@@ -48,29 +48,6 @@ def test_help_succeeds_and_bad_use_is_status_2():
         assert said in answer.stderr, (arguments, answer.stderr)
 
 
-@pytest.mark.parametrize("name", ["small_machine", "modbus_tcp", "modbus_rtu", "can"])
-def test_every_example_checks(name):
-    answer = run("check", EXAMPLES / f"{name}.toml")
-    assert answer.returncode == 0, answer.stderr
-    assert "OK" in answer.stdout and "SHA-256" in answer.stdout
-    # An example is of no machine, and its first start moves nothing.
-    assert "\ncompared: NEVER, as far as the model file says" in answer.stdout
-    assert "\nfirst start: switched off until `thermocomp enable`\n" in answer.stdout
-
-
-@pytest.mark.parametrize("name", ["small_machine", "modbus_tcp", "can", "piezo"])
-def test_every_controller_can_be_run_dry(name, tmp_path):
-    for model in EXAMPLES.glob("*model*.toml"):
-        shutil.copy(model, tmp_path)
-    text = (EXAMPLES / f"{name}.toml").read_text()
-    lines = [line for line in text.splitlines() if not line.startswith("dry_run")]
-    lines.insert(lines.index("[controller]") + 1, "dry_run = true")
-    (tmp_path / "dry.toml").write_text("\n".join(lines) + "\n")
-    answer = run("check", "dry.toml", cwd=tmp_path)
-    assert answer.returncode == 0, answer.stderr
-    assert "DRY RUN: nothing is written to it" in answer.stdout
-
-
 def test_check_says_when_a_first_start_compensates_at_once(tmp_path):
     for model in EXAMPLES.glob("*model*.toml"):
         shutil.copy(model, tmp_path)

@@ -119,11 +119,11 @@ def axis_text(bus, i, more=""):
             f"offset = {bus.offset(i)}\napplied = {bus.applied(i)}\n")
 
 
-def machine_text(bus, events=""):
+def machine_text(bus):
     channels = (f'[[channel]]\nname = "t{i + 1}"\ndevice = "module"\n{bus.place(i)}\n'
                 for i in range(SENSORS))
     return ("format = 1\n" + bus.machine + "".join(axis_text(bus, i) for i in range(AXES)) +
-            "".join(channels) + events)
+            "".join(channels))
 
 
 NO_SMOOTHING = 'form = "off"\nperiod_s = 0.0\n'

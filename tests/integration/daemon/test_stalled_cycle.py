@@ -2,7 +2,6 @@
 is what holds, now and after a restart."""
 
 import json
-import socket
 import threading
 import time
 
@@ -78,33 +77,6 @@ def test_a_disable_after_a_late_reload_survives_a_restart(machine, stall):
     daemon.wait_for_mode("disabled")
 
 
-def test_a_command_that_is_not_taken_in_time_never_happens(machine, stall):
-    daemon = machine.start()
-    machine.warm_by(6.0)
-    daemon.wait_for_offset(6.0, 0.05)
-    with stall:
-        said = asked(daemon, "disable")
-        assert "does not answer" in said and "withdrawn" in said, said
-    time.sleep(0.5)
-    assert daemon.status()["mode"] == "compensating" and saved(daemon)["enabled"] is True
-    daemon.wait_for_offset(6.0, 0.05)
-    daemon.kill()
-    daemon.start()
-    daemon.wait_for_mode("compensating")
-
-
-def test_a_command_that_is_taken_late_but_in_time_is_done(machine, stall):
-    daemon = machine.start()
-    answers = []
-    with stall:
-        waiting = threading.Thread(target=lambda: answers.append(asked(daemon, "disable")))
-        waiting.start()
-        time.sleep(1.0)
-        assert answers == []
-    waiting.join(10)
-    assert answers == [{"done": True}] and saved(daemon)["enabled"] is False
-
-
 def test_others_are_answered_while_somebody_waits_and_a_second_reload_is_refused(machine, stall):
     daemon = machine.start()
     answers = []
@@ -125,15 +97,3 @@ def test_others_are_answered_while_somebody_waits_and_a_second_reload_is_refused
         waiting.join(10)
     assert len(answers) == 1 and "withdrawn" in answers[0]
     assert asked(daemon, "reload")["done"] is True
-
-
-def test_a_client_that_goes_away_leaves_its_command_to_be_done_and_saved(machine, stall):
-    daemon = machine.start()
-    with stall:
-        with socket.socket(socket.AF_UNIX) as link:
-            link.connect(str(daemon.socket))
-            link.sendall(b'{"jsonrpc":"2.0","id":1,"method":"disable"}\n')
-            time.sleep(0.3)
-    daemon.wait_for_mode("disabled")
-    eventually(lambda: saved(daemon)["enabled"] is False, "it is on disk")
-    daemon.end()

@@ -55,14 +55,6 @@ def test_the_same_history_is_refused(machine, other, lab):
     assert_replays_exactly(daemon.history, lab.folder / "out.csv")
 
 
-def test_the_same_history_by_another_path_is_refused(machine, other):
-    daemon = machine.start()
-    link = other.daemon.folder / "elsewhere"
-    link.symlink_to(daemon.folder)
-    change(other, (other.daemon.history, link / daemon.history.name))
-    assert_refused(other.daemon, daemon)
-
-
 def test_the_same_state_file_is_refused(machine, other):
     daemon = machine.start()
     change(other, (other.daemon.state, daemon.state))
@@ -76,13 +68,6 @@ def test_the_same_controller_is_refused(machine, other):
     seen = len(machine.controller.orders())
     assert_refused(other.daemon, daemon, "controller", str(machine.controller.port))
     assert len(machine.controller.orders()) >= seen
-
-
-def test_another_unit_behind_the_same_address_is_another_controller(machine, other):
-    machine.start()
-    change(other, (f"port = {other.controller.port}\nunit = 1",
-                   f"port = {machine.controller.port}\nunit = 2"))
-    other.daemon.start()
 
 
 def test_after_an_end_or_a_kill_the_next_may_have_it(machine, other):

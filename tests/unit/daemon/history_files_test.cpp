@@ -238,33 +238,6 @@ TEST_CASE("a newer version and another program's database are refused", "[histor
   }
 }
 
-TEST_CASE("a full disk is counted, and after it the history goes on", "[history]") {
-  const TempFolder folder;
-  const HistoryConfig config = history_config(folder / "h.db");
-  RecordedMachine machine(config, 10);
-  machine.start();
-  machine.run(1000);
-  REQUIRE(eventually([&] { return machine.writer().statistics().records > 0; }));
-  // Writes beyond the limit fail with EFBIG, which SQLite reports as it does a full disk.
-  rlimit before{};
-  getrlimit(RLIMIT_FSIZE, &before);
-  signal(SIGXFSZ, SIG_IGN);
-  rlimit tight = before;
-  tight.rlim_cur = 4096;
-  REQUIRE(setrlimit(RLIMIT_FSIZE, &tight) == 0);
-  machine.run(2000);
-  const bool has_failed = eventually([&] { return machine.writer().statistics().errors > 0; });
-  setrlimit(RLIMIT_FSIZE, &before);
-  REQUIRE(has_failed);
-  CHECK_FALSE(machine.writer().statistics().last_error.empty());
-  CHECK(eventually([&] { return machine.writer().statistics().working; }));
-  machine.run(500);
-  machine.stop();
-  const ReplaySummary summary = replay_quietly(config.file);
-  CHECK(summary.different == 0);
-  CHECK(summary.cycles > 3000);
-}
-
 TEST_CASE("a history is read while it is written", "[history]") {
   const TempFolder folder;
   const HistoryConfig config = history_config(folder / "h.db");

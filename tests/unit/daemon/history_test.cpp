@@ -205,45 +205,6 @@ TEST_CASE("a ring that overflows leaves a gap and a replay that still agrees", "
   CHECK(summary.different == 0);
 }
 
-TEST_CASE("what was committed before kill -9 is read and replayed whole", "[history][crash]") {
-  const unsigned seed = GENERATE(range(0u, 8u));
-  const TempFolder folder;
-  const HistoryConfig config = history_config(folder / "h.db");
-  const pid_t child = fork();
-  REQUIRE(child >= 0);
-  if (child == 0) {
-    RecordedMachine machine(config, seed);
-    machine.start();
-    for (;;) {
-      machine.run(100);
-      std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    }
-  }
-  std::this_thread::sleep_for(std::chrono::milliseconds(400 + 37 * seed));
-  const bool was_started = eventually([&] {
-    try {
-      const HistoryReader reader(config.file);
-      return !reader.segments().empty();
-    } catch (const HistoryError&) {
-      return false;  // not there, or not begun
-    }
-  });
-  kill(child, SIGKILL);
-  waitpid(child, nullptr, 0);
-  REQUIRE(was_started);
-  const ReplaySummary before = replay_quietly(config.file);
-  CHECK(before.different == 0);
-
-  RecordedMachine machine(config, seed + 100);
-  machine.start();
-  machine.run(500);
-  machine.stop();
-  const ReplaySummary after = replay_quietly(config.file);
-  CHECK(after.segments == before.segments + 1);
-  CHECK(after.compared > before.compared);
-  CHECK(after.different == 0);
-}
-
 TEST_CASE("the file keeps to its size by losing the oldest segments", "[history]") {
   const TempFolder folder;
   HistoryConfig config = history_config(folder / "h.db");

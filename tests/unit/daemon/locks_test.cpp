@@ -175,29 +175,6 @@ TEST_CASE("of two that begin at the same moment exactly one gets the name", "[lo
   }
 }
 
-TEST_CASE("another user's process that takes the name keeps nobody out", "[locks]") {
-  if (geteuid() != 0) return;  // only root can be another user
-  const std::string name = own_name();
-  constexpr uid_t nobody = 65534;
-  const auto take = [](const std::string& text) {
-    sockaddr_un address{};
-    address.sun_family = AF_UNIX;
-    text.copy(address.sun_path + 1, sizeof address.sun_path - 1);
-    const int fd = socket(AF_UNIX, SOCK_STREAM, 0);
-    const auto length = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + text.size());
-    if (bind(fd, reinterpret_cast<const sockaddr*>(&address), length) != 0 || listen(fd, 8) != 0)
-      _exit(1);
-  };
-  Child foreign([&] {
-    if (setgid(nobody) != 0 || setuid(nobody) != 0) _exit(1);
-    take("thermocomp/" + name);
-    for (const char* end : {"/0000000000000000", "/ffffffffffffffff", "/x", "/"})
-      take("thermocomp/" + name + end);
-  });
-  const NameLock lock(name);
-  CHECK(refusal([&] { NameLock second(name); }).find(this_process()) != std::string::npos);
-}
-
 TEST_CASE("the lock of a file is not for those who may only read it", "[locks]") {
   const TempFolder folder;
   std::ofstream(folder / "state.json.lock") << "of an earlier version";

@@ -207,22 +207,6 @@ TEST_CASE("growth with the squared speed is named, with its size and its gain", 
   CHECK_NOTHROW(parse_model(write_model(answer.extended), "extended"));
 }
 
-TEST_CASE("play of the joint is named with the width of its dead band", "[diagnosis]") {
-  // A hidden state of its own: the play of 5 T with a width of 6 um.
-  double state = 0.0;
-  const auto hidden = [&state](double, double rise_K, int row) {
-    if (row == 0) state = 5.0 * rise_K;
-    state = std::min(std::max(state, 5.0 * rise_K - 3.0), 5.0 * rise_K + 3.0);
-    return state - 5.0 * rise_K;
-  };
-  const Diagnosis answer = diagnosis_of(hidden);
-  REQUIRE_FALSE(answer.findings.empty());
-  CHECK(answer.findings[0].cause == "hysteresis");
-  const Parameter& width = answer.findings[0].parameters.front();
-  // With one input, play of the output and of the temperature are the same.
-  CHECK(width.values.at("") * (width.name == "width_K" ? 5.0 : 1.0) == Approx(6.0).epsilon(0.05));
-}
-
 TEST_CASE("a cycle that is probed rarely has an interval that holds the periods it may have",
           "[diagnosis]") {
   const double period_s = 1500.0;

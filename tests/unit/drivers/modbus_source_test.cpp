@@ -174,28 +174,6 @@ TEST_CASE("a busy or failing device is a fault, and a value again afterwards", "
   CHECK(running.becomes(0, 1000.0));
 }
 
-TEST_CASE("garbage is a bad frame, and a value again afterwards", "[source]") {
-  peer::TcpDevice tcp;
-  peer::SerialLine serial;
-  const bool rtu = GENERATE(false, true);
-  CAPTURE(rtu);
-  ModbusBusConfig bus = rtu ? rtu_bus(serial.device()) : tcp_bus(tcp.port());
-  bus.devices = {device_of(1, 0, {0})};
-  Running running(bus);
-  REQUIRE(running.becomes(0, 1000.0));
-  const auto garbage = [](const peer::Request&) {
-    peer::Reply reply;
-    reply.raw = {1, 4, 2, 0x11, 0x22, 0x33, 0x44, 0x55, 0x66, 0x77, 0x88, 0x99, 0xAA};
-    return reply;
-  };
-  tcp.handle(garbage);
-  serial.handle(garbage);
-  CHECK(running.becomes(0, Fault::bad_frame));
-  tcp.handle(peer::honest);
-  serial.handle(peer::honest);
-  CHECK(running.becomes(0, 1000.0));
-}
-
 TEST_CASE("a dead unit has no answer, the others go on, and it comes back", "[source]") {
   std::atomic<bool> dead{true};
   peer::SerialLine line([&dead](const peer::Request& request) {
@@ -218,53 +196,6 @@ TEST_CASE("a dead unit has no answer, the others go on, and it comes back", "[so
   CHECK(running.becomes(1, 2000.0));
 }
 
-namespace {
-
-/// Eight seconds of readings beside a unit that answers everything after its time-out; all requests
-/// have the same shape.
-struct LateReadings {
-  std::uint64_t wrong{0};
-  bool others_go_on{false};
-};
-
-LateReadings read_late_unit(std::chrono::milliseconds lateness) {
-  peer::SerialLine line([lateness](const peer::Request& request) {
-    peer::Reply reply = peer::honest(request);
-    if (request.unit == 1) reply.delay = lateness;
-    return reply;
-  });
-  ModbusBusConfig bus = rtu_bus(line.device());
-  bus.devices = {device_of(1, 0, {0, 100, 200, 300}), device_of(2, 4, {0, 100, 200, 300})};
-  bus.line.backoff_s_max = 0.5;  // as often as possible
-  Running running(bus);
-  const std::array<double, 8> right{1000, 1100, 1200, 1300, 2000, 2100, 2200, 2300};
-  const auto end = peer::steady_clock::now() + 8s;
-  LateReadings seen;
-  while (peer::steady_clock::now() < end) {
-    running.source.newest(running.all);
-    for (std::size_t i = 0; i < right.size(); ++i) {
-      const Reading& reading = running.all[i];
-      if (reading.fault == Fault::none && reading.temp_degC != right[i]) ++seen.wrong;
-    }
-    std::this_thread::sleep_for(1ms);
-  }
-  seen.others_go_on = running.becomes(4, 2000.0);
-  return seen;
-}
-
-}  // namespace
-
-TEST_CASE("late answers never land in another channel", "[source][late]") {
-  std::vector<std::future<LateReadings>> lines;
-  for (const auto lateness : {80ms, 700ms, 1500ms})
-    lines.push_back(std::async(std::launch::async, read_late_unit, lateness));
-  for (auto& line : lines) {
-    const LateReadings seen = line.get();
-    CHECK(seen.wrong == 0);
-    CHECK(seen.others_go_on);
-  }
-}
-
 TEST_CASE("a register range that is never answered leaves the rest readable", "[source]") {
   peer::TcpDevice device([](const peer::Request& request) {
     return request.address == 100 ? peer::Reply{} : peer::honest(request);
@@ -278,21 +209,6 @@ TEST_CASE("a register range that is never answered leaves the rest readable", "[
   CHECK(running.becomes(2, 1200.0));
   const auto seen = running.all[2].taken_at;
   CHECK(peer::eventually([&] { return running.reading(2).taken_at > seen; }));
-}
-
-TEST_CASE("a server that goes away and returns is read again", "[source][reconnect]") {
-  auto device = std::make_unique<peer::TcpDevice>();
-  const int port = device->port();
-  ModbusBusConfig bus = tcp_bus(port);
-  bus.devices = {device_of(1, 0, {0})};
-  Running running(bus);
-  REQUIRE(running.becomes(0, 1000.0));
-  device.reset();
-  REQUIRE(running.becomes(0, Fault::no_answer));
-  CHECK_FALSE(running.source.health().connected);
-  device = std::make_unique<peer::TcpDevice>(peer::honest, port);
-  CHECK(running.becomes(0, 1000.0));
-  CHECK(running.source.health().connects >= 2);
 }
 
 TEST_CASE("a server that closes idle connections costs no reading", "[source][reconnect]") {
@@ -316,25 +232,6 @@ TEST_CASE("a server that closes idle connections costs no reading", "[source][re
   }();
   CHECK_FALSE(faulty);
   CHECK(device.connections() > 2);
-}
-
-TEST_CASE("a device that reboots is read again", "[source][reconnect]") {
-  std::atomic<bool> booting{false};
-  const auto handler = [&booting](const peer::Request& request) {
-    return booting ? peer::Reply{} : peer::honest(request);
-  };
-  peer::TcpDevice tcp(handler);
-  peer::SerialLine serial(handler);
-  const bool rtu = GENERATE(false, true);
-  CAPTURE(rtu);
-  ModbusBusConfig bus = rtu ? rtu_bus(serial.device()) : tcp_bus(tcp.port());
-  bus.devices = {device_of(1, 0, {0})};
-  Running running(bus);
-  REQUIRE(running.becomes(0, 1000.0));
-  booting = true;
-  REQUIRE(running.becomes(0, Fault::no_answer));
-  booting = false;
-  CHECK(running.becomes(0, 1000.0));
 }
 
 TEST_CASE("a serial port that vanishes and returns is read again", "[source][reconnect]") {

@@ -10,19 +10,6 @@ namespace {
 
 constexpr double step_s = 20.0;
 
-TEST_CASE("beam formulas are what finite elements of the gate machine say", "[tiebar][fe]") {
-  const double tie_mm = GENERATE(250.0, 400.0, 600.0, 900.0);
-  const bench::GateStructure gate(tie_mm, step_s);
-  const auto& m = gate.machine();
-  CHECK(m.tie_height_mm == Approx(tie_mm));
-  const auto beam = identification::tie_coefficients(m);
-  const auto fe = gate.coefficients();
-  const double free_um_per_K = 1000 * 3 * m.column_expansion_per_K * m.working_height_mm *
-                               m.working_height_mm / (8 * m.column_width_mm);
-  CHECK(std::abs(fe.ki_um_per_K - beam.ki_um_per_K) < 0.03 * free_um_per_K);
-  CHECK(fe.kc_um_per_K == Approx(beam.kc_um_per_K).epsilon(0.02));
-}
-
 TEST_CASE("warm oil first brings tool and work closer, then the tie parts them", "[tiebar][fe]") {
   bench::GateStructure gate(250.0, step_s);
   double early_um = 0.0;

@@ -9,8 +9,6 @@
 #include "config/toml/toml_reader.hpp"
 #include "estimator/checks.hpp"
 #include "modelling/identification/printed.hpp"
-#include "modelling/structure/heat_model.hpp"
-#include "modelling/structure/solve/locate.hpp"
 #include "modelling/structure/solve/statics.hpp"
 #include "modelling/structure/structure_model.hpp"
 
@@ -70,9 +68,6 @@ std::string text_of_tie(const std::string& name, const FiniteTie& tie) {
         "[[joint]]\nname = \"%s_on_%s\"\nfrom = { part = \"%s\", x_mm = [%s, %s] }\n"
         "to = { part = \"%s\", x_mm = [%s, %s] }\nconductance_W_per_m2_K = 10000.0\n",
         name.c_str(), column, name.c_str(), x, x, column, x, x);
-  for (const char* air : {"8.4", "3.6\nto = \"coolant\""})
-    text += identification::printed(
-        "[[convection]]\non = { part = \"%s\" }\ncoefficient_W_per_m2_K = %s\n", name.c_str(), air);
   return text;
 }
 
@@ -123,7 +118,7 @@ void refine(StructureSpec& spec, std::size_t ties) {
   }
 }
 
-StructureSpec spec_of(const std::vector<FiniteTie>& ties, Elements elements) {
+StructureSpec spec_of(const std::vector<FiniteTie>& ties) {
   std::string text = read_text_file(THERMOCOMP_GATE_STRUCTURE);
   replace(text, "from_mm = [80, 24, 243.75]   # 150 mm^2, its middle 250 mm above the ground\n",
           "");
@@ -138,7 +133,7 @@ StructureSpec spec_of(const std::vector<FiniteTie>& ties, Elements elements) {
     }
   std::erase_if(spec.sensors,
                 [](const SensorSpec& sensor) { return sensor.name.starts_with("tie_"); });
-  if (elements == Elements::refined) refine(spec, ties.size());
+  refine(spec, ties.size());
   return spec;
 }
 
@@ -168,15 +163,10 @@ identification::TiedColumns beams_of(const StructureSpec& spec,
 }  // namespace
 
 struct TiedStructure::Parts {
-  Parts(const std::vector<FiniteTie>& ties, double each_step_s, Elements elements)
-      : spec(spec_of(ties, elements)),
+  explicit Parts(const std::vector<FiniteTie>& ties)
+      : spec(spec_of(ties)),
         beams(beams_of(spec, ties)),
-        structure(build_structure(spec, [](std::string_view) {})),
-        heat(build_heat_model(spec, structure)),
-        empty(structure.mesh, structure.material_of_part, heat.reduction, heat.dry),
-        filled(structure.mesh, structure.material_of_part, heat.reduction, heat.flooded),
-        step_s(each_step_s),
-        rise_K(structure.mesh.nodes_m.size(), 0.0) {
+        structure(build_structure(spec, [](std::string_view) {})) {
     const Statics statics(structure.mesh, structure.material_of_part, structure.reduction,
                           structure.springs);
     sensitivity_m_per_K = statics.sensitivities(structure.rows).front();
@@ -202,31 +192,15 @@ struct TiedStructure::Parts {
     }
     return field;
   }
-  [[nodiscard]] double at_sensor_K(std::size_t index) const {
-    const PlaceSpec& place = spec.sensors[index].place;
-    const auto found =
-        locate_in_part(structure.mesh, place.part, place.at_m.front(), place.tolerance_m);
-    THERMOCOMP_ENSURE(found.has_value());
-    double sum_K = 0.0;
-    for (const Weighted& node : found->nodes) sum_K += node.weight * rise_K[node.node];
-    return sum_K;
-  }
 
   StructureSpec spec;
   identification::TiedColumns beams;
   Structure structure;
-  HeatModel heat;
-  Conduction empty;  ///< the tank
-  Conduction filled;
-  double step_s;
-  std::vector<double> rise_K;
   std::vector<double> sensitivity_m_per_K;
-  std::unique_ptr<TransientConduction> course;
-  bool oil_was_in{false};
 };
 
-TiedStructure::TiedStructure(const std::vector<FiniteTie>& ties, double step_s, Elements elements)
-    : parts_(std::make_unique<Parts>(ties, step_s, elements)) {}
+TiedStructure::TiedStructure(const std::vector<FiniteTie>& ties)
+    : parts_(std::make_unique<Parts>(ties)) {}
 TiedStructure::~TiedStructure() = default;
 
 const identification::TiedColumns& TiedStructure::columns() const {
@@ -242,40 +216,6 @@ identification::TiedCoefficients TiedStructure::coefficients() const {
         -parts_->displacement_um(std::vector<double>(belongs.begin(), belongs.end())));
   }
   return k;
-}
-
-void TiedStructure::advance(bool oil_in_tank, double oil_degC) {
-  Parts& parts = *parts_;
-  if (!parts.course || oil_in_tank != parts.oil_was_in) {
-    parts.course = std::make_unique<TransientConduction>(oil_in_tank ? parts.filled : parts.empty,
-                                                         parts.step_s, parts.rise_K);
-    parts.oil_was_in = oil_in_tank;
-  }
-  const double oil_K = oil_in_tank ? oil_degC - parts.spec.room_degC : 0.0;
-  parts.course->step([&](double, double, HeatInput& input) {
-    for (std::size_t i = 0; i < input.load_W.size(); ++i)
-      input.load_W[i] = parts.heat.coolant_W_per_K[i] * oil_K;
-  });
-  parts.rise_K = parts.course->temps_degC();
-}
-
-double TiedStructure::theta_a_K() const {
-  return parts_->at_sensor_K(0);
-}
-double TiedStructure::theta_b_K() const {
-  return parts_->at_sensor_K(1);
-}
-double TiedStructure::theta_c_K(std::size_t tie) const {
-  const auto belongs =
-      nodes_of_part(parts_->structure.mesh, first_tie_part + static_cast<Index>(tie));
-  double sum_K = 0.0;
-  double count = 0.0;
-  for (std::size_t i = 0; i < belongs.size(); ++i)
-    if (belongs[i]) sum_K += parts_->rise_K[i], count += 1.0;
-  return sum_K / count;
-}
-double TiedStructure::displacement_um() const {
-  return parts_->displacement_um(parts_->rise_K);
 }
 
 }  // namespace thermocomp::gate_tests

@@ -1,8 +1,7 @@
-/// The gate machine of config/examples/gate_structure.toml with any number of ties, as finite
-/// elements: its coefficients, and its course in time under oil that comes and goes.
+/// The coefficients of the gate machine of config/examples/gate_structure.toml with any number of
+/// ties, as finite elements.
 #pragma once
 
-#include <cstdint>
 #include <memory>
 #include <vector>
 
@@ -15,16 +14,10 @@ struct FiniteTie {
   double area_mm2{0.0};
 };
 
-enum class Elements : std::uint8_t {
-  as_in_file,
-  refined,  ///< at the feet and where ties are bonded; Ki and Kc then stay within 0.4 %
-};
-
 class TiedStructure {
  public:
-  /// @param step_s  of advance()
-  TiedStructure(const std::vector<FiniteTie>& ties, double step_s,
-                Elements elements = Elements::as_in_file);
+  /// Refined at the feet and where ties are bonded; Ki and Kc then stay within 0.4 %.
+  explicit TiedStructure(const std::vector<FiniteTie>& ties);
   ~TiedStructure();
   TiedStructure(const TiedStructure&) = delete;
   TiedStructure& operator=(const TiedStructure&) = delete;
@@ -33,12 +26,6 @@ class TiedStructure {
   [[nodiscard]] const identification::TiedColumns& columns() const;
   /// A temperature that is linear across the heated zone, and each tie 1 K warm.
   [[nodiscard]] identification::TiedCoefficients coefficients() const;
-
-  void advance(bool oil_in_tank, double oil_degC);
-  [[nodiscard]] double theta_a_K() const;                 ///< middle of the heated zone
-  [[nodiscard]] double theta_b_K() const;                 ///< opposite
-  [[nodiscard]] double theta_c_K(std::size_t tie) const;  ///< mean of the tie's nodes
-  [[nodiscard]] double displacement_um() const;           ///< positive: tool and work come closer
 
  private:
   struct Parts;

@@ -2,7 +2,6 @@
 warm machine is not taken for straight, and an operator's "off" stays."""
 
 import contextlib
-import json
 import sqlite3
 
 import pytest
@@ -131,46 +130,3 @@ def test_without_a_history_it_stays_off_and_says_what_to_do(machine, damage):
     daemon.start()
     machine.warm_by(5.0)
     daemon.wait_for_offset(5.0, 0.05)
-
-
-def test_an_older_sound_segment_gives_the_reference_but_not_the_switch(machine):
-    daemon = machine.start()
-    machine.warm_by(9.0)
-    daemon.wait_for_offset(9.0, 0.05)
-    assert daemon.cli("reload")[0] == 0
-    daemon.end()
-    with sqlite3.connect(daemon.history) as base:
-        newest, = base.execute("SELECT max(id) FROM segment").fetchone()
-        state, = base.execute("SELECT estimator_state FROM segment WHERE id = ?",
-                              (newest,)).fetchone()
-        damaged = bytes([state[0] ^ 1]) + state[1:]
-        base.execute("UPDATE segment SET estimator_state = ? WHERE id = ?", (damaged, newest))
-    DAMAGE["empty"](daemon.state)
-    daemon.start()
-    daemon.wait_for_mode("disabled")
-    assert references(daemon) == [20.0, 20.0]
-    assert f"segment {newest}" in warnings(daemon)
-    assert daemon.cli("enable")[0] == 0
-    daemon.wait_for_offset(9.0, 0.05)
-
-
-def test_a_history_without_a_sound_segment_keeps_it_off(machine):
-    daemon = machine.start()
-    daemon.end()
-    with sqlite3.connect(daemon.history) as base:
-        base.execute("UPDATE segment SET estimator_state = zeroblob(16)")
-    daemon.state.unlink()
-    daemon.start()
-    daemon.wait_for_mode("disabled")
-    assert "thermocomp reference" in warnings(daemon)
-    assert json.loads(daemon.state.read_text())["reference_lost"] is True
-
-
-def test_without_state_file_and_history_it_is_the_first_start(machine):
-    daemon = machine.start()
-    daemon.end()
-    daemon.state.unlink()
-    for file in daemon.folder.glob("history.db*"):
-        file.unlink()
-    daemon.start().wait_for_mode("compensating")
-    assert daemon.status()["warnings"] == [] or "history" not in warnings(daemon)

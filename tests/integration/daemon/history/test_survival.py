@@ -5,8 +5,8 @@ import time
 
 import pytest
 
-from lab import assert_replays_exactly, eventually, read_columns
-from plain_devices import RATE_UM_PER_S, SIMULATED, Machine, assert_slewed
+from lab import assert_replays_exactly, eventually
+from plain_devices import RATE_UM_PER_S, Machine, assert_slewed
 
 
 @pytest.fixture
@@ -84,32 +84,6 @@ def test_a_controller_that_restarts_from_zero_is_brought_back_slowly(machine, la
     assert_replays_exactly(daemon.history, lab.folder / "out.csv")
 
 
-def test_a_controller_that_applies_something_else_is_not_driven_until_released(machine):
-    daemon = machine.start()
-    machine.warm_by(12.0)
-    daemon.wait_for_offset(12.0, 0.05)
-    before = len(machine.controller.orders())
-    # An operator rehomed the axes: what is applied falls to 0 without the link being lost.
-    with machine.controller.lock:
-        machine.controller.written = lambda: None
-        machine.controller.applied_nm = 0
-        machine.controller.show_applied()
-    eventually(lambda: "mismatch_latched" in daemon.status()["reasons"], "the mismatch is latched")
-    mismatch = daemon.axis()["mismatch"]
-    assert abs(mismatch["sent_um"] - 12.0) < 0.1 and mismatch["read_um"] == 0.0
-    assert "another writer" in mismatch["likely"]
-    with machine.controller.lock:
-        del machine.controller.written
-    still = len(machine.controller.orders())
-    time.sleep(0.5)
-    # Nobody drives it: the controller would leap by 12 um.
-    assert all(abs(um) < 0.01 for _, um in machine.controller.orders()[still:])
-    assert daemon.cli("release", "z")[0] == 0
-    eventually(lambda: abs(machine.controller.applied_um() - 12.0) < 0.01, "the offset is back")
-    assert_slewed([(machine.controller.orders()[before][0], 0.0)] +
-                  machine.controller.orders()[before:])
-
-
 def test_a_sensor_outage_holds_and_ends_within_two_seconds_of_the_return(machine):
     daemon = machine.start()
     machine.warm_by(6.0)
@@ -129,31 +103,3 @@ def test_a_sensor_outage_holds_and_ends_within_two_seconds_of_the_return(machine
     assert took_s < 2.0 + 3.0
     daemon.wait_for_offset(8.0, 0.05)
     assert_slewed(machine.controller.orders())
-
-
-def test_a_simulated_machine_that_restarts_gets_its_offset_back_slowly(machine, lab):
-    run = lab.folder / "run.csv"
-    rows = ["0,20,20,0"] + [f"{i},16,20,0" for i in range(1, 600)]
-    run.write_text("time_s,column_degC,spindle_degC,z_um\n" + "\n".join(rows) + "\n")
-    truth = lab.folder / "truth.csv"
-    ports = ["--port", f"sensors={machine.module.port}", "--port",
-             f"cnc={machine.controller.port}"]
-    machine.module.stop()
-    machine.controller.stop()
-    simulator = lab.simulator(SIMULATED, *ports, "--replay", run, "--rows", "0:1", "--stay")
-    daemon = machine.start()
-    simulator.kill()
-    # Twice: with an offset of its own to reach, and with one that was lost.
-    for _ in range(2):
-        simulator = lab.simulator(SIMULATED, *ports, "--replay", run, "--rows", "1:",
-                                  "--row-period-ms", 20, "--truth", truth, "--stay")
-        daemon.wait_for_mode("compensating")
-        eventually(lambda: abs((daemon.axis()["applied"] or 0) - 12.0) < 0.01, "12 um applied")
-        simulator.end()
-        applied = read_columns(truth)["z_offset_um"]
-        assert applied[0] == 0.0
-        # Rows are 20 ms apart; a busy machine may leave out some.
-        steps = [abs(later - earlier) for earlier, later in zip(applied, applied[1:])]
-        assert max(steps) <= RATE_UM_PER_S * (0.02 + 0.7)
-        assert sum(1 for step in steps if step > 0.0) > 5
-        daemon.wait_for_mode("holding")
