@@ -84,7 +84,6 @@ TEST_CASE("candump sees the offsets, several signals in one frame", "[vm][contro
   Candump dump("vcan0,100:7FF");
   Machine machine("vcan0");
   CanController link(two_axes("vcan0"));
-  link.start();
   Cycle cycle(link);
   cycle.want(0, 12.34);  // 1234 = 0x04D2
   cycle.want(1, -7.0);   // -700 = 0xFD44
@@ -102,7 +101,6 @@ TEST_CASE("what has left the CAN interface is written, and what waits in its que
           "[vm][controller]") {
   Machine machine("vcan0");
   CanController link(two_axes("vcan0"));
-  link.start();
   Cycle cycle(link);
   REQUIRE(eventually([&] { return cycle.state().online; }));
   CHECK_FALSE(cycle.state().written);
@@ -119,7 +117,6 @@ TEST_CASE("what the CAN controller applies and measures is read back", "[vm][con
   Machine machine("vcan0");
   machine.applied_counts = -250;
   CanController link(two_axes("vcan0"));
-  link.start();
   Cycle cycle(link);
   REQUIRE(eventually([&] { return cycle.state().online; }));
   const ControllerState state = cycle.state();
@@ -140,7 +137,6 @@ TEST_CASE("no offset is sent before the CAN controller has told everything", "[v
   Machine machine("vcan0");
   machine.tells_speed = false;
   CanController link(two_axes("vcan0"));
-  link.start();
   Cycle cycle(link);
   cycle.want(0, 1.0);
   REQUIRE(eventually([&] { return link.health().reads > 20; }));
@@ -154,7 +150,6 @@ TEST_CASE("no offset is sent before the CAN controller has told everything", "[v
 TEST_CASE("a silent CAN controller is offline, and its return is a new epoch", "[vm][controller]") {
   Machine machine("vcan0");
   CanController link(two_axes("vcan0"));
-  link.start();
   Cycle cycle(link);
   cycle.want(0, 1.0);
   REQUIRE(eventually([&] { return link.health().writes > 3; }));
@@ -184,7 +179,6 @@ TEST_CASE("a silent CAN controller is offline, and its return is a new epoch", "
 TEST_CASE("a bus-off that is over before the link looks takes a new epoch", "[vm][controller]") {
   Machine machine("vcan0");
   CanController link(two_axes("vcan0"));
-  link.start();
   Cycle cycle(link);
   REQUIRE(eventually([&] { return cycle.state().online; }));
   RawSender bus("vcan0");
@@ -213,7 +207,6 @@ TEST_CASE("a controller made with python-can takes offsets and shows them applie
       "    for id, data in ((0x200, applied), (0x201, bytes(2))):\n"
       "        bus.send(can.Message(arbitration_id=id, is_extended_id=False, data=data))\n\"");
   CanController link(two_axes("vcan1"));
-  link.start();
   Cycle cycle(link);
   cycle.want(0, 21.5);
   cycle.want(1, -30.25);
@@ -354,7 +347,6 @@ TEST_CASE("a set goes in several frames with one number that counts up",
   Interpolator machine("vcan0");
   Candump dump("vcan0,110:7FE");
   CanController link(two_nodes("vcan0"));
-  link.start();
   Cycle cycle(link);
   cycle.want(0, 1.0);
   cycle.want(1, -2.0);
@@ -378,7 +370,6 @@ TEST_CASE("what is applied counts when all frames carry the number of one set",
   machine.near_counts = 100;
   machine.far_counts = 300;
   CanController link(two_nodes("vcan0"));
-  link.start();
   Cycle cycle(link);
   REQUIRE(eventually([&] { return cycle.state().online; }));
   CHECK(cycle.state().applied_um[1] == Approx(3.0));
@@ -407,7 +398,6 @@ TEST_CASE("while one node must stand, the set stays and its valid bit is 0",
           "[vm][controller][travel]") {
   Interpolator machine("vcan0");
   CanController link(two_nodes("vcan0"));
-  link.start();
   Cycle cycle(link);
   cycle.want(0, 1.0);
   cycle.want(1, 2.0);

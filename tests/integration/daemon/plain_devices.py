@@ -147,13 +147,24 @@ outputs = ["z_um"]
 reference = "first_sample"
 matrix_um_per_K = [[3.0, -1.5]]
 """
-CONFIG = """format = 1
-@STATE@
-[loop]
-rate_hz = 100
-[model]
-file = "model.toml"
-[[bus]]
+# A block a sensor, and readings that are used as they are.
+BLOCKS = """[screening]
+settle_s = 0.0
+stale_after_s = {stale_after_s}
+rate_allowance_K = 100.0
+[smoothing]
+form = "off"
+[[block]]
+name = "column"
+input = "column_degC"
+sensors = ["column"]
+[[block]]
+name = "spindle"
+input = "spindle_degC"
+sensors = ["spindle"]
+"""
+# Module and controller; the limits of the axis are still to come.
+OVER_TCP = """[[bus]]
 name = "cabinet"
 kind = "modbus_tcp"
 host = "127.0.0.1"
@@ -174,20 +185,6 @@ address = 0
 name = "spindle"
 device = "module"
 address = 1
-[screening]
-settle_s = 0.0
-stale_after_s = 1.0
-rate_allowance_K = 100.0
-[smoothing]
-form = "off"
-[[block]]
-name = "column"
-input = "column_degC"
-sensors = ["column"]
-[[block]]
-name = "spindle"
-input = "spindle_degC"
-sensors = ["spindle"]
 [controller]
 name = "cnc"
 kind = "modbus_tcp"
@@ -204,10 +201,17 @@ address = 0
 [[axis]]
 name = "z"
 output = "z_um"
-offset_um_max = 60.0
-rate_um_per_s_max = 8.0
 offset = {{ table = "holding", address = 0, encoding = "int32", scale = 0.001 }}
 applied = {{ table = "input", address = 10, encoding = "int32", scale = 0.001 }}
+"""
+CONFIG = """format = 1
+@STATE@
+[loop]
+rate_hz = 100
+[model]
+file = "model.toml"
+""" + BLOCKS.format(stale_after_s=1.0) + OVER_TCP + """offset_um_max = 60.0
+rate_um_per_s_max = 8.0
 [compensation]
 enabled_at_first_start = true
 disable_signal = "compensation_off_on"

@@ -11,7 +11,7 @@ import sqlite3
 import subprocess
 
 from lab import eventually
-from plain_devices import PlainController, PlainModule
+from plain_devices import BLOCKS, MODEL, OVER_TCP, PlainController, PlainModule
 
 UNIT = "thermocompd.service"
 CONFIG = pathlib.Path("/etc/thermocomp/thermocompd.toml")
@@ -103,12 +103,6 @@ def wait_for_offset(offset_um):
         raise AssertionError(f"offset {offset_um} um was not reached: {status()}") from error
 
 
-MODEL = """format = 1
-inputs = ["column_degC", "spindle_degC"]
-outputs = ["z_um"]
-reference = "first_sample"
-matrix_um_per_K = [[3.0, -1.5]]
-"""
 # What every configuration here has, whatever its buses.
 COMMON = """format = 1
 [loop]
@@ -116,62 +110,12 @@ rate_hz = 100
 real_time = "require"
 [model]
 file = "model.toml"
-[screening]
-settle_s = 0.0
-stale_after_s = 2.0
-rate_allowance_K = 100.0
-[smoothing]
-form = "off"
-[[block]]
-name = "column"
-input = "column_degC"
-sensors = ["column"]
-[[block]]
-name = "spindle"
-input = "spindle_degC"
-sensors = ["spindle"]
-[history]
+""" + BLOCKS.format(stale_after_s=2.0) + """[history]
 offsets_period_s = 0.01
 commit_s = 0.2
 """
 LIMITS = f"offset_um_max = 60.0\nrate_um_per_s_max = {SLEW_UM_PER_S}\n"
 ENABLED = "[compensation]\nenabled_at_first_start = true\n"
-OVER_TCP = """[[bus]]
-name = "cabinet"
-kind = "modbus_tcp"
-host = "127.0.0.1"
-port = {module}
-[[device]]
-name = "module"
-bus = "cabinet"
-unit = 1
-period_s = 0.02
-table = "input"
-encoding = "int16"
-scale = 0.01
-[[sensor]]
-name = "column"
-device = "module"
-address = 0
-[[sensor]]
-name = "spindle"
-device = "module"
-address = 1
-[controller]
-name = "cnc"
-kind = "modbus_tcp"
-host = "127.0.0.1"
-port = {controller}
-unit = 1
-period_s = 0.02
-valid_bits = {{ table = "holding", address = 2, encoding = "uint16" }}
-heartbeat = {{ table = "holding", address = 3, encoding = "uint16" }}
-[[axis]]
-name = "z"
-output = "z_um"
-offset = {{ table = "holding", address = 0, encoding = "int32", scale = 0.001 }}
-applied = {{ table = "input", address = 10, encoding = "int32", scale = 0.001 }}
-"""
 
 
 def free_port():

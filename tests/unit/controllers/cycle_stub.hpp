@@ -12,12 +12,16 @@
 
 namespace thermocomp::test {
 
-/// A cycle at 100 Hz: takes the state, marks the wanted offsets with its epoch, offers them.
+/// A cycle at 100 Hz, which starts the link: takes the state, marks the wanted offsets with its epoch,
+/// offers them.
 template <class Link>
 class Cycle {
  public:
   explicit Cycle(Link& link, std::uint32_t epoch = 0)
-      : fixed_epoch(epoch), link_(link), thread_([this] { run(); }) {}
+      : fixed_epoch(epoch), link_(link) {
+    link.start();
+    thread_ = std::thread([this] { run(); });
+  }
   Cycle(const Cycle&) = delete;
   Cycle& operator=(const Cycle&) = delete;
   ~Cycle() {

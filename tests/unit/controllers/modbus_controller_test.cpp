@@ -60,7 +60,6 @@ std::int32_t int32_of(const ModbusMachine& machine, int address) {
 TEST_CASE("offsets stand in the controller's registers with sign and scale", "[controllers]") {
   ModbusMachine machine;
   ModbusController link(three_axes(machine.port()));
-  link.start();
   Cycle cycle(link);
   cycle.want(0, 12.34);
   cycle.want(1, -7.0);
@@ -74,7 +73,6 @@ TEST_CASE("offsets stand in the controller's registers with sign and scale", "[c
 TEST_CASE("the heartbeat counts up with every write", "[controllers]") {
   ModbusMachine machine;
   ModbusController link(three_axes(machine.port()));
-  link.start();
   Cycle cycle(link);
   cycle.want(0, 1.0);
   REQUIRE(eventually([&] { return machine.holding(heartbeat_at) >= 5; }));
@@ -87,7 +85,6 @@ TEST_CASE("the heartbeat counts up with every write", "[controllers]") {
 TEST_CASE("an invalid axis keeps its register and clears its bit", "[controllers]") {
   ModbusMachine machine;
   ModbusController link(three_axes(machine.port()));
-  link.start();
   Cycle cycle(link);
   cycle.want(0, 1.0);
   cycle.want(1, 2.0);
@@ -156,7 +153,6 @@ TEST_CASE("without read-back the registers that are written tell what stands in 
   ModbusControllerConfig config = three_axes(machine.port());
   config.axes[1].applied.reset();
   ModbusController link(config);
-  link.start();
   Cycle cycle(link);
   REQUIRE(eventually([&] { return cycle.state().online; }));
   if (machine.shows == ModbusMachine::Shows::all)
@@ -180,7 +176,6 @@ TEST_CASE("registers that do not hold what is written tell nothing", "[controlle
   ModbusControllerConfig config = three_axes(machine.port());
   for (ModbusAxis& axis : config.axes) axis.applied.reset();
   ModbusController link(config);
-  link.start();
   Cycle cycle(link);
   REQUIRE(eventually([&] { return cycle.state().online; }));
   CHECK(cycle.state().applied_um[0] == 0.0);
@@ -200,7 +195,6 @@ TEST_CASE("a controller that applies something else is seen", "[controllers]") {
   ModbusMachine machine;
   machine.mirrored = 6;
   ModbusController link(three_axes(machine.port()));
-  link.start();
   Cycle cycle(link);
   cycle.want(0, 8.0);
   REQUIRE(eventually([&] { return cycle.state().applied_um[0] == Approx(8.0); }));
@@ -215,7 +209,6 @@ TEST_CASE("a re-homed controller gets nothing that was computed before it was se
   ModbusMachine machine;
   machine.mirrored = 6;
   ModbusController link(three_axes(machine.port()));
-  link.start();
   Cycle cycle(link);
   cycle.want(0, 30.0);
   REQUIRE(eventually([&] { return cycle.state().applied_um[0] == Approx(30.0); }));
@@ -235,7 +228,6 @@ TEST_CASE("nothing is written without a command of this epoch, not even a heartb
           "[controllers]") {
   ModbusMachine machine;
   ModbusController link(three_axes(machine.port()));
-  link.start();
   Cycle cycle(link, 4711);
   cycle.want(0, 5.0);
   const int reads = machine.reads;
@@ -252,7 +244,6 @@ TEST_CASE("a controller that was switched off and on is read back before it is w
   machine->mirrored = 6;
   const int port = machine->port();
   ModbusController link(three_axes(port));
-  link.start();
   Cycle cycle(link);
   cycle.want(0, 9.0);
   REQUIRE(eventually([&] { return cycle.state().applied_um[0] == Approx(9.0); }));
@@ -279,7 +270,6 @@ TEST_CASE("a write that fails takes a new epoch and is not repeated with the old
   ModbusMachine machine;
   machine.mirrored = 6;
   ModbusController link(three_axes(machine.port()));
-  link.start();
   Cycle cycle(link);
   cycle.want(0, 2.0);
   REQUIRE(eventually([&] { return cycle.state().applied_um[0] == Approx(2.0); }));
@@ -308,7 +298,6 @@ TEST_CASE("a controller that refuses writes is there, asked once a period, and n
   ModbusControllerConfig config = three_axes(machine.port());
   config.period_s = 0.1;
   ModbusController link(config);
-  link.start();
   Cycle cycle(link);
   cycle.want(0, 2.0);
   REQUIRE(eventually([&] { return link.health().write.refused >= 3; }));
@@ -347,7 +336,6 @@ TEST_CASE("a controller that ignores writes is there and not written", "[control
   ModbusControllerConfig config = three_axes(machine.port());
   config.line.timeout_ms = 100;
   ModbusController link(config);
-  link.start();
   Cycle cycle(link);
   cycle.want(0, 2.0);
   REQUIRE(eventually([&] { return cycle.state().written; }));
@@ -372,7 +360,6 @@ TEST_CASE("a controller that is read for longer than a command lasts is written 
     config.signals.push_back(
         {i, at(ModbusTable::input, static_cast<std::uint16_t>(40 * i), Encoding::uint16)});
   ModbusController link(config);
-  link.start();
   Cycle cycle(link);
   cycle.want(0, 2.0);
   REQUIRE(eventually([&] { return int32_of(machine, 0) == 200; }));
@@ -390,7 +377,6 @@ TEST_CASE("a write that is not answered is not repeated before another look", "[
   ModbusMachine machine;
   machine.mirrored = 6;
   ModbusController link(three_axes(machine.port()));
-  link.start();
   Cycle cycle(link);
   cycle.want(0, 30.0);
   REQUIRE(eventually([&] { return cycle.state().applied_um[0] == Approx(30.0); }));
@@ -408,7 +394,6 @@ TEST_CASE("a controller that cannot be read is offline and is not written", "[co
   ModbusMachine machine;
   machine.refuse_reads = true;
   ModbusController link(three_axes(machine.port()));
-  link.start();
   Cycle cycle(link);
   cycle.want(0, 2.0);
   REQUIRE(eventually([&] { return link.health().read_errors >= 3; }));
@@ -430,7 +415,6 @@ TEST_CASE("the heartbeat stops when the cycle stands still, and its return is a 
           "[controllers]") {
   ModbusMachine machine;
   ModbusController link(three_axes(machine.port()));
-  link.start();
   Cycle cycle(link);
   cycle.want(0, 6.0);
   REQUIRE(eventually([&] { return machine.holding(heartbeat_at) > 0; }));

@@ -219,7 +219,6 @@ TEST_CASE("a set goes in one block, and its number counts up", "[controllers][tr
   machine.set_holding(27, 39);
   machine.mirrored = 28;
   ModbusController link(config_of(machine.port(), line()));
-  link.start();
   Cycle cycle(link);
   cycle.want(0, -4.0);
   cycle.want(1, 12.0);
@@ -241,7 +240,6 @@ TEST_CASE("the first set of a link has another number than the one that stands i
   ModbusMachine machine;
   machine.set_holding(27, 0xFFFF);
   ModbusController link(config_of(machine.port(), line()));
-  link.start();
   Cycle cycle(link);
   cycle.want(0, 0.0);
   cycle.want(1, 0.0);
@@ -254,7 +252,6 @@ TEST_CASE("while one node must stand, nothing of the set is written and its bit 
           "[controllers][travel]") {
   ModbusMachine machine;
   ModbusController link(config_of(machine.port(), table()));
-  link.start();
   Cycle cycle(link);
   for (std::size_t i = 0; i < 6; ++i) cycle.want(i, 1.0);
   REQUIRE(eventually([&] { return machine.holding(10) == 0b11; }));

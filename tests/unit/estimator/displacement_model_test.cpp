@@ -90,20 +90,6 @@ TEST_CASE("a lag follows a step exactly, whatever the steps of time", "[displace
   }
 }
 
-TEST_CASE("a lag at irregular steps is the analytic one too", "[displacement]") {
-  ThermalModel spec = without_matrix();
-  spec.terms = {
-      {"thermal_lag", "t1_degC", {{"tau_s", 100.0}}, {{"gain_um_per_K", {{"z_um", 1.0}}}}}};
-  DisplacementModel model(spec);
-  single(model, 0s, {0.0});
-  double time_s = 0.0;
-  for (const int step_ms : {1, 40, 40, 12000, 5, 333333, 10}) {
-    time_s += 1e-3 * step_ms;
-    const auto now = std::chrono::duration_cast<nanoseconds>(seconds_d(time_s));
-    CHECK(single(model, now, {1.0}) == Approx(-std::exp(-time_s / 100.0)).epsilon(1e-9));
-  }
-}
-
 TEST_CASE("a missing heat source warms with the signal, linear or squared", "[displacement]") {
   for (const double power : {1.0, 2.0}) {
     ThermalModel spec = without_matrix();

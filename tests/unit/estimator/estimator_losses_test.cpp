@@ -24,30 +24,6 @@ TEST_CASE("lost data hold the offset; it goes on from there when they return", "
   CHECK(machine.offset_um() == -10.0);
 }
 
-TEST_CASE("the ramp policy holds for hold_s, then goes to zero at the slew rate", "[estimator]") {
-  auto config = small_config();
-  config.compensation.on_loss = LossPolicy::ramp_to_zero;
-  config.compensation.hold_s = 30;
-  config.axes[0].limiter.rate_um_per_s_max = 1.0;
-  Machine machine(config);
-  machine.step({20.0, 30.0});
-  machine.steps(20, {21.0, 30.0});
-  REQUIRE(machine.offset_um() == -5.0);
-  int held = 0;
-  while (machine.report().mode != Mode::ramping_to_zero && held < 100) {
-    machine.step({lost, 30.0});
-    if (machine.report().mode == Mode::holding) CHECK(machine.offset_um() == -5.0);
-    ++held;
-  }
-  CHECK(held == 5 + 31);  // five seconds until stale, more than thirty held
-  CHECK(machine.offset_um() == -4.0);
-  machine.steps(4, {lost, 30.0});
-  CHECK(machine.offset_um() == 0.0);
-  machine.step({21.0, 30.0});
-  CHECK(machine.report().mode == Mode::compensating);
-  CHECK(machine.offset_um() == -1.0);
-}
-
 namespace {
 
 /// Lost data at -30 um with the ramp policy and no time to hold, in the middle of a cut.

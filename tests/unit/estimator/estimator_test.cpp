@@ -38,24 +38,6 @@ TEST_CASE("an axis that the controller counts the other way gets the other sign"
   CHECK(machine.offset_um() == 6.0);
 }
 
-TEST_CASE("a reference in the model file is used as it stands", "[estimator]") {
-  auto model = small_model();
-  model.reference_degC = {20.0, 20.0};
-  Machine machine(small_config(), model);
-  machine.steps(10, {21.0, 22.0});
-  CHECK(machine.offset_um() == -7.0);
-}
-
-TEST_CASE("a commanded reference makes the present state the straight one", "[estimator]") {
-  Machine machine;
-  machine.step({20.0, 30.0});
-  machine.steps(10, {21.0, 31.0});
-  machine.estimator.apply({CommandKind::reference, 0, 0.0});
-  machine.steps(10, {21.0, 31.0});
-  CHECK(machine.offset_um() == 0.0);
-  CHECK(machine.report().inputs[0].reference_degC == 21.0);
-}
-
 TEST_CASE("a reference is not taken while a block is lost", "[estimator]") {
   Machine machine;
   machine.step({20.0, 30.0});
@@ -63,45 +45,6 @@ TEST_CASE("a reference is not taken while a block is lost", "[estimator]") {
   machine.estimator.apply({CommandKind::reference, 0, 0.0});
   machine.step({21.0, lost});
   CHECK(machine.report().inputs[0].reference_degC == 20.0);
-}
-
-TEST_CASE("a sampled reference takes the running spindle as part of the straight state",
-          "[estimator]") {
-  Machine machine(small_config(), model_with_growth());
-  machine.controller.signals[0] = 10000.0;
-  machine.steps(10, {20.0, 30.0});
-  CHECK(machine.offset_um() == 0.0);
-  CHECK(machine.report().signals[0].reference == 10000.0);
-  machine.controller.signals[0] = 0.0;
-  machine.steps(10, {20.0, 30.0});
-  CHECK(machine.offset_um() == Approx(10.0));
-}
-
-TEST_CASE("a reference in the model file means a machine at rest", "[estimator]") {
-  auto model = model_with_growth();
-  model.reference_degC = {20.0, 30.0};
-  Machine machine(small_config(), model);
-  machine.controller.signals[0] = 10000.0;
-  machine.steps(10, {20.0, 30.0});
-  CHECK(machine.offset_um() == Approx(-10.0));
-}
-
-TEST_CASE("a reference commanded while the controller is silent waits for its signals",
-          "[estimator]") {
-  Machine machine(small_config(), model_with_growth());
-  machine.controller.signals[0] = 10000.0;
-  machine.steps(10, {20.0, 30.0});
-  machine.controller.online = false;
-  machine.controller.written = machine.controller.online;
-  machine.step({20.0, 30.0});
-  machine.estimator.apply({CommandKind::reference, 0, 0.0});
-  machine.steps(3, {20.0, 30.0});
-  machine.controller.online = true;
-  machine.controller.written = machine.controller.online;
-  machine.controller.signals[0] = 0.0;
-  machine.steps(3, {20.0, 30.0});
-  CHECK(machine.report().signals[0].reference == 0.0);
-  CHECK(machine.offset_um() == 0.0);
 }
 
 TEST_CASE("what is not written is not compensated", "[estimator]") {
@@ -169,75 +112,6 @@ TEST_CASE("disable and enable move at the slew rate", "[estimator]") {
     machine.step({21.0, 30.0});
     CHECK(machine.offset_um() == std::max(-1.0 * i, -5.0));
   }
-}
-
-TEST_CASE("a stop takes the offsets to zero at the slew rate and leaves the switch as it is",
-          "[estimator]") {
-  auto config = small_config();
-  config.axes[0].limiter.rate_um_per_s_max = 1.0;
-  Machine machine(config);
-  machine.step({20.0, 30.0});
-  machine.steps(20, {21.0, 30.0});
-  machine.estimator.apply({CommandKind::stop, 0, 0.0});
-  for (int i = 1; i <= 7; ++i) {
-    machine.step({21.0, 30.0});
-    CHECK(machine.offset_um() == std::min(-5.0 + i, 0.0));
-  }
-  CHECK(machine.report().mode == Mode::ramping_to_zero);
-  CHECK(machine.report().enabled);
-  machine.estimator.apply({CommandKind::enable, 0, 0.0});
-  machine.steps(5, {21.0, 30.0});
-  CHECK(machine.offset_um() == 0.0);
-}
-
-TEST_CASE("the controller's switch disables; unknown, it holds", "[estimator]") {
-  Machine machine;
-  machine.step({20.0, 30.0});
-  machine.steps(10, {21.0, 30.0});
-  machine.controller.signals[2] = not_a_number;
-  machine.steps(5, {22.0, 30.0});
-  CHECK(machine.report().mode == Mode::holding);
-  CHECK(machine.offset_um() == -5.0);
-  machine.controller.signals[2] = 1.0;
-  machine.steps(5, {22.0, 30.0});
-  CHECK(machine.report().mode == Mode::disabled);
-  CHECK(machine.says(Reason::controller_disabled));
-  CHECK(machine.report().enabled);
-  CHECK(machine.offset_um() == 0.0);
-  machine.controller.signals[2] = 0.0;
-  machine.steps(5, {22.0, 30.0});
-  CHECK(machine.offset_um() == -10.0);
-}
-
-TEST_CASE("a controller gone silent holds the offset", "[estimator]") {
-  Machine machine;
-  machine.step({20.0, 30.0});
-  machine.steps(10, {21.0, 30.0});
-  machine.controller.online = false;
-  machine.controller.written = machine.controller.online;
-  machine.steps(10, {25.0, 30.0});
-  CHECK(machine.report().mode == Mode::holding);
-  CHECK(machine.says(Reason::controller_offline));
-  CHECK(machine.offset_um() == -5.0);
-}
-
-TEST_CASE("the offset holds while cutting where so configured", "[estimator]") {
-  auto config = small_config();
-  config.compensation.hold_while_cutting = true;
-  config.compensation.cutting_signal = "cutting_on";
-  Machine machine(config);
-  machine.step({20.0, 30.0});
-  machine.steps(10, {21.0, 30.0});
-  for (const double cutting : {1.0, not_a_number}) {
-    machine.controller.signals[1] = cutting;
-    machine.steps(5, {22.0, 30.0});
-    CHECK(machine.says(Reason::cutting));
-    CHECK(machine.offset_um() == -5.0);
-  }
-  machine.controller.signals[1] = 0.0;
-  machine.steps(2, {22.0, 30.0});
-  CHECK(machine.offset_um() == -10.0);
-  CHECK_FALSE(machine.says(Reason::cutting));
 }
 
 TEST_CASE("measured and cycle end are remembered for the report and move nothing", "[estimator]") {
@@ -395,37 +269,6 @@ TEST_CASE("a reload does not move the axis by itself", "[estimator]") {
   CHECK(machine.report().mode == Mode::compensating);
   CHECK(machine.command.valid[0]);
   CHECK(machine.report().cycle == 12);
-}
-
-TEST_CASE("after a reload a smaller bound is approached at the slew rate", "[estimator]") {
-  Machine machine;
-  machine.step({20.0, 30.0});
-  machine.steps(30, {26.0, 30.0});
-  REQUIRE(machine.offset_um() == -30.0);
-  auto config = small_config();
-  config.axes[0].limiter = {12.0, 2.0};
-  reload(machine, config, small_model());
-  for (int i = 1; i <= 12; ++i) {
-    machine.step({26.0, 30.0});
-    CHECK(machine.offset_um() == std::min(-30.0 + 2.0 * i, -12.0));
-  }
-  CHECK(machine.says(Reason::at_bound));
-}
-
-TEST_CASE("a reload with another matrix approaches the new offset at the slew rate",
-          "[estimator]") {
-  auto config = small_config();
-  config.axes[0].limiter.rate_um_per_s_max = 1.0;
-  Machine machine(config);
-  machine.step({20.0, 30.0});
-  machine.steps(20, {21.0, 30.0});
-  auto model = small_model();
-  model.matrix_um_per_K = {{-5.0, 1.0}};
-  reload(machine, config, model);
-  for (int i = 1; i <= 12; ++i) {
-    machine.step({21.0, 30.0});
-    CHECK(machine.offset_um() == std::min(-5.0 + i, 5.0));
-  }
 }
 
 TEST_CASE("a reload takes numbers newly written as the reference, and keeps an old one",

@@ -12,6 +12,7 @@ import pytest
 
 import spindle
 from lab import assert_replays_exactly, eventually
+from plain_devices import BLOCKS
 
 pytestmark = pytest.mark.skipif(not pathlib.Path("/sys/class/net/vcan1").exists(),
                                 reason="there is no vcan1 (tests/vm/run_with_can.sh makes one)")
@@ -50,21 +51,7 @@ name = "spindle"
 device = "node"
 start_bit = 23
 byte_order = "big_endian"
-[screening]
-settle_s = 0.0
-rate_allowance_K = 100.0
-stale_after_s = 60.0
-[smoothing]
-form = "off"
-[[block]]
-name = "column"
-input = "column_degC"
-sensors = ["column"]
-[[block]]
-name = "spindle"
-input = "spindle_degC"
-sensors = ["spindle"]
-[controller]
+""" + BLOCKS.format(stale_after_s=60.0) + """[controller]
 name = "cnc"
 kind = "can"
 interface = "vcan1"
