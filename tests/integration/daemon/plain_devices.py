@@ -163,7 +163,7 @@ name = "spindle"
 input = "spindle_degC"
 sensors = ["spindle"]
 """
-# Module and controller; the limits of the axis are still to come.
+# Module and controller.
 OVER_TCP = """[[bus]]
 name = "cabinet"
 kind = "modbus_tcp"
@@ -201,6 +201,8 @@ address = 0
 [[axis]]
 name = "z"
 output = "z_um"
+offset_um_max = 60.0
+rate_um_per_s_max = 8.0
 offset = {{ table = "holding", address = 0, encoding = "int32", scale = 0.001 }}
 applied = {{ table = "input", address = 10, encoding = "int32", scale = 0.001 }}
 """
@@ -210,9 +212,7 @@ CONFIG = """format = 1
 rate_hz = 100
 [model]
 file = "model.toml"
-""" + BLOCKS.format(stale_after_s=1.0) + OVER_TCP + """offset_um_max = 60.0
-rate_um_per_s_max = 8.0
-[compensation]
+""" + BLOCKS.format(stale_after_s=1.0) + OVER_TCP + """[compensation]
 enabled_at_first_start = true
 disable_signal = "compensation_off_on"
 prove_hold_s = 0.2

@@ -138,8 +138,9 @@ class Machine:
         self.warm_by(0.0)
 
     def config(self, more=""):
-        return COMMON + OVER_TCP.format(module=self.module.port,
-                                        controller=self.controller.port) + LIMITS + ENABLED + more
+        over_tcp = OVER_TCP.format(module=self.module.port, controller=self.controller.port)
+        return (COMMON + over_tcp.replace("rate_um_per_s_max = 8.0",
+                                          f"rate_um_per_s_max = {SLEW_UM_PER_S}") + ENABLED + more)
 
     def warm_by(self, offset_um):
         """The column is so much off the 20 degC of the reference that this is the offset."""
