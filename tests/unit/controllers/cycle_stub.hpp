@@ -12,13 +12,12 @@
 
 namespace thermocomp::test {
 
-/// A cycle at 100 Hz, which starts the link: takes the state, marks the wanted offsets with its epoch,
-/// offers them.
+/// A cycle at 100 Hz, which starts the link: takes the state, marks the wanted offsets with its
+/// epoch, offers them.
 template <class Link>
 class Cycle {
  public:
-  explicit Cycle(Link& link, std::uint32_t epoch = 0)
-      : fixed_epoch(epoch), link_(link) {
+  explicit Cycle(Link& link, std::uint32_t epoch = 0) : fixed_epoch(epoch), link_(link) {
     link.start();
     thread_ = std::thread([this] { run(); });
   }
