@@ -1,13 +1,15 @@
-"""Machines of one type night by night: what departs, and what falsely does.
+"""Workshops of machines of one type night by night: what departs, how soon, and what falsely does.
 
-    departures.py PROGRAM
+    departures.py PROGRAM [--workshops N] [--first SEED]
 
-A series of eight machines; six others run healthy nights, and nights with an effect planted. Each is
-compared with its sisters, and with its own past: three healthy nights before. A false alarm is a
-night on which a healthy machine newly departs: nights that follow an alarm of the same machine are
-the same one. Detection: nights from the effect to the alarm.
+As `thermocomp-fleet night` compares them: twelve machines a workshop, nights of 24 h with a probing
+each 10 min; after seven nights a series of the sisters (the other half of the workshop) and one of
+the machine's own past. A false alarm: a healthy machine newly departs, that is, did not the night
+before. Planted effects: nights from the effect to the alarm, on every machine of every third
+workshop. `2_nights`: an alarm only with the second night in a row.
 """
 
+import argparse
 import json
 import pathlib
 import sys
@@ -15,82 +17,143 @@ import tempfile
 
 import numpy as np
 
-import series
+import series  # first: it knows where the next two are
+import measured_data
 import series_type
 
-NIGHTS = 40
-BEGINS = 3  # healthy nights before, where a night is compared with the machine's own past
-WATCHED = 5
-KINDS = ("sisters", "own_past")
-HOURS = 8
+MACHINES = 12
+PAST = 7
+HEALTHY = 10  # nights
+WATCHED = 5  # nights with an effect
+PROBE_EVERY_MIN = 10
+PLAY_UM = 8.0
 
 
-def swapped(columns, _fields):
+def swapped(columns, _fields, _night):
     columns["head_degC"], columns["screw_degC"] = columns["screw_degC"], columns["head_degC"]
 
 
-def loose_sensor(columns, _fields):
-    rise = columns["spindle_degC"] - columns["spindle_degC"][0]
-    columns["spindle_degC"] = columns["spindle_degC"][0] + 0.6 * rise
+def scaled_rise(columns, place, scale):
+    columns[place] = columns[place][0] + scale * (columns[place] - columns[place][0])
 
 
-def grown_expansion(columns, fields):
+def loose_sensor(columns, _fields, _night):
+    scaled_rise(columns, "spindle_degC", 0.6)
+
+
+def ageing(columns, _fields, night):
+    """A sensor that shows 5 % less of its rise each night."""
+    scaled_rise(columns, "spindle_degC", 1.0 - 0.05 * (night + 1))
+
+
+def grown_expansion(columns, fields, _night=0, share=0.5):
     """A joint that has come loose: the column's growth counts once more by half."""
     cells = series_type.plant.Machine.cells("column")
     rise = (fields[:, cells] - fields[0, cells]).mean(axis=1)
-    columns["z_um"] = columns["z_um"] + 0.5 * 11.5 * rise
+    columns["z_um"] = columns["z_um"] + share * 11.5 * rise
 
 
-EFFECTS = {"swapped_sensors": swapped, "loose_sensor": loose_sensor, "column": grown_expansion}
+def grown_little(columns, fields, _night):
+    grown_expansion(columns, fields, share=0.2)
 
 
-def own_past(tool, series_file, seed):
-    """The series of one machine: its first nights, and what its sisters say of the rest."""
-    machine, own = series_type.TypeMachine(seed), tool.path(".toml")
-    past = [tool.written(machine.day(90 + night, HOURS)) for night in range(BEGINS)]
-    tool.run("series", *past, "--machine", f"machine {seed}", "--prior", series_file, "-o", own)
-    return own
+def play(columns, _fields, _night):
+    """A guide that follows only once PLAY_UM have built up."""
+    at, followed = columns["z_um"][0], []
+    for value in columns["z_um"]:
+        at = min(max(at, value - PLAY_UM / 2), value + PLAY_UM / 2)
+        followed.append(at)
+    columns["z_um"] = np.array(followed)
 
 
-def nights(tool, priors, seed, count, change=None):
-    """Whether each night's run departs, one list a prior."""
-    machine = series_type.TypeMachine(seed)
-    said = [[] for _ in priors]
-    for night in range(count):
-        run, answer = tool.written(machine.day(100 + night, HOURS, change)), tool.path(".json")
-        for prior, of_prior in zip(priors, said):
-            tool.run("inspect", run, "--series", prior, "--json", answer, good=(0, 1))
-            departure = json.loads(answer.read_text())["departure"]
-            of_prior.append(any(each["departs"] for each in departure.values()))
-        run.unlink()
-    return said
+EFFECTS = {"swapped_sensors": swapped, "loose_sensor": loose_sensor, "ageing_sensor": ageing,
+           "column_0.5": grown_expansion, "column_0.2": grown_little, "play": play}
+
+
+class Workshop:
+    def __init__(self, tool, first_seed):
+        self.tool = tool
+        self.seeds = range(first_seed, first_seed + MACHINES)
+        past = {seed: [self.night(seed, night) for night in range(PAST)] for seed in self.seeds}
+        statistics = {}
+        for seed in self.seeds:
+            statistics[seed] = tool.path(".toml")
+            tool.run("series", "--machine", f"machine {seed}", *past[seed], "-o", statistics[seed])
+        sisters = [tool.path(".toml") for _ in range(2)]
+        for group in range(2):
+            tool.run("series", "-o", sisters[group],
+                     *(statistics[seed] for seed in self.seeds if seed % 2 != group))
+        self.priors = {}
+        for seed in self.seeds:
+            own = tool.path(".toml")
+            tool.run("series", "--machine", "its past", "--prior", sisters[seed % 2], "-o", own,
+                     *past[seed])
+            self.priors[seed] = (sisters[seed % 2], own)
+
+    def night(self, seed, night, effect=None, since=0):
+        change = effect and (lambda columns, fields: effect(columns, fields, night - since))
+        columns = series_type.TypeMachine(seed).day(night, 24, change)
+        for output in series_type.plant.OUTPUTS:
+            columns[output][np.arange(len(columns["time_s"])) % PROBE_EVERY_MIN != 0] = np.nan
+        path = self.tool.path(".csv")
+        measured_data.write(measured_data.Run("", columns), path)
+        return path
+
+    def departs(self, seed, nights, effect=None):
+        """Whether it departs from sisters, and from its own past, shape (nights, 2)."""
+        said = []
+        for night in nights:
+            run, answer = self.night(seed, night, effect, nights[0]), self.tool.path(".json")
+            of_night = []
+            for prior in self.priors[seed]:
+                self.tool.run("inspect", run, "--series", prior, "--json", answer, good=(0, 1))
+                departure = json.loads(answer.read_text())["departure"]
+                of_night.append(any(each["departs"] for each in departure.values()))
+            run.unlink()
+            said.append(of_night)
+        return np.array(said)
+
+
+def rules(said):
+    """One row a rule: whether each night is an alarm."""
+    either = said.any(axis=1)
+    return {"sisters": said[:, 0], "own_past": said[:, 1], "either": either,
+            "2_nights": either & np.concatenate([[False], either[:-1]])}
 
 
 def main():
-    with tempfile.TemporaryDirectory() as folder:
-        tool = series.Tool(sys.argv[1], pathlib.Path(folder))
-        sisters = tool.path(".toml")
-        tool.run("series", *series.simulated_sisters(tool), "--outputs", "z_um,y_um", "-o", sisters)
-        priors = {seed: (sisters, own_past(tool, sisters, seed)) for seed in range(200, 206)}
-        alarms, healthy = np.zeros(2), 0
-        for seed in priors:
-            both = nights(tool, priors[seed], seed, NIGHTS)
-            alarms += [said[0] + sum(b and not a for a, b in zip(said, said[1:])) for said in both]
-            healthy += NIGHTS
-            print(f"healthy {seed}: {both}", file=sys.stderr)
-        after = {}
-        for name, change in EFFECTS.items():
-            both = [nights(tool, priors[seed], seed, WATCHED, change) for seed in priors]
-            for kind, said in zip(KINDS, zip(*both)):
-                after[f"{name}_{kind}"] = [each.index(True) + 1 if True in each else np.nan
-                                           for each in said]
-            print(f"{name}: {both}", file=sys.stderr)
-    for name, found in after.items():
-        print(f"{name}_found {np.isfinite(found).mean():.3f} ratio")
-        if np.isfinite(found).any():
-            print(f"{name}_after {np.nanmedian(found):.3g} nights")
-    for kind, count in zip(KINDS, alarms):
-        print(f"{kind}_false_alarms_a_machine_year {365.0 * count / healthy:.3g} 1/year")
+    parser = argparse.ArgumentParser()
+    parser.add_argument("program")
+    parser.add_argument("--workshops", type=int, default=12)
+    parser.add_argument("--first", type=int, default=5000)
+    options = parser.parse_args()
+    alarms, healthy = {}, 0
+    found = {}
+    for workshop in range(options.workshops):
+        with tempfile.TemporaryDirectory() as folder:
+            shop = Workshop(series.Tool(options.program, pathlib.Path(folder)),
+                            options.first + workshop * MACHINES)
+            for seed in shop.seeds:
+                for rule, said in rules(shop.departs(seed, range(PAST, PAST + HEALTHY))).items():
+                    new = said & ~np.concatenate([[False], said[:-1]])
+                    alarms[rule] = alarms.get(rule, 0) + int(new.sum())
+                healthy += HEALTHY
+                if workshop % 3 != 0:
+                    continue
+                for name, effect in EFFECTS.items():
+                    nights = range(PAST + 20, PAST + 20 + WATCHED)
+                    for rule, said in rules(shop.departs(seed, nights, effect)).items():
+                        found.setdefault((name, rule), []).append(
+                            1 + int(np.argmax(said)) if said.any() else np.inf)
+        print(f"workshop {workshop}: {alarms} in {healthy} machine-nights", file=sys.stderr)
+    for (name, rule), nights in found.items():
+        print(f"{name}_{rule}_found {np.isfinite(nights).mean():.3f} ratio")
+        if np.isfinite(np.median(nights)):
+            print(f"{name}_{rule}_after {np.median(nights):.3g} nights")
+    print(f"healthy {healthy} machine-nights")
+    for rule, count in alarms.items():
+        print(f"{rule}_false_alarms {count} alarms")
+        print(f"{rule}_false_alarms_a_machine_year {365.0 * count / healthy:.3g} 1/year")
 
 
 if __name__ == "__main__":

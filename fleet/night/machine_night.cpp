@@ -30,6 +30,7 @@ namespace fs = std::filesystem;
 
 constexpr int probings_min = 8;              ///< of a night; fewer say nothing of a machine
 constexpr std::size_t nights_of_series = 7;  ///< of each machine, before the night that is judged
+constexpr double probability_least = 1e-30;  ///< a real of PostgreSQL holds hardly less
 constexpr int machines_min = 3;              ///< besides the one that is judged
 constexpr std::size_t sisters_max = 3 + 60;  ///< words of the command; more show hardly more of S
 
@@ -90,17 +91,19 @@ struct Verdict {
   nlohmann::json answer = nullptr;  ///< "departure" of `inspect`
 };
 
+/// By the answer: the exit status is 1 for a fault of the recording, too.
 Verdict compared(const WorkFolder& folder, const fs::path& run, const std::string& series) {
   write_text(folder / "series.toml", series);
-  const int status = run_modelling({"inspect", run.string(), "--series", folder / "series.toml",
-                                    "--json", folder / "answer.json"},
-                                   folder / "log");
+  run_modelling({"inspect", run.string(), "--series", folder / "series.toml", "--json",
+                 folder / "answer.json"},
+                folder / "log");
   Verdict verdict;
-  verdict.departs = status == 1;
   verdict.answer = nlohmann::json::parse(read_text_file(folder / "answer.json"))
                        .value("departure", nlohmann::json());
-  for (const auto& output : verdict.answer)
+  for (const auto& output : verdict.answer) {
+    verdict.departs = verdict.departs || output.value("departs", false);
     verdict.probability = std::min(verdict.probability, output.value("probability", 1.0));
+  }
   return verdict;
 }
 
@@ -215,9 +218,8 @@ WorkFolder::~WorkFolder() {
   fs::remove_all(path_, ignored);
 }
 
-int run_modelling(const std::vector<std::string>& arguments, const fs::path& log) {
-  const std::string program =
-      (fs::read_symlink("/proc/self/exe").parent_path() / "thermocomp-modelling").string();
+int run_program(const std::string& program, const std::vector<std::string>& arguments,
+                const fs::path& log) {
   std::vector<char*> words{const_cast<char*>(program.c_str())};
   for (const std::string& argument : arguments)
     words.push_back(const_cast<char*>(argument.c_str()));
@@ -225,18 +227,26 @@ int run_modelling(const std::vector<std::string>& arguments, const fs::path& log
   posix_spawn_file_actions_t files;
   posix_spawn_file_actions_init(&files);
   posix_spawn_file_actions_addopen(&files, 0, "/dev/null", O_RDONLY, 0);
-  posix_spawn_file_actions_addopen(&files, 1, log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
-  posix_spawn_file_actions_adddup2(&files, 1, 2);
+  if (!log.empty()) {
+    posix_spawn_file_actions_addopen(&files, 1, log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
+    posix_spawn_file_actions_adddup2(&files, 1, 2);
+  }
   pid_t child = 0;
-  const int failed = posix_spawn(&child, program.c_str(), &files, nullptr, words.data(), environ);
+  const int failed = posix_spawnp(&child, program.c_str(), &files, nullptr, words.data(), environ);
   posix_spawn_file_actions_destroy(&files);
   if (failed != 0) throw std::system_error(failed, std::generic_category(), program);
   int status = 0;
   while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
-  if (!WIFEXITED(status) || WEXITSTATUS(status) > 1)
+  return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+}
+
+int run_modelling(const std::vector<std::string>& arguments, const fs::path& log) {
+  const fs::path folder = fs::read_symlink("/proc/self/exe").parent_path();
+  const int status = run_program((folder / "thermocomp-modelling").string(), arguments, log);
+  if (status > 1)
     throw std::runtime_error(std::string(arguments.front()).append(": ").append(last_line(log)));
-  return WEXITSTATUS(status);
+  return status;
 }
 
 int write_run(pqxx::connection& store, const MachineNight& night, const fs::path& file) {
@@ -308,7 +318,8 @@ NightOutcome work_off(pqxx::connection& store, const MachineNight& night) {
       if (!series) continue;
       const Verdict verdict = compared(folder, run, *series);
       result.departure[kind] = verdict.answer;
-      result.probability = std::min(result.probability.value_or(1.0), verdict.probability);
+      result.probability = std::min(result.probability.value_or(1.0),
+                                    std::max(verdict.probability, probability_least));
       if (verdict.departs)
         text = std::string("from its ") + (kind == "sisters" ? kind : "own past") + ", " +
                subject_text(verdict.answer);
@@ -344,6 +355,12 @@ struct Ready {
   std::string statistics;
 };
 
+/// Of a night that is over: `--slurm` makes the series before any night was worked off.
+constexpr const char* make_missing_minutes =
+    "SELECT fleet.make_minutes($1, $2::date) FROM fleet.uplink WHERE machine = $1 AND NOT EXISTS"
+    " (SELECT FROM fleet.minute WHERE machine = $1 AND at >= $2::date AND at < $2::date + 1)"
+    " GROUP BY machine HAVING max(newest) >= $2::date + 1";
+
 /// Writes their runs and statistics into the folder.
 std::vector<Ready> ready_machines(pqxx::connection& store, const WorkFolder& folder,
                                   const std::string& type, const pqxx::result& machines,
@@ -354,6 +371,9 @@ std::vector<Ready> ready_machines(pqxx::connection& store, const WorkFolder& fol
     Ready of_machine{each.machine, machine[2].as<bool>(), {}, folder / (each.name + ".toml")};
     for (const pqxx::row& day : days) {
       each.night = day[0].as<std::string>();
+      pqxx::work work(store);
+      work.exec_params(make_missing_minutes, each.machine, each.night);
+      work.commit();
       const fs::path file = folder / (each.name + "_" + each.night + ".csv");
       if (write_run(store, each, file) >= probings_min) of_machine.runs.push_back(file);
     }

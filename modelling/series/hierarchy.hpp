@@ -79,12 +79,13 @@ struct Departure {
 
 /// Distance of a machine's own estimate from `mean` in S + V, over the directions that its rows
 /// determine. In sisters whose S was estimated from `machines` of them the distance has an F
-/// distribution with freedom and `machines` degrees of freedom.
+/// distribution with freedom and `machines` degrees of freedom; infinite: S is known.
 [[nodiscard]] Departure departure_of(const Evidence& evidence, double density,
                                      const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance,
                                      double machines, std::span<const Group> groups);
 
-/// P(F >= f) by Paulson's approximation (Biometrika 29, 1942).
+/// P(F >= f) by Paulson's approximation (Biometrika 29, 1942); that of Wilson and Hilferty for
+/// chi-square where `freedom_below` is infinite.
 [[nodiscard]] double f_tail(double f, double freedom, double freedom_below);
 
 }  // namespace thermocomp::series

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "config/model/model_file.hpp"
@@ -138,8 +139,10 @@ double median_of(std::vector<double> values) {
   return values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
 }
 
-/// Degrees of freedom of S: machines, and the two that were assumed.
+/// Degrees of freedom of S: machines, and the two that were assumed. The covariance of a machine's
+/// own past comes from its rows and a stated drift instead, however few its sisters are.
 double freedom_of(const Series& series) {
+  if (!series.past_of.empty()) return std::numeric_limits<double>::infinity();
   return static_cast<double>(series.machines.size()) + 2.0;
 }
 
@@ -352,6 +355,7 @@ Series own_series(const Series& prior, const Statistics& machine, const std::str
   const Adapted own = adapted(prior, machine, prior_name);
   Series series = prior;
   series.machines.push_back(machine.machine);
+  series.past_of = machine.machine;
   series.hours += machine.time_s / 3600.0;
   std::erase_if(series.outputs,
                 [&](const auto& each) { return !own.coefficients.contains(each.first); });

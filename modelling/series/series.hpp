@@ -26,6 +26,7 @@ struct OutputSeries {
 
 struct Series {
   std::vector<std::string> machines;
+  std::string past_of;  ///< the one machine whose own past it is; empty: of a type
   double hours{0.0};
   Columns columns;
   Eigen::MatrixXd moment;  ///< mean of x x' over all rows

@@ -185,6 +185,7 @@ std::string write_series(const Series& series) {
       "# thermocomp fit --prior, sisters of thermocomp inspect --series.\n"
       "format = 1\nkind = \"series\"\n";
   add(text, "machines", toml_list(series.machines, toml_string));
+  if (!series.past_of.empty()) add(text, "past_of", toml_string(series.past_of));
   add(text, "hours", toml_number(series.hours));
   add_columns(text, series.columns);
   text += "# mean of the products of two columns\nmoment = " + toml_rows(rows_of(series.moment));
@@ -205,6 +206,7 @@ Series load_series(const std::filesystem::path& file) {
   const TomlTable root = root_of(document, "series");
   Series series;
   series.machines = root.texts("machines");
+  series.past_of = root.text("past_of", "");
   series.hours = root.number("hours", not_negative);
   series.columns = read_columns(root);
   const Eigen::Index count = series.columns.size();

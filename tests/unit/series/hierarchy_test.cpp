@@ -1,6 +1,7 @@
 #include "modelling/series/hierarchy.hpp"
 
 #include <cmath>
+#include <limits>
 #include <random>
 
 #include <Eigen/Cholesky>
@@ -153,6 +154,8 @@ TEST_CASE("the coefficient that departs is named first", "[series]") {
 TEST_CASE("the tail of F is that of tables", "[series]") {
   CHECK_THAT(f_tail(4.10, 2.0, 10.0), WithinAbs(0.05, 0.003));
   CHECK_THAT(f_tail(4.94, 5.0, 12.0), WithinAbs(0.011, 0.003));
+  const double of_chi_square = f_tail(1.8307, 10.0, std::numeric_limits<double>::infinity());
+  CHECK_THAT(of_chi_square, WithinAbs(0.05, 0.001));
 }
 
 }  // namespace

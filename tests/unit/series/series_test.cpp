@@ -148,6 +148,9 @@ TEST_CASE("statistics and series are read as they were written", "[series]") {
   std::string text = write_series(series);
   const auto series_file = written("series.toml", text);
   CHECK(write_series(load_series(series_file)) == text);
+  const std::string past = write_series(own_series(series, machines[0], "series.toml", 0.05));
+  CHECK(load_series(written("past.toml", past)).past_of == "machine 0");
+  CHECK(write_series(load_series(written("past.toml", past))) == past);
   CHECK_THROWS_WITH(load_series(statistics_file), Contains("must be \"series\""));
   const auto at = text.find("covariance = [");
   text.replace(text.find_first_of("0123456789", at), 1, "-9");
@@ -162,6 +165,27 @@ TEST_CASE("a machine with another gain departs, and its sensor is named", "[seri
   const auto other = compared(series, statistics_of_run(run_of(61, 5.0, 6.0), "other"));
   CHECK(departs(other.at(0)));
   CHECK(other[0].departure.parts.front().name == "b_degC");
+}
+
+TEST_CASE("how sure a machine's own past is does not depend on how few its sisters are",
+          "[series]") {
+  const Series series = series_of(sisters(2), std::nullopt);
+  std::vector<std::string> notes;
+  const Statistics past = statistics_of({run_of(80, 5.0, -2.0), run_of(81, 5.0, -2.0)}, "machine",
+                                        {}, {0.0, 900.0}, notes);
+  const Series own = own_series(series, past, "series.toml", 0.05);
+  const auto healthy = compared(own, statistics_of_run(run_of(82, 5.1, -2.0), "healthy"));
+  CHECK_FALSE(departs(healthy.at(0)));
+  const Statistics changed = statistics_of_run(run_of(83, 6.0, -2.0), "changed");
+  const auto beside_past = compared(own, changed);
+  CHECK(departs(beside_past.at(0)));
+  // The same distance where so few sisters had shown the covariance.
+  Series of_type = own;
+  of_type.past_of.clear();
+  const auto beside_type = compared(of_type, changed);
+  CHECK_THAT(beside_type[0].departure.distance2,
+             WithinAbs(beside_past[0].departure.distance2, 1e-9));
+  CHECK(beside_type[0].departure.probability > beside_past[0].departure.probability);
 }
 
 TEST_CASE("last year's model as a prior gives way to the rows the more it may have drifted",
