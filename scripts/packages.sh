@@ -55,5 +55,5 @@ packages_test=(
   debhelper lintian mmdebstrap systemd-container man-db groff-base
 )
 
-# Peers of bench/run.sh measured; not part of the tests, being large.
-packages_bench=("${packages_test[@]}" python3-sklearn)
+# Peers of bench/run.sh measured, and the cluster of fleet_slurm; not part of the tests, being large.
+packages_bench=("${packages_test[@]}" python3-sklearn slurm-wlm munge)

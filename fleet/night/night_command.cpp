@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <atomic>
 #include <cstdio>
+#include <cstdlib>
+#include <filesystem>
 #include <memory>
 #include <mutex>
 #include <pqxx/pqxx>
@@ -18,8 +20,12 @@
 namespace thermocomp::fleet {
 namespace {
 
+using Nights = std::vector<MachineNight>;
+
 struct NightOptions {
   int nights{30};
+  bool is_slurm{false};
+  int machine{0};  ///< 0: all
   unsigned jobs{std::max(1u, std::thread::hardware_concurrency())};
 };
 
@@ -32,8 +38,8 @@ struct Tally {
 };
 
 /// Until all are taken. What fails is noted, and does not stop the others.
-void work_off_some(const std::string& conninfo, const std::vector<MachineNight>& nights,
-                   std::size_t all, Tally& tally) {
+void work_off_some(const std::string& conninfo, const Nights& nights, std::size_t all,
+                   Tally& tally) {
   pqxx::connection store = open_store(conninfo);
   for (std::size_t i = tally.next++; i < nights.size(); i = tally.next++) {
     const MachineNight& night = nights[i];
@@ -56,36 +62,46 @@ void work_off_some(const std::string& conninfo, const std::vector<MachineNight>&
   }
 }
 
-std::vector<MachineNight> open_nights(pqxx::connection& store, int nights) {
+Nights open_nights(pqxx::connection& store, const NightOptions& options) {
   pqxx::read_transaction work(store);
-  std::vector<MachineNight> all;
+  Nights all;
   for (const pqxx::row& row :
        work.exec_params("SELECT machine, name, type, night::text FROM fleet.open_nights("
-                        "(now() AT TIME ZONE 'UTC')::date - $1::int, $2)",
-                        nights, THERMOCOMP_VERSION))
+                        "(now() AT TIME ZONE 'UTC')::date - $1::int, $2) WHERE $3 IN (0, machine)",
+                        options.nights, THERMOCOMP_VERSION, options.machine))
     all.push_back({row[0].as<int>(), row[1].as<std::string>(), row[2].as<std::string>(),
                    row[3].as<std::string>()});
   return all;
 }
 
+Nights::const_iterator end_of_date(Nights::const_iterator begin, Nights::const_iterator end) {
+  return std::find_if(begin, end,
+                      [&](const MachineNight& each) { return each.night != begin->night; });
+}
+
+/// What these nights of one date are compared with.
+void make_all_series(pqxx::connection& store, Nights::const_iterator begin,
+                     Nights::const_iterator end) {
+  std::set<std::string> types;
+  for (auto each = begin; each != end; ++each) types.insert(each->type);
+  for (const std::string& type : types) {
+    try {
+      make_series(store, type, begin->night);
+    } catch (const std::exception& error) {
+      std::fprintf(stderr, "series of %s: %s\n", type.c_str(), error.what());
+    }
+  }
+}
+
 /// Night by night, since what is judged is compared with what was before it.
-int run(const std::string& conninfo, const NightOptions& options) {
+int run_here(const std::string& conninfo, const NightOptions& options) {
   pqxx::connection store = open_store(conninfo);
-  const std::vector<MachineNight> all = open_nights(store, options.nights);
+  const Nights all = open_nights(store, options);
   Tally tally;
   for (auto begin = all.begin(); begin != all.end();) {
-    const auto end = std::find_if(
-        begin, all.end(), [&](const MachineNight& each) { return each.night != begin->night; });
-    const std::vector<MachineNight> nights(begin, end);
-    std::set<std::string> types;
-    for (const MachineNight& each : nights) types.insert(each.type);
-    for (const std::string& type : types) {
-      try {
-        make_series(store, type, begin->night);
-      } catch (const std::exception& error) {
-        std::fprintf(stderr, "series of %s: %s\n", type.c_str(), error.what());
-      }
-    }
+    const auto end = end_of_date(begin, all.end());
+    if (options.machine == 0) make_all_series(store, begin, end);
+    const Nights nights(begin, end);
     tally.next = 0;
     std::vector<std::thread> threads;
     for (unsigned i = 0; i < std::min<std::size_t>(options.jobs, nights.size()); ++i)
@@ -105,6 +121,61 @@ int run(const std::string& conninfo, const NightOptions& options) {
   return tally.failed > 0 || tally.departing > 0 ? cli::exit_no : cli::exit_success;
 }
 
+/// As Slurm takes it: 1-3,5.
+std::string ranges(const std::set<int>& numbers) {
+  std::string text;
+  for (auto first = numbers.begin(); first != numbers.end();) {
+    auto last = first;
+    while (std::next(last) != numbers.end() && *std::next(last) == *last + 1) ++last;
+    text += (text.empty() ? "" : ",") + std::to_string(*first);
+    if (last != first) text += "-" + std::to_string(*last);
+    first = std::next(last);
+  }
+  return text;
+}
+
+/// One job array, a task a machine: a task that is repeated does what has no result yet. The series
+/// are made here, before, since each needs the nights of all machines.
+int run_by_slurm(const std::string& conninfo, const NightOptions& options) {
+  std::set<int> machines;
+  std::string began;
+  {
+    pqxx::connection store = open_store(conninfo);
+    began = pqxx::nontransaction(store).exec1("SELECT now()")[0].as<std::string>();
+    const Nights all = open_nights(store, options);
+    for (auto begin = all.begin(); begin != all.end();) {
+      const auto end = end_of_date(begin, all.end());
+      make_all_series(store, begin, end);
+      begin = end;
+    }
+    for (const MachineNight& each : all) machines.insert(each.machine);
+    std::printf("%zu machine-nights of %zu machines\n", all.size(), machines.size());
+    std::fflush(stdout);
+  }
+  if (!machines.empty()) {
+    ::setenv("THERMOCOMP_FLEET_STORE", conninfo.c_str(), 1);  // sbatch hands it to the tasks
+    // Exit status 1, a departure or a failed night, is a result: it stands in the store.
+    const std::string task = "'" + std::filesystem::read_symlink("/proc/self/exe").string() +
+                             "' night --machine-number $SLURM_ARRAY_TASK_ID --nights " +
+                             std::to_string(options.nights) + "; [ $? -lt 2 ]";
+    run_program(
+        "sbatch",
+        {"--wait", "--requeue", "--job-name=thermocomp-night", "--output=thermocomp-night-%A.log",
+         "--open-mode=append", "--array=" + ranges(machines), "--wrap=" + task},
+        "");
+  }
+  pqxx::connection store = open_store(conninfo);
+  const pqxx::row counts = pqxx::nontransaction(store).exec_params1(
+      "SELECT count(*), count(*) FILTER (WHERE departs), count(*) FILTER (WHERE state = 'failed')"
+      " FROM fleet.night_result WHERE finished >= $1::timestamptz AND program_version = $2",
+      began, THERMOCOMP_VERSION);
+  const auto departing = counts[1].as<std::size_t>();
+  const std::size_t left = open_nights(store, options).size();
+  std::printf("%zu machine-nights, %zu depart, %zu failed; %zu have no result yet\n",
+              counts[0].as<std::size_t>(), departing, counts[2].as<std::size_t>(), left);
+  return left > 0 || departing > 0 ? cli::exit_no : cli::exit_success;
+}
+
 }  // namespace
 
 void add_night_command(CLI::App& app, const std::string& store, cli::Action& action) {
@@ -116,14 +187,31 @@ void add_night_command(CLI::App& app, const std::string& store, cli::Action& act
       ->add_option("--nights", options->nights, "how far back it looks for days without a result")
       ->check(CLI::Range(1, 400))
       ->capture_default_str();
-  command->add_option("-j,--jobs", options->jobs, "machines at the same time; else one a core")
-      ->check(CLI::Range(1, 256));
+  CLI::Option* jobs =
+      command->add_option("-j,--jobs", options->jobs, "machines at the same time; else one a core")
+          ->check(CLI::Range(1, 256));
+  CLI::Option* slurm =
+      command
+          ->add_flag("--slurm", options->is_slurm,
+                     "makes the series, gives Slurm (sbatch) one job array with a task a machine, "
+                     "and waits for it. The program and the store are reached from every node; the "
+                     "tasks write into thermocomp-night-JOB.log here. What was killed is done by "
+                     "the next run")
+          ->excludes(jobs);
+  command
+      ->add_option("--machine-number", options->machine,
+                   "only this machine, by its number in the store, beside the series that are "
+                   "there: a task of --slurm")
+      ->check(CLI::PositiveNumber)
+      ->excludes(slurm);
   command->footer(
-      "Exit status: 0 nothing departs; 1 a machine departs or a night failed (it is tried again); "
-      "2 bad "
-      "use, or the store is not reached.");
-  command->callback(
-      [&store, &action, options] { action = [&store, options] { return run(store, *options); }; });
+      "Exit status: 0 nothing departs; 1 a machine departs, or a night has no result (it is tried "
+      "again); 2 bad use, or the store is not reached.");
+  command->callback([&store, &action, options] {
+    action = [&store, options] {
+      return options->is_slurm ? run_by_slurm(store, *options) : run_here(store, *options);
+    };
+  });
 }
 
 }  // namespace thermocomp::fleet
