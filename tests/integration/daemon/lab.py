@@ -171,7 +171,15 @@ class Simulator:
         line = self.process.stdout.readline()
         assert line, "no ready line: " + (folder / "thermocomp-sim.log").read_text()
         self.ready = json.loads(line)
-        assert not self.ready["unavailable"], self.ready
+
+    def port(self, name):
+        return self.ready["ports"][name]
+
+    def connect(self, name):
+        return socket.create_connection(("127.0.0.1", self.port(name)), timeout=PATIENCE_S)
+
+    def alive(self):
+        return self.process.poll() is None
 
     def wait(self, patience_s):
         out, _ = self.process.communicate(timeout=patience_s)
@@ -183,8 +191,9 @@ class Simulator:
         self.process.communicate(timeout=PATIENCE_S)
 
     def end(self):
+        """Stops it as an operator would; the rest of what it printed."""
         self.process.terminate()
-        self.wait(PATIENCE_S)
+        return self.wait(PATIENCE_S)
 
 
 class Lab:
@@ -198,6 +207,7 @@ class Lab:
 
     def simulator(self, machine, *options):
         self.started.append(Simulator(self.folder, machine, *options))
+        assert not self.started[-1].ready["unavailable"], self.started[-1].ready
         return self.started[-1]
 
     def daemon(self, config, name="thermocompd"):

@@ -3,15 +3,16 @@
 import json
 import os
 import pathlib
-import signal
-import socket
 import struct
 import subprocess
-import time
+import sys
 
 import pytest
 
-BIN = pathlib.Path(os.environ.get("THERMOCOMP_BIN", "build/release/bin"))
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / "daemon"))
+import lab  # noqa: E402
+from lab import BIN, eventually  # noqa: E402, F401
+
 SOURCE = pathlib.Path(os.environ.get("THERMOCOMP_SOURCE", "."))
 PATIENCE_S = 60.0
 ROOM_DEGC = 25.0
@@ -44,24 +45,14 @@ matrix_um_per_K = [[1.0]]
 """
 
 
-class Simulator:
+class Simulator(lab.Simulator):
     def __init__(self, folder, machine):
         self.line = folder / "line"
-        (folder / "machine.toml").write_text(machine.replace("LINE", str(self.line)))
-        errors = folder / "simulator_errors"  # a file: many of them would fill a pipe
-        with open(errors, "w", encoding="utf-8") as sink:
-            self.process = subprocess.Popen(
-                [str(BIN / "thermocomp-sim"), str(folder / "machine.toml")],
-                stdout=subprocess.PIPE, stderr=sink, text=True)
-        line = self.process.stdout.readline()
-        if not line:
-            raise AssertionError("no ready line: " + errors.read_text()[:2000])
-        self.ports = json.loads(line)["ports"]
-        self.port = self.ports["net"]
+        super().__init__(folder, machine.replace("LINE", str(self.line)))
 
     def read(self, unit, function, address, count):
         """Words, or bits, as they stand in the answer: a client that is not ours to trust."""
-        with socket.create_connection(("127.0.0.1", self.port), timeout=PATIENCE_S) as link:
+        with self.connect("net") as link:
             link.sendall(struct.pack(">HHHBBHH", 1, 0, 6, unit, function, address, count))
             head = receive(link, 9)
             assert head[7] == function, f"exception {head[8]}"
@@ -69,11 +60,6 @@ class Simulator:
         if function in (1, 2):
             return [(body[i // 8] >> (i % 8)) & 1 for i in range(count)]
         return list(struct.unpack(f">{count}H", body))
-
-    def end(self):
-        if self.process.poll() is None:
-            self.process.send_signal(signal.SIGTERM)
-        self.process.communicate(timeout=PATIENCE_S)
 
 
 def receive(link, count):
@@ -95,12 +81,12 @@ def simulate(tmp_path):
 
     yield start
     for simulator in running:
-        simulator.end()
+        simulator.kill()
 
 
 def bus(simulator, kind, **keys):
     if kind == "modbus_tcp":
-        keys = {"host": "127.0.0.1", "port": simulator.port, **keys}
+        keys = {"host": "127.0.0.1", "port": simulator.port("net"), **keys}
     else:
         keys = {"device": str(simulator.line), "baud": 115200, "parity": "none", **keys}
     return table("[[bus]]", name="bus", kind=kind, **keys)
@@ -151,13 +137,3 @@ def scan(path, *options):
     whole = report["controller"] is None or report["controller"]["complete"]
     assert done.returncode == (0 if whole and report["good"] == report["channels"] else 1)
     return report, channels
-
-
-def eventually(check, what):
-    end = time.monotonic() + PATIENCE_S
-    while time.monotonic() < end:
-        value = check()
-        if value:
-            return value
-        time.sleep(0.05)
-    raise AssertionError("never happened: " + what)

@@ -95,7 +95,7 @@ def controller(port, signals=SIGNALS, **keys):
 
 def written(simulator):
     """The registers that the daemon writes, as they stand."""
-    with socket.create_connection(("127.0.0.1", simulator.ports["cnc"]), timeout=30) as link:
+    with simulator.connect("cnc") as link:
         link.sendall(struct.pack(">HHHBBHH", 1, 0, 6, 1, 3, 0, 8))
         answer = link.makefile("rb").read(9 + 16)
     return answer[9:]
@@ -103,7 +103,7 @@ def written(simulator):
 
 def test_every_register_is_read_and_none_is_changed(simulate, relay, tmp_path):
     simulator = simulate(MACHINE)
-    between = relay(simulator.ports["cnc"])
+    between = relay(simulator.port("cnc"))
     before = written(simulator)
     path = configuration(tmp_path, bus(simulator, "modbus_tcp", timeout_ms=3000.0), DEVICES,
                          SENSORS, controller(between.port))
@@ -135,7 +135,7 @@ def test_every_register_is_read_and_none_is_changed(simulate, relay, tmp_path):
 
 
 def write(simulator, address, words):
-    with socket.create_connection(("127.0.0.1", simulator.ports["cnc"]), timeout=30) as link:
+    with simulator.connect("cnc") as link:
         link.sendall(struct.pack(">HHHBBHHB", 1, 0, 7 + 2 * len(words), 1, 16, address, len(words),
                                  2 * len(words)) + struct.pack(f">{len(words)}H", *words))
         assert link.recv(100)[7] == 16
@@ -146,7 +146,7 @@ def write(simulator, address, words):
     ({"dry_run": True}, "")])
 def test_nothing_is_written_that_might_move_an_axis(simulate, relay, tmp_path, keys, why):
     simulator = simulate(MACHINE)
-    between = relay(simulator.ports["cnc"])
+    between = relay(simulator.port("cnc"))
     write(simulator, 0, [0, 5000])
     path = configuration(tmp_path, bus(simulator, "modbus_tcp", timeout_ms=3000.0), DEVICES,
                          SENSORS, controller(between.port, **keys))
@@ -161,7 +161,7 @@ def test_a_register_that_is_not_there_is_named_with_the_exception(simulate, rela
     more = table("[[controller.signal]]", name="y_mm", table="input", address=900,
                  encoding="int32", scale=0.001)
     path = configuration(tmp_path, bus(simulator, "modbus_tcp", timeout_ms=3000.0), DEVICES,
-                         SENSORS, controller(relay(simulator.ports["cnc"]).port, SIGNALS + more))
+                         SENSORS, controller(relay(simulator.port("cnc")).port, SIGNALS + more))
     report, _ = scan(path)
     missing = [each for each in report["controller"]["values"] if each["why"]]
     assert [each["what"] for each in missing] == ["y_mm"]
@@ -175,7 +175,7 @@ def test_a_register_that_is_not_there_is_named_with_the_exception(simulate, rela
 def test_a_controller_that_is_silent_or_gone_is_told_so(simulate, relay, tmp_path):
     simulator = simulate(MACHINE)
     sensors = bus(simulator, "modbus_tcp", timeout_ms=3000.0)
-    silent = controller(relay(simulator.ports["cnc"], is_silent=True).port)
+    silent = controller(relay(simulator.port("cnc"), is_silent=True).port)
     path = configuration(tmp_path, sensors, DEVICES, SENSORS,
                          silent.replace("timeout_ms = 3000.0", "timeout_ms = 200.0"))
     report, _ = scan(path)

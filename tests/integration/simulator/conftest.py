@@ -1,63 +1,15 @@
 """A running thermocomp-sim, and the few bytes of Modbus the tests speak themselves."""
 
-import json
-import os
 import pathlib
 import re
-import signal
-import socket
 import struct
 import subprocess
-import time
+import sys
 
 import pytest
 
-BIN = pathlib.Path(os.environ.get("THERMOCOMP_BIN", "build/release/bin"))
-PATIENCE_S = 20.0
-
-
-def eventually(check, what):
-    """Polls until check() gives something true; that value."""
-    end = time.monotonic() + PATIENCE_S
-    while time.monotonic() < end:
-        value = check()
-        if value:
-            return value
-        time.sleep(0.02)
-    raise AssertionError("never happened: " + what)
-
-
-class Simulator:
-    def __init__(self, folder, machine, *options):
-        self.folder = folder
-        self.machine = folder / "machine.toml"
-        self.machine.write_text(machine)
-        self.process = subprocess.Popen(
-            [str(BIN / "thermocomp-sim"), str(self.machine), *map(str, options)],
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=folder)
-        line = self.process.stdout.readline()
-        if not line:
-            raise AssertionError("no ready line: " + self.process.stderr.read())
-        self.ready = json.loads(line)
-
-    def port(self, name):
-        return self.ready["ports"][name]
-
-    def connect(self, name):
-        link = socket.create_connection(("127.0.0.1", self.port(name)), timeout=PATIENCE_S)
-        link.settimeout(PATIENCE_S)
-        return link
-
-    def alive(self):
-        return self.process.poll() is None
-
-    def end(self):
-        """Stops it as an operator would; the rest of what it printed."""
-        if self.alive():
-            self.process.send_signal(signal.SIGTERM)
-        out, err = self.process.communicate(timeout=PATIENCE_S)
-        assert self.process.returncode == 0, err
-        return out
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / "daemon"))
+from lab import BIN, PATIENCE_S, Simulator, eventually  # noqa: E402, F401
 
 
 @pytest.fixture
@@ -70,9 +22,7 @@ def simulate(tmp_path):
 
     yield start
     for simulator in running:
-        if simulator.alive():
-            simulator.process.kill()
-        simulator.process.communicate()
+        simulator.kill()
 
 
 def request(unit, pdu, transaction=1):

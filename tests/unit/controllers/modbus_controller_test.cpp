@@ -494,30 +494,22 @@ TEST_CASE("a controller that is not there is tried again for ever", "[controller
 }
 
 TEST_CASE("a Modbus controller that cannot be is refused", "[controllers]") {
-  const ModbusControllerConfig good = three_axes(502);
-  CHECK_NOTHROW(ModbusController(good));
-  ModbusControllerConfig bad = good;
-  bad.axes[1].offset.address = 1;  // half of axis 0
-  CHECK_THROWS_AS(ModbusController(bad), InvalidValue);
-  bad = good;
-  bad.axes[0].offset.table = ModbusTable::input;
-  CHECK_THROWS_AS(ModbusController(bad), InvalidValue);
-  bad = good;
-  bad.axes[0].offset.scale = 0.0;
-  CHECK_THROWS_AS(ModbusController(bad), InvalidValue);
-  bad = good;
-  bad.axes[0].offset.address = 65535;  // two registers
-  CHECK_THROWS_AS(ModbusController(bad), InvalidValue);
-  bad = good;
-  bad.period_s = 0.0;
-  CHECK_THROWS_AS(ModbusController(bad), InvalidValue);
-  bad = good;
-  bad.signals = {{signals_max, at(ModbusTable::input, 0, Encoding::int16)}};
-  CHECK_THROWS_AS(ModbusController(bad), InvalidValue);
-  bad = good;
-  bad.axes.resize(17, good.axes[0]);
-  CHECK_THROWS_AS(ModbusController(bad), InvalidValue);
-  bad = good;
-  bad.line.link = ModbusTcp{"", 502};
-  CHECK_THROWS_AS(ModbusController(bad), DriverError);
+  const auto refused = [](auto change) {
+    ModbusControllerConfig bad = three_axes(502);
+    CHECK_NOTHROW(ModbusController(bad));
+    change(bad);
+    CHECK_THROWS_AS(ModbusController(bad), InvalidValue);
+  };
+  refused([](auto& bad) { bad.axes[1].offset.address = 1; });  // half of axis 0
+  refused([](auto& bad) { bad.axes[0].offset.table = ModbusTable::input; });
+  refused([](auto& bad) { bad.axes[0].offset.scale = 0.0; });
+  refused([](auto& bad) { bad.axes[0].offset.address = 65535; });  // two registers
+  refused([](auto& bad) { bad.period_s = 0.0; });
+  refused([](auto& bad) {
+    bad.signals = {{signals_max, at(ModbusTable::input, 0, Encoding::int16)}};
+  });
+  refused([](auto& bad) { bad.axes.resize(17, bad.axes[0]); });
+  ModbusControllerConfig nowhere = three_axes(502);
+  nowhere.line.link = ModbusTcp{"", 502};
+  CHECK_THROWS_AS(ModbusController(nowhere), DriverError);
 }

@@ -431,24 +431,17 @@ TEST_CASE("a CAN controller that cannot be is refused", "[controllers][can]") {
   good.valid_bits = can_signal(0x100, 32, 8);
   good.heartbeat = can_signal(0x100, 40, 8);
   CHECK_NOTHROW(CanController(good));
-  CanControllerConfig bad = good;
-  bad.axes[1].offset.start_bit = 15;
-  CHECK_THROWS_AS(CanController(bad), InvalidValue);
-  bad = good;
-  bad.axes[1].applied->id = 0x100;
-  CHECK_THROWS_AS(CanController(bad), InvalidValue);
-  bad = good;
-  bad.axes[1].offset.start_bit = 60;
-  CHECK_THROWS_AS(CanController(bad), InvalidValue);
-  bad = good;
-  bad.valid_bits->length_bits = 1;
-  CHECK_THROWS_AS(CanController(bad), InvalidValue);
-  bad = good;
-  bad.interface = "";
-  CHECK_THROWS_AS(CanController(bad), InvalidValue);
-  bad = good;
-  bad.period_s = -1.0;
-  CHECK_THROWS_AS(CanController(bad), InvalidValue);
+  const auto refused = [&good](auto change) {
+    CanControllerConfig bad = good;
+    change(bad);
+    CHECK_THROWS_AS(CanController(bad), InvalidValue);
+  };
+  refused([](auto& bad) { bad.axes[1].offset.start_bit = 15; });
+  refused([](auto& bad) { bad.axes[1].applied->id = 0x100; });
+  refused([](auto& bad) { bad.axes[1].offset.start_bit = 60; });
+  refused([](auto& bad) { bad.valid_bits->length_bits = 1; });
+  refused([](auto& bad) { bad.interface = ""; });
+  refused([](auto& bad) { bad.period_s = -1.0; });
 }
 
 TEST_CASE("a controller that moves between read-back and first command is noticed",

@@ -266,27 +266,16 @@ TEST_CASE("while one node must stand, nothing of the set is written and its bit 
 }
 
 TEST_CASE("sets that cannot be are refused", "[controllers][travel]") {
-  const auto refused = [](const ModbusTravel& travel) {
+  const auto refused = [](ModbusTravel travel, auto change) {
+    change(travel);
     CHECK_THROWS_AS(ModbusController(config_of(1, travel)), InvalidValue);
   };
-  ModbusTravel bad = line();
-  bad.values[1].address = 24;  // a gap
-  refused(bad);
-  bad = line();
-  bad.end.address = 19;
-  refused(bad);
-  bad = line();
-  bad.nodes_mm = {0.0, 100.0, 200.0};
-  refused(bad);
-  bad = table();
-  bad.nodes_mm[1] = 400.0;
-  refused(bad);
-  bad = table();
-  bad.applied.pop_back();
-  refused(bad);
-  bad = table();
-  bad.begin.encoding = Encoding::float32;
-  refused(bad);
+  refused(line(), [](auto& bad) { bad.values[1].address = 24; });  // a gap
+  refused(line(), [](auto& bad) { bad.end.address = 19; });
+  refused(line(), [](auto& bad) { bad.nodes_mm = {0.0, 100.0, 200.0}; });
+  refused(table(), [](auto& bad) { bad.nodes_mm[1] = 400.0; });
+  refused(table(), [](auto& bad) { bad.applied.pop_back(); });
+  refused(table(), [](auto& bad) { bad.begin.encoding = Encoding::float32; });
 }
 
 TEST_CASE("a set that stands in its registers tells the offsets at the nodes", "[controllers]") {

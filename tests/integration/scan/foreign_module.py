@@ -1,10 +1,10 @@
 """A thermocouple module made of pymodbus (software that is not ours), on TCP or a serial port.
 
-    thermocouple_module.py tcp PORT | rtu DEVICE BAUD
+    foreign_module.py tcp PORT | rtu DEVICE BAUD
 
 Input registers: four floats 23.4375 in the word orders ABCD, DCBA, BADC, CDAB at 0, 2, 4, 6;
 int16 tenths of a degree at 20: 215, -57, 32767 (open circuit), 1. Holding registers: a float64
-at 0, an int32 -123456 (low word first) at 10. Discrete inputs: second channel broken.
+at 0. Discrete inputs: second channel broken.
 The floats are packed by pymodbus' own payload builder where it knows the order.
 """
 import sys
@@ -39,7 +39,6 @@ def context():
     inputs[20:24] = [215, 0x10000 - 57, 32767, 1]
     holdings = [0] * 100
     holdings[0:4] = registers_of(Endian.Big, Endian.Big, lambda b: b.add_64bit_float(-12.625))
-    holdings[10:12] = registers_of(Endian.Big, Endian.Little, lambda b: b.add_32bit_int(-123456))
     bits = [0, 1, 0, 0] + [0] * 12
     slave = ModbusSlaveContext(
         di=ModbusSequentialDataBlock(0, bits), co=ModbusSequentialDataBlock(0, [0] * 16),
