@@ -14,25 +14,13 @@ import time
 import pytest
 from conftest import PROGRAM, SOURCE, run
 
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / "daemon"))
+from lab import eventually, free_port  # noqa: E402
+
 HERE = pathlib.Path(__file__).parent
 DAEMON = pathlib.Path(PROGRAM).parent / "thermocompd"
 PATIENCE_S = 60.0
 NAMES = "bed column spindle"
-
-
-def eventually(check, what):
-    end = time.monotonic() + PATIENCE_S
-    while time.monotonic() < end:
-        if value := check():
-            return value
-        time.sleep(0.05)
-    raise AssertionError("never happened: " + what)
-
-
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 def listens(port):

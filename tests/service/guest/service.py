@@ -10,7 +10,7 @@ import socket
 import sqlite3
 import subprocess
 
-from lab import eventually
+from lab import eventually, free_port
 from plain_devices import BLOCKS, MODEL, OVER_TCP, PlainController, PlainModule
 
 UNIT = "thermocompd.service"
@@ -116,12 +116,6 @@ commit_s = 0.2
 """
 LIMITS = f"offset_um_max = 60.0\nrate_um_per_s_max = {SLEW_UM_PER_S}\n"
 ENABLED = "[compensation]\nenabled_at_first_start = true\n"
-
-
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 def write_config(text):
