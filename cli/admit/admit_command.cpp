@@ -15,6 +15,7 @@
 #include "cli/commands.hpp"
 #include "cli/common/daemon_client.hpp"
 #include "cli/common/json_fields.hpp"
+#include "cli/observe/status_text.hpp"
 #include "cli/operate/promotion.hpp"
 #include "config/daemon/daemon_config.hpp"
 #include "config/model/approval.hpp"
@@ -98,6 +99,10 @@ class Steps {
     const json& steps = list_of(kept_, "steps");
     return steps.empty() ? "" : text_of(steps.back(), "step");
   }
+  [[nodiscard]] std::string last_detail() const {
+    const json& steps = list_of(kept_, "steps");
+    return steps.empty() ? "" : text_of(steps.back(), "detail");
+  }
   void begin(const Offer& offer) {
     kept_ = {{"release", offer.order.release},
              {"model", offer.order.checksum},
@@ -132,7 +137,7 @@ class Admission {
     if (offer_.order.release > steps_.release()) receive();
     if (steps_.last() == "checked") {
       run_beside(config_.socket.path, candidate_file());
-      steps_.add("candidate", "");
+      steps_.add("candidate", score_text({}));
     }
     if (steps_.last() == "candidate") look_at_candidate();
     if (steps_.last() == "promoted") look_at_promoted();
@@ -200,6 +205,8 @@ class Admission {
         part_from<Status>(ask_daemon(config_.socket.path, "status", json::object()));
     if (!status.candidate || status.candidate->file != candidate_file())
       run_beside(config_.socket.path, candidate_file());
+    else if (const std::string score = score_text(*status.candidate); score != steps_.last_detail())
+      steps_.add("candidate", score);  // by which it is approved
     if (settings_.approvers.empty() || offer_.approval.empty()) return;
     const std::string name = signer(false);
     if (name.empty()) return end_candidate(signed_by_nobody("approval"));

@@ -289,19 +289,23 @@ std::string status_text(const Status& status, bool colours) {
          line("Daemon", "version " + status.version + ", up " + duration_text(status.uptime_s));
 }
 
-std::string candidate_text(const CandidateStatus& candidate) {
-  if (!candidate.problem.empty()) return candidate.file + " does not run: " + candidate.problem;
-  if (candidate.probings == 0) return candidate.file + ", not probed yet";
-  std::string text = candidate.file;
+std::string score_text(const CandidateStatus& candidate) {
+  if (candidate.probings == 0) return "not probed yet";
+  std::string text;
   for (const auto& [axis, rms] : candidate.rms_um)
-    text +=
-        ", " + axis + " leaves " + fixed(rms.candidate, 1) + " of " + fixed(rms.model, 1) + " um";
+    text += (text.empty() ? "" : ", ") + axis + " leaves " + fixed(rms.candidate, 1) + " of " +
+            fixed(rms.model, 1) + " um";
   const bool is_worse = candidate.worse_probability > candidate.better_probability;
   return text + " over " + std::to_string(candidate.probings) +
          (candidate.probings == 1 ? " probing, " : " probings, ") +
          (is_worse ? "worse" : "better") + " with " +
          fixed(100.0 * std::max(candidate.better_probability, candidate.worse_probability), 0) +
          " %";
+}
+
+std::string candidate_text(const CandidateStatus& candidate) {
+  if (!candidate.problem.empty()) return candidate.file + " does not run: " + candidate.problem;
+  return candidate.file + ", " + score_text(candidate);
 }
 
 std::string sensors_text(const SensorsAnswer& answer, bool colours) {

@@ -10,7 +10,9 @@ namespace thermocomp::cli {
 /// `thermocomp status`: aligned `Key : value` lines.
 [[nodiscard]] std::string status_text(const Status& status, bool colours);
 
-/// "new.toml, z leaves 1.8 of 3.1 um over 14 probings, better with 97 %".
+/// "z leaves 1.8 of 3.1 um over 14 probings, better with 97 %".
+[[nodiscard]] std::string score_text(const CandidateStatus& candidate);
+/// The same after the file's name.
 [[nodiscard]] std::string candidate_text(const CandidateStatus& candidate);
 
 /// `thermocomp sensors`: a line a sensor.

@@ -174,6 +174,7 @@ SocketConfig read_socket(const TomlTable& table, const fs::path& folder) {
   socket.read_group = table.text("read_group", socket.read_group);
   socket.operator_group = table.text("operator_group", socket.operator_group);
   socket.bridge_group = table.text("bridge_group", socket.bridge_group);
+  socket.model_group = table.text("model_group", socket.model_group);
   return socket;
 }
 

@@ -40,6 +40,7 @@ struct SocketConfig {
   std::string read_group{"thermocomp"};
   std::string operator_group{"thermocomp-operator"};
   std::string bridge_group{"thermocomp-bridge"};
+  std::string model_group{"thermocomp-model"};  ///< may change which model runs
   bool operator==(const SocketConfig&) const = default;
 };
 

@@ -396,8 +396,9 @@ RpcPending candidate(const DaemonActions& actions, const json& params) {
 
 void add_operator_methods(StatusServer& server, const DaemonActions& actions) {
   add_reads(server, actions);
-  const auto add = [&](const char* name, RpcSlowHandler handler) {
-    server.add_slow_method(name, AccessClass::operate, std::move(handler));
+  const auto add = [&](const char* name, RpcSlowHandler handler,
+                       AccessClass access = AccessClass::operate) {
+    server.add_slow_method(name, access, std::move(handler));
   };
   const auto simple = [&](const char* name, CommandKind kind) {
     add(name, [actions, kind](const json&) { return actions.command({kind, 0, 0.0}); });
@@ -414,8 +415,9 @@ void add_operator_methods(StatusServer& server, const DaemonActions& actions) {
   add("prove", [actions](const json& params) { return prove(actions, params); });
   add("release", [actions](const json& params) { return release(actions, params); });
   add("accept", [actions](const json& params) { return accept(actions, params); });
-  add("reload", [actions](const json&) { return reload(actions); });
-  add("candidate", [actions](const json& params) { return candidate(actions, params); });
+  add("reload", [actions](const json&) { return reload(actions); }, AccessClass::model);
+  add("candidate", [actions](const json& params) { return candidate(actions, params); },
+      AccessClass::model);
   server.add_method("controller_state", AccessClass::bridge, [actions](const json& params) {
     refuse_unless(bool(actions.controller_state), "this configuration's controller is no bridge");
     return actions.controller_state(params);

@@ -66,11 +66,11 @@ std::optional<Peer> peer_of(int socket_fd) {
 
 AccessGroups look_up_groups(const SocketConfig& config) {
   return {group_called(config.read_group), group_called(config.operator_group),
-          group_called(config.bridge_group)};
+          group_called(config.model_group), group_called(config.bridge_group)};
 }
 
 PeerAccess access_of(const Peer& peer, uid_t daemon_user, const AccessGroups& groups) {
-  if (peer.user == 0) return {true, true, true};
+  if (peer.user == 0) return {true, true, true, true};
   const bool is_own_user = peer.user == daemon_user;
   const auto allowed = [&](const std::optional<gid_t>& group) {
     // Without the groups this is a development daemon, and its own user stands for all of them.
@@ -78,8 +78,9 @@ PeerAccess access_of(const Peer& peer, uid_t daemon_user, const AccessGroups& gr
   };
   PeerAccess access;
   access.operate = allowed(groups.operate);
+  access.model = access.operate || allowed(groups.model);
   access.bridge = allowed(groups.bridge);
-  access.read = is_own_user || access.operate || access.bridge || allowed(groups.read);
+  access.read = is_own_user || access.model || access.bridge || allowed(groups.read);
   return access;
 }
 

@@ -25,6 +25,7 @@ struct Peer {
 struct AccessGroups {
   std::optional<gid_t> read;
   std::optional<gid_t> operate;
+  std::optional<gid_t> model;
   std::optional<gid_t> bridge;
 };
 

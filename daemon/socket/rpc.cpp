@@ -31,10 +31,26 @@ bool is_allowed(const PeerAccess& access, AccessClass needed) {
       return access.read;
     case AccessClass::operate:
       return access.operate;
+    case AccessClass::model:
+      return access.model;
     case AccessClass::bridge:
       return access.bridge;
   }
   return false;
+}
+
+std::string groups_of(const SocketConfig& config, AccessClass needed) {
+  switch (needed) {
+    case AccessClass::read:
+      return config.read_group;
+    case AccessClass::operate:
+      return config.operator_group;
+    case AccessClass::model:
+      return config.operator_group + " or " + config.model_group;
+    case AccessClass::bridge:
+      return config.bridge_group;
+  }
+  return "";
 }
 
 /// A request that has the shape of one.
@@ -151,10 +167,8 @@ const RpcDispatcher::Method& RpcDispatcher::find(const PeerAccess& access,
   }
   const AccessClass needed = method->second.access;
   if (!is_allowed(access, needed)) {
-    const std::string& group = needed == AccessClass::read      ? config_.read_group
-                               : needed == AccessClass::operate ? config_.operator_group
-                                                                : config_.bridge_group;
-    throw RpcError(rpc::not_permitted, name + ": only for root and members of " + group);
+    throw RpcError(rpc::not_permitted,
+                   name + ": only for root and members of " + groups_of(config_, needed));
   }
   return method->second;
 }

@@ -26,8 +26,9 @@ class SocketError : public std::runtime_error {
 
 /// Who may call a method. root always may.
 enum class AccessClass {
-  read,     ///< read_group, operator_group, bridge_group, and the daemon's own user
+  read,     ///< the members of any group, and the daemon's own user
   operate,  ///< operator_group
+  model,    ///< which model runs: operator_group, model_group
   bridge    ///< bridge_group
 };
 
@@ -35,9 +36,10 @@ enum class AccessClass {
 struct PeerAccess {
   bool read{false};
   bool operate{false};
+  bool model{false};
   bool bridge{false};
 
-  [[nodiscard]] bool any() const noexcept { return read || operate || bridge; }
+  [[nodiscard]] bool any() const noexcept { return read || operate || model || bridge; }
   bool operator==(const PeerAccess&) const = default;
 };
 

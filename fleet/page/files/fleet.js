@@ -151,7 +151,9 @@ function releaseList(releases) {
   for (const release of releases) {
     const entry = make('li', 'release ' + release.id + ', model ' + release.model + (release.note ? ': ' + release.note : ''));
     const steps = make('ol');
-    for (const step of release.steps || []) {
+    const all = release.steps || [];
+    const isOldScore = (step, i) => step.step === 'candidate' && all[i + 1] && all[i + 1].step === 'candidate';
+    for (const step of all.filter((step, i) => !isOldScore(step, i))) {
       const line = make('li');
       line.append(make('time', clock(step.at_s)), step.step.replace(/_/g, ' ') + ' by ' + step.who +
                   (step.detail ? ', ' + step.detail : ''));

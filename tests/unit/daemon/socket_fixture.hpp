@@ -29,7 +29,7 @@ class RunningServer {
  public:
   explicit RunningServer(const std::filesystem::path& path, const SocketLimits& limits = {})
       : config_{path, "thermocomp-no-such-group", "thermocomp-no-such-group",
-                "thermocomp-no-such-group"} {
+                "thermocomp-no-such-group", "thermocomp-no-such-group"} {
     server_ = std::make_unique<StatusServer>(config_, limits);
     server_->add_method("status", AccessClass::read, [](const json&) {
       return json{{"mode", "compensating"}, {"value_um", not_a_number}};

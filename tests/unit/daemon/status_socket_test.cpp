@@ -146,26 +146,28 @@ TEST_CASE("another user without the groups may do nothing", "[socket][permission
 
 TEST_CASE("each group may do what is its own", "[socket][permission]") {
   // Groups of every Debian system stand for those of the package.
-  const SocketConfig config{"/s", "users", "disk", "dialout"};
+  const SocketConfig config{"/s", "users", "disk", "dialout", "audio"};
   const auto gid = [](const char* name) { return getgrnam(name)->gr_gid; };
   const auto access = [&](uid_t user, std::vector<gid_t> groups) {
     return access_of({user, 65534, std::move(groups)}, 990, look_up_groups(config));
   };
   const PeerAccess reader = access(1000, {gid("users")});
-  CHECK((reader.read && !reader.operate && !reader.bridge));
+  CHECK(reader == PeerAccess{.read = true});
   const PeerAccess op = access(1000, {gid("disk")});
-  CHECK((op.read && op.operate && !op.bridge));
+  CHECK(op == PeerAccess{.read = true, .operate = true, .model = true});
   const PeerAccess bridge = access(1000, {gid("dialout")});
-  CHECK((bridge.read && !bridge.operate && bridge.bridge));
+  CHECK(bridge == PeerAccess{.read = true, .bridge = true});
+  const PeerAccess modeller = access(1000, {gid("audio")});
+  CHECK(modeller == PeerAccess{.read = true, .model = true});
   const PeerAccess nobody = access(1000, {});
-  CHECK((!nobody.read && !nobody.operate && !nobody.bridge));
+  CHECK(nobody == PeerAccess{});
   const PeerAccess own = access(990, {});
-  CHECK((own.read && !own.operate && !own.bridge));
+  CHECK(own == PeerAccess{.read = true});
   const PeerAccess root = access(0, {});
-  CHECK((root.read && root.operate && root.bridge));
+  CHECK(root == PeerAccess{true, true, true, true});
   const PeerAccess developer = access_of(
-      {1000, 1000, {}}, 1000, look_up_groups({"/s", "no-such-1", "no-such-2", "no-such-3"}));
-  CHECK((developer.read && developer.operate && developer.bridge));
+      {1000, 1000, {}}, 1000, look_up_groups({"/s", "no-such-1", "no-such-2", "no-such-3", "no-such-4"}));
+  CHECK(developer == PeerAccess{true, true, true, true});
 }
 
 TEST_CASE("a socket path is taken over only from the dead", "[socket]") {
