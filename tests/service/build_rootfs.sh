@@ -59,12 +59,13 @@ if ! mmdebstrap --mode=root --variant=minbase --include="$base" \
 fi
 comm -13 "$folder/packages.base" "$folder/packages.dependencies" > "$folder/dependencies"
 
-# Nothing to be done on a first boot, and no unit that a guest has no use for.
+# Nothing to be done on a first boot, and no unit that a guest has no use for. PostgreSQL's server is started by the
+# test that needs it.
 rootfs=$folder/rootfs
 echo 0123456789abcdef0123456789abcdef > "$rootfs/etc/machine-id"
 touch "$rootfs/etc/.updated" "$rootfs/var/.updated"
 for unit in apt-daily.timer apt-daily-upgrade.timer dpkg-db-backup.timer e2scrub_all.timer \
-  e2scrub_reap.service fstrim.timer getty.target getty@tty1.service kmod-static-nodes.service \
+  e2scrub_reap.service fstrim.timer getty.target getty@tty1.service kmod-static-nodes.service postgresql.service \
   modprobe@configfs.service modprobe@dm_mod.service modprobe@drm.service modprobe@fuse.service \
   modprobe@loop.service systemd-journal-flush.service systemd-logind.service \
   systemd-pstore.service systemd-random-seed.service systemd-timesyncd.service \

@@ -70,7 +70,7 @@ echo "thermocomp-modelling: structure, place, diagnose"
 if [[ $(id -u) -eq 0 ]]; then
   # shellcheck disable=SC2046,SC2086
   "$here/build_rootfs.sh" "$folder" $beside_machine -- $(depends_of thermocomp-modelling) \
-    -- $(depends_of thermocomp-gateway)
+    -- $(depends_of thermocomp-gateway thermocomp-uplink thermocomp-fleet) postgresql
 fi
 
 for file in "$packages"/*.deb; do

@@ -18,7 +18,7 @@ case $kind in
   nspawn)
     command -v systemd-nspawn >/dev/null || skip "systemd-container is not installed"
     tests=(test_1_install_and_start.py test_2_survive.py test_3_sandbox.py
-      test_4_upgrade_and_remove.py test_5_gateway.py)
+      test_4_upgrade_and_remove.py test_5_gateway.py test_6_fleet.py)
     ;;
   uml)
     command -v linux.uml >/dev/null || skip "user-mode-linux is not installed"

@@ -124,6 +124,18 @@ def test_an_approved_release_is_promoted_and_taken_back(lab, store):
     assert mill.model() == MODEL
     mill.admit()  # without an approval nothing more happens
     assert [step for step, _, _ in mill.steps(release)] == ["offered", "checked", "candidate"]
+    assert mill.steps(release)[-1][2].endswith("not probed yet")
+
+    # Who approves it sees how it does: of 15 um the model takes out a third too much, the candidate none.
+    mill.machine.warm_by(15.0)
+    mill.daemon.wait_for_offset(15.0, 0.05)
+    assert mill.daemon.cli("measured", "z", 5.0)[0] == 0
+    mill.admit()
+    step, _, score = mill.steps(release)[-1]
+    assert step == "candidate" and re.search(r"z leaves [\d.]+ of [\d.]+ um over 1 probing, better with \d+ %$", score), score
+    assert f"release {release}, mill_1: candidate, {score}" in store.fleet("status")
+    mill.machine.warm_by(12.0)
+    mill.daemon.wait_for_offset(12.0, 0.05)
 
     store.fleet("approve", release, "--key", mill.key)
     assert mill.admit()[0] == 0
@@ -136,9 +148,9 @@ def test_an_approved_release_is_promoted_and_taken_back(lab, store):
     mill.daemon.wait_for_offset(12.0, 0.05)
     assert [(step, who) for step, who, _ in mill.steps(release)] == [
         ("offered", "postgres"), ("checked", "machine_mill_1"), ("candidate", "machine_mill_1"),
-        ("approved", "postgres"), ("promoted", "machine_mill_1"), ("rollback", "postgres"),
+        ("candidate", "machine_mill_1"), ("approved", "postgres"), ("promoted", "machine_mill_1"), ("rollback", "postgres"),
         ("rolled_back", "machine_mill_1")]
-    assert "as ordered by maria" in mill.steps(release)[4][2]
+    assert "as ordered by maria" in mill.steps(release)[5][2]
     assert "rolled_back" in store.fleet("approve", release, "--key", mill.key, status=1)
     assert_slewed(mill.machine.controller.orders())
     mill.daemon.end()
