@@ -206,7 +206,7 @@ void Cycle::take_over(std::uint64_t cycle) noexcept {
   if (next == nullptr) return;
   retiring_ = parts_.release();
   next->estimator.adopt(retiring_->estimator);
-  // Its lags have lived through what those of another model have not.
+  // Its lags and its inputs' reference have lived through what those of another model have not.
   if (next->promotes && retiring_->candidate)
     next->estimator.adopt_model(retiring_->candidate->estimator());
   if (next->candidate) next->candidate->adopt(retiring_->estimator, retiring_->candidate.get());

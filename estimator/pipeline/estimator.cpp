@@ -303,6 +303,7 @@ void Estimator::adopt(const Estimator& previous) noexcept {
 }
 
 void Estimator::adopt_model(const Estimator& beside) noexcept {
+  stages_->reference.complete(beside.stages_->reference);
   stages_->prediction.adopt_model(beside.stages_->prediction);
 }
 

@@ -72,6 +72,16 @@ void Reference::adopt(const Reference& previous, const std::vector<int>& columns
   take_by_plan(signals, previous.signals_, signals_);
 }
 
+void Reference::complete(const Reference& same) noexcept {
+  for (std::size_t i = 0; i < temps_degC_.size(); ++i) {
+    if (std::isfinite(temps_degC_[i])) continue;
+    temps_degC_[i] = same.temps_degC_[i];
+    sampled_at_[i] = same.sampled_at_[i];
+  }
+  for (std::size_t i = 0; i < signals_.size(); ++i)
+    if (!std::isfinite(signals_[i])) signals_[i] = same.signals_[i];
+}
+
 namespace {
 
 /// The model as LostBlocks is to see it.

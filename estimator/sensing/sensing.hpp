@@ -48,6 +48,8 @@ class Reference {
   /// deliberate; otherwise the machine's state stays.
   void adopt(const Reference& previous, const std::vector<int>& columns,
              const std::vector<int>& signals) noexcept;
+  /// Takes what is not known yet from that of an estimator with the same model.
+  void complete(const Reference& same) noexcept;
   void visit_temperatures(StateArchive& archive) { archive(temps_degC_, sampled_at_); }
   void visit_signals(StateArchive& archive) { archive(signals_); }
 

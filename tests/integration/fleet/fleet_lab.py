@@ -69,6 +69,8 @@ class Store:
 
 CONFIG = """format = 1
 state_file = "{folder}/state.json"
+[loop]
+rate_hz = 2
 [model]
 file = "model.toml"
 [[bus]]

@@ -33,6 +33,7 @@ class Machine {
  public:
   Machine(const DaemonConfig& config, const Course& course)
       : course_(course),
+        period_s_(1.0 / config.loop.rate_hz),
         random_(course.seed),
         writer_(config.history, grid_, "test", 65536,
                 {[this] { return now_; }, [this] { return wall(); }}),
@@ -45,15 +46,16 @@ class Machine {
     writer_.open();
     recorder_->begin(0, estimator_, SegmentReason::start);
     note("started");
-    const auto cycles = static_cast<std::uint64_t>(course_.hours * 3600.0 / period_s);
+    const auto cycles = static_cast<std::uint64_t>(course_.hours * 3600.0 / period_s_);
+    const auto minute = static_cast<std::uint64_t>(60.0 / period_s_);
     for (std::uint64_t cycle = 0; cycle < cycles; ++cycle) {
       now_ = grid_.time_of(cycle);
-      show_readings(period_s * static_cast<double>(cycle));
-      if (cycle > 100 && uniform() < course_.probings_per_h * period_s / 3600.0) probe(cycle);
+      show_readings(period_s_ * static_cast<double>(cycle));
+      if (cycle > 100 && uniform() < course_.probings_per_h * period_s_ / 3600.0) probe(cycle);
       estimator_.step(now_, readings_, controller_, command_);
       recorder_->record(cycle, readings_, controller_, command_, estimator_);
-      if (cycle % 4 == 0) writer_.work();
-      if (cycle % 7200 == 0) note("hour " + std::to_string(cycle / 7200));
+      if (cycle % minute == 0) writer_.work();
+      if (cycle % (60 * minute) == 0) note("hour " + std::to_string(cycle / (60 * minute)));
     }
     recorder_->finish(cycles - 1, command_);
     writer_.stop();
@@ -62,8 +64,6 @@ class Machine {
   }
 
  private:
-  static constexpr double period_s = 0.5;
-
   [[nodiscard]] nanoseconds wall() const {
     const double passed_s = 1e-9 * static_cast<double>((now_ - grid_.start).count());
     double wall_s = course_.begin_s + passed_s;
@@ -103,8 +103,10 @@ class Machine {
   }
 
   Course course_;
+  double period_s_;
   std::mt19937 random_;
-  Grid grid_{std::chrono::hours(7), std::chrono::milliseconds(500)};
+  Grid grid_{std::chrono::hours(7),
+             nanoseconds(static_cast<std::int64_t>(1e9 * period_s_))};
   nanoseconds now_{grid_.start};
   HistoryWriter writer_;
   Estimator estimator_;

@@ -132,6 +132,7 @@ def test_an_approved_release_is_promoted_and_taken_back(lab, store):
     assert mill.daemon.cli("measured", "z", 5.0)[0] == 0
     mill.admit()
     step, _, score = mill.steps(release)[-1]
+    print(score)
     assert step == "candidate" and re.search(r"z leaves [\d.]+ of [\d.]+ um over 1 probing, better with \d+ %$", score), score
     assert f"release {release}, mill_1: candidate, {score}" in store.fleet("status")
     mill.machine.warm_by(12.0)

@@ -14,7 +14,7 @@ from service import CONFIG, run
 UNIT = "thermocomp-gateway.service"
 SETTINGS = CONFIG.parent / "gateway.toml"
 PASSWORDS = CONFIG.parent / "gateway.passwords"
-PORT = 8420
+PORT = 8420  # of the page of a store too
 GATEWAY = 'format = 1\nmachine = "mill_3"\n[http]\n'
 EXPOSURE_MAX = 1.5
 

@@ -264,6 +264,7 @@ std::unique_ptr<CycleParts> contested(const ThermalModel& model, const ThermalMo
   EstimatorConfig config = one_sensor();
   config.correction.measured = MeasuredMeaning::total;
   config.sensors[0].smoothing.form = SmoothingForm::off;
+  config.blocks.push_back({"other", "other_degC", {0}});
   auto made = std::make_unique<CycleParts>(Estimator(config, model));
   made->candidate = std::make_unique<Candidate>(config, candidate, pair);
   return made;
@@ -339,14 +340,17 @@ TEST_CASE("a score outlives restart and reload, and counts for its two models on
   CHECK(machine.cycle.parts().candidate->score()[0].candidate_um2 == Approx(0.0).margin(1e-9));
 }
 
-TEST_CASE("a promoted candidate goes on with what its lags have lived through",
+TEST_CASE("a promoted candidate goes on with what its lags and inputs have lived through",
           "[cycle][candidate]") {
   const bool promotes = GENERATE(true, false);
-  WarmingMachine always(contested(late_input(), one_input(2.0)));
-  WarmingMachine machine(contested(one_input(2.0), late_input()));
+  ThermalModel other_input = one_input(2.0);
+  other_input.inputs = {"other_degC"};
+  const ThermalModel candidate = GENERATE_COPY(late_input(), other_input);
+  WarmingMachine always(contested(candidate, one_input(2.0)));
+  WarmingMachine machine(contested(one_input(2.0), candidate));
   always.step(20);
   machine.step(20);
-  auto promoted = contested(late_input(), one_input(2.0));
+  auto promoted = contested(candidate, one_input(2.0));
   promoted->promotes = promotes;
   promoted->estimator.plan_adoption(machine.cycle.parts().estimator);
   promoted->candidate->plan_adoption(machine.cycle.parts().estimator);
