@@ -2,7 +2,7 @@
 # A simulated machining centre works through an eight-hour shift in 48 s; thermocompd reads its
 # thermocouples and the height of its head over Modbus, and keeps its tool where it should be. At the
 # end: a picture, and what was left of the error. Everything it writes is in demo_output/.
-#   ./demo.sh fleet     instead: twelve machines of one type, two weeks, a PostgreSQL of its own
+#   ./demo.sh fleet     instead: twelve machines of one type, two weeks, a PostgreSQL of its own; some three minutes
 set -euo pipefail
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")"
 source scripts/common.sh
@@ -11,7 +11,7 @@ if [[ ${1:-} == fleet ]]; then
   stage "packages" scripts/setup.sh demo_fleet
   stage "configure" cmake --preset release
   stage "build" cmake --build --preset release -j "$(build_jobs)" \
-    --target thermocomp thermocomp-modelling thermocomp-fleet
+    --target thermocomp thermocomp-modelling thermocomp-fleet thermocomp-uplink thermocompd thermocomp-sim
   exec "$python" scripts/demo_fleet.py build/release/bin demo_output
 elif (($# > 0)); then
   echo "usage: ./demo.sh [fleet]" >&2

@@ -1,5 +1,6 @@
 #!/usr/bin/python3
-"""Twelve simulated machines of one type, two weeks, one store: who departs and why, and what a new machine gains.
+"""Twelve simulated machines of one type, two weeks, one store: who departs and why, what a new machine gains, and how
+its better model gets onto it and off again.
 
     scripts/demo_fleet.py BIN OUT
 
@@ -17,11 +18,14 @@ import tempfile
 
 HERE = pathlib.Path(__file__).resolve().parents[1]
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
-sys.path[:0] = [str(HERE / path) for path in ("tests/integration/fleet", "bench/series", "bench/measured")]
+os.environ["THERMOCOMP_BIN"] = str(pathlib.Path(sys.argv[1]).resolve())
+sys.path[:0] = [str(HERE / path) for path in ("tests/integration/fleet", "tests/integration/daemon", "bench/series",
+                                              "bench/measured")]
 
 # ruff: noqa: E402
 import numpy as np
 
+import demo_release
 import measured_data
 import series
 import series_type
@@ -32,6 +36,7 @@ MACHINES, DAYS, BEGINS = 12, 14, 9
 PROBE_EVERY_MIN = 10
 HIDDEN, AGEING = 5, 9
 OUTPUTS = ["z_um", "y_um"]
+NEW = series_type.TypeMachine(77)
 TODAY = datetime.datetime.now(datetime.timezone.utc).date()
 
 
@@ -59,8 +64,10 @@ def day_of(machine, day):
 class Workshop:
     def __init__(self, programs, server, folder):
         self.programs, self.server, self.folder = programs, server, folder
+        self.tool = series.Tool(str(programs / "thermocomp"), folder)
         server.create_database()
         self.fleet("init")
+        self.add()
 
     def fleet(self, *arguments, show=False, good=(0,)):
         command = [str(self.programs / "thermocomp-fleet"), "--store", self.server.local(), *map(str, arguments)]
@@ -68,15 +75,23 @@ class Workshop:
         assert done.returncode in good, command
         return done.stdout
 
-    def fill(self):
-        run = self.folder / "day.csv"
+    def add(self):
         for machine in range(MACHINES):
             self.fleet("add", f"mill_{machine}", "--type", "mill", "--hall", 1 + machine // 6, "-o",
                        self.folder / f"{machine}.password")
-            for day in range(DAYS):
+
+    def load(self, days, *, with_model=False):
+        """The model in use is the machine's own fit to its first day; `diagnose`, which takes its time, starts from it."""
+        run = self.folder / "day.csv"
+        for machine in range(MACHINES):
+            for day in days:
+                more = []
+                if with_model:
+                    measured_data.write(measured_data.Run("", day_of(machine, 0)), run)
+                    more = ["--model", self.tool.fit([run], OUTPUTS)]
                 measured_data.write(measured_data.Run("", day_of(machine, day)), run)
                 begin = TODAY - datetime.timedelta(days=DAYS - day)
-                self.fleet("load", f"mill_{machine}", run, "--begin", f"{begin}T00:00:00Z")
+                self.fleet("load", f"mill_{machine}", run, "--begin", f"{begin}T00:00:00Z", *more)
 
     def results(self):
         """{machine: [(day, departs, probability, answer)]}"""
@@ -87,6 +102,14 @@ class Workshop:
             found.setdefault(int(name.split("_")[1]), []).append(
                 (int(day), departs == "t", float(probability), json.loads(answer)))
         return found
+
+    def say_what_diagnose_finds(self):
+        for name, answer in self.server.ask("SELECT name, diagnosis FROM fleet.night_result JOIN fleet.machine "
+                                            "ON id = machine WHERE diagnosis IS NOT NULL ORDER BY id"):
+            found = json.loads(answer)
+            named = [f"{finding['cause']} of {finding['subject']} ({finding['probability']:.2f})"
+                     for finding in found["findings"]]
+            print(f"diagnose of {name}'s last night: {', '.join(named) or found['verdict']}")
 
 
 def reason(answer):
@@ -116,18 +139,18 @@ def say_who_departs(found):
     print(f"the others: {sum(healthy)} of {len(healthy)} nights depart")
 
 
-def new_machine(programs, workshop, folder):
-    """RMS on days that it has not seen, with one probed day: (own fit, mean of the type, both)."""
+def new_machine(workshop, folder):
+    """RMS on days that it has not seen, with one probed day: (own fit, mean of the type, both); the models of own and
+    both."""
     type_file = folder / "type.toml"
     type_file.write_text(json.loads(workshop.server.value(
         "SELECT to_json(content) FROM fleet.series WHERE kind = 'type' ORDER BY through LIMIT 1")))
-    tool = series.Tool(str(programs / "thermocomp"), folder)
-    machine = series_type.TypeMachine(77)
-    train = [tool.written(machine.day(0, 8))]
-    test = [tool.written(machine.day(day, 24)) for day in range(1, 5)]
-    own, _ = tool.residuals(tool.fit(train, OUTPUTS), test, OUTPUTS)
-    both, _ = tool.residuals(tool.fit(train, OUTPUTS, "--prior", type_file), test, OUTPUTS)
-    return [float(np.mean(each)) for each in (own, series.mean_rms(type_file, test, OUTPUTS), both)]
+    tool = workshop.tool
+    train = [tool.written(NEW.day(0, 8))]
+    test = [tool.written(NEW.day(day, 24)) for day in range(1, 5)]
+    models = tool.fit(train, OUTPUTS), tool.fit(train, OUTPUTS, "--prior", type_file)
+    own, both = (tool.residuals(model, test, OUTPUTS)[0] for model in models)
+    return [float(np.mean(each)) for each in (own, series.mean_rms(type_file, test, OUTPUTS), both)], models
 
 
 def draw(found, errors, out):
@@ -155,22 +178,31 @@ def main():
     out.mkdir(exist_ok=True)
     server = Postgres()
     try:
+        server.require_tls()
         server.start()
         with tempfile.TemporaryDirectory() as folder:
             folder = pathlib.Path(folder)
             workshop = Workshop(programs, server, folder)
             print(f"== {MACHINES} machines, {DAYS} days each, probed every {PROBE_EVERY_MIN} min", flush=True)
-            workshop.fill()
+            workshop.load(range(DAYS - 1))
             print("== the nights", flush=True)
             with (out / "fleet_nights.log").open("w") as log:
+                log.write(workshop.fleet("night", "--nights", DAYS + 1, good=(0, 1)))
+                workshop.load([DAYS - 1], with_model=True)
                 log.write(workshop.fleet("night", "--nights", DAYS + 1, good=(0, 1)))
             workshop.fleet("status", show=True, good=(0, 1))
             found = workshop.results()
             say_who_departs(found)
-            errors = new_machine(programs, workshop, folder)
+            workshop.say_what_diagnose_finds()
+            print("== a new machine", flush=True)
+            errors, (own, both) = new_machine(workshop, folder)
             print("a new machine with 8 h of data, RMS on four other days: "
                   + ", ".join(f"{name} {value:.2f} um" for name, value in
                               zip(("own fit", "mean of its sisters", "both"), errors)))
+            print("== a release: its day in 48 s, a model of the office on it and off again", flush=True)
+            measured_data.write(measured_data.Run("", day_of(HIDDEN, DAYS - 1)), folder / "day.csv")
+            demo_release.show(programs, workshop, folder / "mill_12", NEW.day(2, 8), own, both,
+                              workshop.tool.fit([folder / "day.csv"], OUTPUTS))
             draw(found, errors, out)
             print(f"picture: {out}/fleet.png and {out}/fleet.svg, nights: {out}/fleet_nights.log")
     finally:

@@ -102,7 +102,8 @@ class Mill:
         self.daemon = self.lab.daemon(daemon_config(machine.ready["ports"]["cabinet"], self.controller_port))
         common = f'format = 1\nmachine = "mill_12"\noffer = "{folder}/offer.json"\n'
         (folder / "uplink.toml").write_text(
-            common + f'store = "{workshop.server.remote("machine_mill_12")}"\npassword_file = "uplink.password"\n'
+            common + f'store = "host=localhost port={workshop.server.port} dbname=fleet sslrootcert={workshop.server.authority}"\n'
+            'password_file = "uplink.password"\n'
             f'history = ["{self.daemon.history}"]\nsteps = "steps.json"\ncpu_percent_max = 100\n')
         (folder / "releases.toml").write_text(common + f'config = "{self.daemon.config}"\nfolder = "."\n'
                                               'approvers = "approvers"\n')

@@ -30,7 +30,7 @@ packages_petsc=("${packages_modelling[@]}" libpetsc-real-dev)
 packages_demo=("${packages_machine[@]}" gnuplot-nox)
 
 # ./demo.sh fleet: the store, its server, and the simulated machines of bench/series.
-packages_demo_fleet=("${packages_demo[@]}" libpqxx-dev postgresql postgresql-client python3-numpy)
+packages_demo_fleet=("${packages_demo[@]}" libpqxx-dev postgresql postgresql-client openssl python3-numpy)
 
 # Software that is not ours and that the tests talk to, and the tools of the checks.
 packages_test=(

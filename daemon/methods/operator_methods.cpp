@@ -415,8 +415,10 @@ void add_operator_methods(StatusServer& server, const DaemonActions& actions) {
   add("prove", [actions](const json& params) { return prove(actions, params); });
   add("release", [actions](const json& params) { return release(actions, params); });
   add("accept", [actions](const json& params) { return accept(actions, params); });
-  add("reload", [actions](const json&) { return reload(actions); }, AccessClass::model);
-  add("candidate", [actions](const json& params) { return candidate(actions, params); },
+  add(
+      "reload", [actions](const json&) { return reload(actions); }, AccessClass::model);
+  add(
+      "candidate", [actions](const json& params) { return candidate(actions, params); },
       AccessClass::model);
   server.add_method("controller_state", AccessClass::bridge, [actions](const json& params) {
     refuse_unless(bool(actions.controller_state), "this configuration's controller is no bridge");

@@ -100,16 +100,18 @@ std::string night_text(const pqxx::row& row) {
   return text.append(", p ").append(row["probability"].c_str());
 }
 
-/// Of each machine the newest release, until it is promoted or has ended: what the machine makes of it.
+/// Of each machine the newest release, until it is promoted or has ended: what the machine makes of
+/// it.
 void print_releases(pqxx::read_transaction& work) {
-  for (const pqxx::row& row : work.exec(
-           "SELECT release.id, machine.name, last.step, last.detail, release.note FROM fleet.machine"
-           " JOIN fleet.release ON release.id ="
-           "   (SELECT max(id) FROM fleet.release WHERE machine = machine.id)"
-           " CROSS JOIN LATERAL (SELECT step, detail FROM fleet.release_step"
-           "   WHERE release = release.id AND step NOT IN ('approved', 'rollback')"
-           "   ORDER BY id DESC LIMIT 1) last"
-           " WHERE last.step IN ('offered', 'checked', 'candidate') ORDER BY release.id"))
+  for (const pqxx::row& row :
+       work.exec("SELECT release.id, machine.name, last.step, last.detail, release.note FROM "
+                 "fleet.machine"
+                 " JOIN fleet.release ON release.id ="
+                 "   (SELECT max(id) FROM fleet.release WHERE machine = machine.id)"
+                 " CROSS JOIN LATERAL (SELECT step, detail FROM fleet.release_step"
+                 "   WHERE release = release.id AND step NOT IN ('approved', 'rollback')"
+                 "   ORDER BY id DESC LIMIT 1) last"
+                 " WHERE last.step IN ('offered', 'checked', 'candidate') ORDER BY release.id"))
     std::printf("release %s, %s: %s%s%s%s%s\n", row[0].c_str(), row[1].c_str(), row[2].c_str(),
                 row[3].size() > 0 ? ", " : "", row[3].c_str(), row[4].size() > 0 ? "; " : "",
                 row[4].c_str());
@@ -236,9 +238,9 @@ void add_store_commands(CLI::App& app, const std::string& store, cli::Action& ac
   load_command->callback(
       [&store, &action, loading] { action = [&store, loading] { return load(store, *loading); }; });
 
-  CLI::App* status_command = app.add_subcommand(
-      "status",
-      "the machines: when they were heard last, what their newest night found, and which models wait");
+  CLI::App* status_command = app.add_subcommand("status",
+                                                "the machines: when they were heard last, what "
+                                                "their newest night found, and which models wait");
   status_command->footer(
       "Exit status: 0 all is well; 1 a machine departs, a night failed, or an uplink was not heard "
       "for "

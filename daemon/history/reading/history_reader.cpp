@@ -171,6 +171,7 @@ HistoryReader::HistoryReader(const std::filesystem::path& file) {
   }
   parts_ = std::make_unique<Parts>(file);
   require_history(parts_->database);
+  parts_->database.run("PRAGMA cache_size = -256");  // chunks are read once, one after the other
   std::vector<SegmentInfo> found;
   try {
     parts_->read(" ORDER BY id", found);

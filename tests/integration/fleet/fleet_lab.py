@@ -186,7 +186,8 @@ class Machine:
                               stdin=subprocess.DEVNULL, capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
         means, header, wall = {}, None, None
-        for line in run.read_text().splitlines():
+        for line in run.open():
+            line = line.rstrip("\n")
             told = re.match(r"# ([\d.]+) s: wall time (\S+)Z$", line)
             if told:
                 at = datetime.datetime.fromisoformat(told[2]).replace(tzinfo=datetime.timezone.utc)
@@ -200,9 +201,10 @@ class Machine:
                 begin = int((wall + values["time_s"] + 1e-4) // 10 * 10)
                 for name, value in values.items():
                     if name not in ("time_s", "z_um", "z_measured_um") and not math.isnan(value):
-                        means.setdefault(begin, {}).setdefault(name, []).append(value)
-        return {begin: {name: sum(values) / len(values) for name, values in row.items()}
-                for begin, row in means.items()}
+                        total = means.setdefault(begin, {}).setdefault(name, [0.0, 0])
+                        total[0] += value
+                        total[1] += 1
+        return {begin: {name: total / count for name, (total, count) in row.items()} for begin, row in means.items()}
 
     def taken(self):
         """The same from the store."""

@@ -48,13 +48,16 @@ class Machine {
     note("started");
     const auto cycles = static_cast<std::uint64_t>(course_.hours * 3600.0 / period_s_);
     const auto minute = static_cast<std::uint64_t>(60.0 / period_s_);
+    // Between commits as many cycles as of a daemon at 100 Hz; a set clock is noted by the next
+    // one.
+    const std::uint64_t commits = course_.clock_at_s < 0 ? 600 : minute;
     for (std::uint64_t cycle = 0; cycle < cycles; ++cycle) {
       now_ = grid_.time_of(cycle);
       show_readings(period_s_ * static_cast<double>(cycle));
       if (cycle > 100 && uniform() < course_.probings_per_h * period_s_ / 3600.0) probe(cycle);
       estimator_.step(now_, readings_, controller_, command_);
       recorder_->record(cycle, readings_, controller_, command_, estimator_);
-      if (cycle % minute == 0) writer_.work();
+      if (cycle % commits == 0) writer_.work();
       if (cycle % (60 * minute) == 0) note("hour " + std::to_string(cycle / (60 * minute)));
     }
     recorder_->finish(cycles - 1, command_);
@@ -105,8 +108,7 @@ class Machine {
   Course course_;
   double period_s_;
   std::mt19937 random_;
-  Grid grid_{std::chrono::hours(7),
-             nanoseconds(static_cast<std::int64_t>(1e9 * period_s_))};
+  Grid grid_{std::chrono::hours(7), nanoseconds(static_cast<std::int64_t>(1e9 * period_s_))};
   nanoseconds now_{grid_.start};
   HistoryWriter writer_;
   Estimator estimator_;

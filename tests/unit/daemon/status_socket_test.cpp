@@ -165,8 +165,9 @@ TEST_CASE("each group may do what is its own", "[socket][permission]") {
   CHECK(own == PeerAccess{.read = true});
   const PeerAccess root = access(0, {});
   CHECK(root == PeerAccess{true, true, true, true});
-  const PeerAccess developer = access_of(
-      {1000, 1000, {}}, 1000, look_up_groups({"/s", "no-such-1", "no-such-2", "no-such-3", "no-such-4"}));
+  const PeerAccess developer =
+      access_of({1000, 1000, {}}, 1000,
+                look_up_groups({"/s", "no-such-1", "no-such-2", "no-such-3", "no-such-4"}));
   CHECK(developer == PeerAccess{true, true, true, true});
 }
 
