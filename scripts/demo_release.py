@@ -1,10 +1,7 @@
 """A thirteenth machine for demo_fleet.py, with a daemon, uplink and admission of its own: a model of the office gets
 onto it, and from it again. Its day passes 600 times as fast as a clock, as in ./demo.sh."""
-import contextlib
 import csv
-import os
 import re
-import socket
 import struct
 import subprocess
 import time
@@ -96,10 +93,9 @@ class Mill:
         measured_data.write(measured_data.Run("", after_standing(day, STANDS_MIN)), run)
         (folder / "model.toml").write_text(quick(model))
         self.lab = Lab(folder)
-        machine = self.lab.simulator("format = 1\n" + buses(0, 0, is_machine=True), "--replay", run, "--time-factor", FACTOR,
-                                     "--start-on-heartbeat", "--stay")
-        self.controller_port = machine.ready["ports"]["cnc"]
-        self.daemon = self.lab.daemon(daemon_config(machine.ready["ports"]["cabinet"], self.controller_port))
+        self.machine = self.lab.simulator("format = 1\n" + buses(0, 0, is_machine=True), "--replay", run, "--time-factor", FACTOR,
+                                          "--start-on-heartbeat", "--stay")
+        self.daemon = self.lab.daemon(daemon_config(self.machine.port("cabinet"), self.machine.port("cnc")))
         common = f'format = 1\nmachine = "mill_12"\noffer = "{folder}/offer.json"\n'
         (folder / "uplink.toml").write_text(
             common + f'store = "host=localhost port={workshop.server.port} dbname=fleet sslrootcert={workshop.server.authority}"\n'
@@ -111,7 +107,7 @@ class Mill:
 
     def left_um(self):
         """What a probe finds at the tool, one value an axis: Modbus, read input registers."""
-        with socket.create_connection(("127.0.0.1", self.controller_port)) as link, link.makefile("rb") as answer:
+        with self.machine.connect("cnc") as link, link.makefile("rb") as answer:
             link.sendall(struct.pack(">HHHBBHH", 1, 0, 6, 1, 4, PROBE_AT, 2 * len(AXES)))
             return [0.001 * nm for nm in struct.unpack(f">{len(AXES)}i", answer.read(9 + 4 * len(AXES))[9:])]
 
