@@ -36,7 +36,8 @@ INSERT INTO fleet.sample (machine, setup, at, value)
 WITH made AS (INSERT INTO fleet.release (machine, model, note)
   SELECT id, encode(sha256('x'), 'hex'), 'colder head' FROM fleet.machine WHERE id % 3 = 0 RETURNING id)
 INSERT INTO fleet.release_step (release, step, detail)
-  SELECT id, step, '' FROM made, unnest(ARRAY['offered', 'checked', 'candidate', 'promoted']) step;
+  SELECT id, step, CASE step WHEN 'candidate' THEN 'over ' || place || ' probings' ELSE '' END
+  FROM made, unnest(ARRAY['offered', 'checked', 'candidate', 'candidate', 'promoted']) WITH ORDINALITY AS each (step, place);
 ANALYZE;
 """
 

@@ -144,6 +144,15 @@ def test_three_clicks_from_a_hall_to_the_curve_of_a_sensor(page, browser, size):
     assert errors(browser) == []
 
 
+def test_a_release_shows_the_newest_score_of_its_candidate(page, browser):
+    name = page.store.value("SELECT name FROM fleet.machine JOIN fleet.release ON machine = machine.id LIMIT 1")
+    open_page(browser, page, DESKTOP)
+    browser.execute_script("location.hash = '#/' + arguments[0]", name)
+    steps = eventually(lambda: texts(browser, "li li"), "its release")
+    assert [step for step in steps if "candidate" in step] == [steps[2]] and steps[2].endswith("over 4 probings"), steps
+    assert len(steps) == 4 and "promoted" in steps[-1]
+
+
 def test_a_machine_is_judged_beside_its_sisters(page):
     machines = {machine["name"]: machine for machine in page.json("/api/machines")}
     assert len(machines) == MACHINES
