@@ -81,7 +81,7 @@ class Workshop:
                        self.folder / f"{machine}.password")
 
     def load(self, days, *, with_model=False):
-        """The model in use is the machine's own fit to its first day; `diagnose`, which takes its time, starts from it."""
+        """The model in use is the machine's own fit to its first day; `diagnose`, which takes long, starts from it."""
         run = self.folder / "day.csv"
         for machine in range(MACHINES):
             for day in days:

@@ -38,7 +38,8 @@ def buses(sensors_port, controller_port, *, is_machine):
     more = {} if is_machine else {"period_s": 0.02}
     text += entry("device", name="module", bus="cabinet", unit=1, encoding="int16", scale=0.01, table="input", **more)
     for i, place in enumerate(PLACES):
-        text += entry("channel" if is_machine else "sensor", name=place.removesuffix("_degC"), device="module", address=i)
+        text += entry("channel" if is_machine else "sensor", name=place.removesuffix("_degC"), device="module",
+                      address=i)
     text += ('[controller]\nname = "cnc"\nkind = "modbus_tcp"\nhost = "127.0.0.1"\n' f"port = {controller_port}\n"
              'valid_bits = { table = "holding", address = 8, encoding = "uint16" }\n'
              'heartbeat = { table = "holding", address = 9, encoding = "uint16" }\n')
@@ -93,12 +94,13 @@ class Mill:
         measured_data.write(measured_data.Run("", after_standing(day, STANDS_MIN)), run)
         (folder / "model.toml").write_text(quick(model))
         self.lab = Lab(folder)
-        self.machine = self.lab.simulator("format = 1\n" + buses(0, 0, is_machine=True), "--replay", run, "--time-factor", FACTOR,
-                                          "--start-on-heartbeat", "--stay")
+        self.machine = self.lab.simulator("format = 1\n" + buses(0, 0, is_machine=True), "--replay", run,
+                                          "--time-factor", FACTOR, "--start-on-heartbeat", "--stay")
         self.daemon = self.lab.daemon(daemon_config(self.machine.port("cabinet"), self.machine.port("cnc")))
         common = f'format = 1\nmachine = "mill_12"\noffer = "{folder}/offer.json"\n'
         (folder / "uplink.toml").write_text(
-            common + f'store = "host=localhost port={workshop.server.port} dbname=fleet sslrootcert={workshop.server.authority}"\n'
+            common + f'store = "host=localhost port={workshop.server.port} dbname=fleet '
+            f'sslrootcert={workshop.server.authority}"\n'
             'password_file = "uplink.password"\n'
             f'history = ["{self.daemon.history}"]\nsteps = "steps.json"\ncpu_percent_max = 100\n')
         (folder / "releases.toml").write_text(common + f'config = "{self.daemon.config}"\nfolder = "."\n'
@@ -149,8 +151,8 @@ class Mill:
         assert self.daemon.cli("export", self.daemon.history, "-o", run)[0] == 0
         with run.open() as file:
             rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
-        sent = {axis: [(float(row["time_s"]), float(row[f"{axis}_offset_um"])) for row in rows if row[f"{axis}_offset_um"]]
-                for axis in AXES}
+        sent = {axis: [(float(row["time_s"]), float(row[f"{axis}_offset_um"])) for row in rows
+                       if row[f"{axis}_offset_um"]] for axis in AXES}
         return max(abs(b - a) / (t1 - t0) for each in sent.values() for (t0, a), (t1, b) in zip(each, each[1:]))
 
 
@@ -162,7 +164,7 @@ def show(programs, workshop, folder, day, own, better, strange):
         mill.probe(4)
         release = mill.offer(better, "its sisters and its own day")
         print(mill.admit().strip())
-        print(f"the model in use, its own fit, leaves {mill.probe(14):.1f} um at 14 probings, which score the candidate:")
+        print(f"its own fit, in use, leaves {mill.probe(14):.1f} um at 14 probings, which score the candidate:")
         print(mill.admit().strip(), "(within two hours by the clock, so they count as one)")
         print(mill.order("approve", release).strip())
         print(mill.admit().strip())
@@ -173,8 +175,9 @@ def show(programs, workshop, folder, day, own, better, strange):
         mill.offer(strange, "meant for mill_5")
         print(mill.admit().strip())
         mill.daemon.committed()
-        print(f"offsets changed by at most {mill.largest_rate_um_per_s():.1f} um/s, "
-              f"their slew rate is {SLEW_UM_PER_S:.0f} um/s: no jump")
+        largest_um_per_s = mill.largest_rate_um_per_s()
+        verdict = "no jump" if largest_um_per_s <= 1.01 * SLEW_UM_PER_S else "A JUMP"
+        print(f"offsets changed by at most {largest_um_per_s:.1f} um/s, slew rate {SLEW_UM_PER_S:.0f} um/s: {verdict}")
         mill.daemon.end()
     finally:
         mill.lab.end()
