@@ -75,20 +75,6 @@ TEST_CASE("each_cycle: the offset changes at cycle ends only", "[cycle_hold][est
   CHECK(machine.offset_um() == -16.0);
 }
 
-TEST_CASE("a cycle end in a moment without data counts when the data are back",
-          "[cycle_hold][estimator]") {
-  EstimatorConfig config = small_config();
-  config.compensation.update = UpdateRule::each_cycle;
-  Machine machine(config);
-  machine.step({20.0, 30.0});
-  machine.steps(5, {21.0, lost});
-  machine.estimator.apply({CommandKind::cycle_end, 0, 0.0});
-  machine.steps(5, {21.0, lost});
-  CHECK(machine.offset_um() == 0.0);
-  machine.steps(5, {21.0, 31.0});
-  CHECK(machine.offset_um() == -6.0);
-}
-
 TEST_CASE("a coil that rises, a counter that changes, and every n-th of them end a cycle",
           "[cycle_hold]") {
   CycleEnds coil(1, true);

@@ -410,21 +410,6 @@ TEST_CASE("the certainty of an offset counts the largest that a bank may still d
   CHECK(slope == Vector{8.0, 3.0});
 }
 
-TEST_CASE("a model of 2000 terms finds each of them again", "[displacement]") {
-  constexpr std::size_t terms = 2000;
-  ThermalModel model = without_matrix();
-  for (std::size_t i = 0; i < terms; ++i)
-    model.terms.push_back({"thermal_lag",
-                           "t1_degC",
-                           {{"tau_s", 1.0 + static_cast<double>(i)}},
-                           {{"gain_um_per_K", {{"z_um", 0.001}}}}});
-  const DisplacementModel built(model);
-  const DisplacementModel next(model);
-  const std::vector<int> plan = next.plan_terms(built);
-  REQUIRE(plan.size() == terms);
-  for (std::size_t i = 0; i < terms; ++i) CHECK(plan[i] == static_cast<int>(i));
-}
-
 TEST_CASE("a diameter moves its axis by half, with its sign, whatever the model is made of",
           "[model][property]") {
   ThermalModel model = two_by_two();

@@ -9,21 +9,6 @@
 
 using namespace thermocomp;
 
-TEST_CASE("lost data hold the offset; it goes on from there when they return", "[estimator]") {
-  Machine machine;
-  machine.step({20.0, 30.0});
-  machine.steps(10, {21.0, 30.0});
-  machine.steps(5, {21.0, lost});
-  CHECK(machine.report().mode == Mode::compensating);  // the last good reading still serves
-  machine.steps(1000, {lost, lost});
-  CHECK(machine.report().mode == Mode::holding);
-  CHECK(machine.says(Reason::block_lost));
-  CHECK(machine.offset_um() == -5.0);
-  machine.step({22.0, 30.0});
-  CHECK(machine.report().mode == Mode::compensating);
-  CHECK(machine.offset_um() == -10.0);
-}
-
 namespace {
 
 /// Lost data at -30 um with the ramp policy and no time to hold, in the middle of a cut.

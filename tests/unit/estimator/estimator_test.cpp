@@ -38,15 +38,6 @@ TEST_CASE("an axis that the controller counts the other way gets the other sign"
   CHECK(machine.offset_um() == 6.0);
 }
 
-TEST_CASE("a reference is not taken while a block is lost", "[estimator]") {
-  Machine machine;
-  machine.step({20.0, 30.0});
-  machine.steps(10, {21.0, lost});
-  machine.estimator.apply({CommandKind::reference, 0, 0.0});
-  machine.step({21.0, lost});
-  CHECK(machine.report().inputs[0].reference_degC == 20.0);
-}
-
 TEST_CASE("what is not written is not compensated", "[estimator]") {
   Machine machine;
   machine.controller.written = false;

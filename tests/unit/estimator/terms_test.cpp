@@ -162,17 +162,6 @@ TEST_CASE("play of a temperature acts on its part of every output", "[terms]") {
   CHECK(at(model, 2s, {3.0, 0.0}) == Vector{7.0, -3.5});
 }
 
-TEST_CASE("a slow sensor's reading is led by its time constant", "[terms]") {
-  // The reading of a ramp of 1 K in 100 s with tau = 300 s stands 3 K behind once it has settled.
-  for (const double dt_s : {0.02, 1.0, 60.0, 200.0}) {
-    Lead lead(300.0);
-    double shown = 0.0;
-    for (double t_s = 0.0; t_s < 6000.0; t_s += dt_s)
-      shown = lead.step(seconds_of(t_s), 0.01 * t_s) - 0.01 * t_s;
-    CHECK(shown == Approx(3.0).epsilon(1e-6));
-  }
-}
-
 TEST_CASE("a slow sensor that warms exponentially is led to the true temperature", "[terms]") {
   const double structure_s = 3600.0;
   const double sensor_s = 240.0;

@@ -142,28 +142,6 @@ TEST_CASE("a line is the nearest to the curve", "[estimator][travel]") {
   CHECK(machine.command.offset_um[1] == Approx(-3.0 + 17.5));
 }
 
-TEST_CASE("what is between the nodes changes no faster than the nodes may",
-          "[estimator][travel][property]") {
-  TravelMachine machine(travel_config({0.0, 800.0}, TravelForm::line));
-  machine.run(5, cold);
-  const auto nodes = std::span(machine.estimator.config().axes).first(2);
-  std::mt19937 engine(7);
-  std::array<double, 9> before_um{};
-  for (int step = 0; step < 2000; ++step) {
-    if (engine() % 20 == 0) machine.controller.online = !machine.controller.online;
-    if (engine() % 10 == 0) machine.controller.signals[0] = static_cast<double>(engine() % 800);
-    machine.step_all({20.0 + 0.001 * static_cast<double>(engine() % 9000),
-                      20.0 + 0.001 * static_cast<double>(engine() % 9000)});
-    for (std::size_t i = 0; i < before_um.size(); ++i) {
-      const double offset_um =
-          value_on_travel(nodes, machine.command.offset_um, 100.0 * static_cast<double>(i));
-      CHECK(std::abs(offset_um) <= 100.0);
-      CHECK(std::abs(offset_um - before_um[i]) <= 10.0 + 1e-9);
-      before_um[i] = offset_um;
-    }
-  }
-}
-
 TEST_CASE("a node that does not apply what it was sent stops the whole axis, and no other",
           "[estimator][travel]") {
   TravelMachine machine(travel_config({0.0, 400.0, 800.0}, TravelForm::table));

@@ -44,41 +44,6 @@ ThermalModel correlated_model(double correlation = 0.98) {
 
 }  // namespace
 
-TEST_CASE("a cold steady machine is compensated ten seconds after its first readings",
-          "[estimator]") {
-  Machine machine(usual_config());
-  machine.steps(10, {20.0, 20.0});
-  CHECK(machine.report().mode == Mode::starting);
-  CHECK_FALSE(machine.says(Reason::sensor_unconfirmed));
-  machine.step({20.0, 20.0});
-  CHECK(machine.report().mode == Mode::compensating);
-}
-
-TEST_CASE("8 K of heating during an outage of 20 minutes are compensated 2 minutes after its end",
-          "[estimator]") {
-  Machine machine(usual_config());
-  machine.steps(600, {20.0, 20.0});
-  machine.steps(1200, {lost, lost});
-  CHECK(machine.report().mode == Mode::holding);
-  machine.steps(120, {28.0, 27.0});
-  CHECK(machine.report().mode == Mode::compensating);
-  CHECK(machine.offset_um() == Approx(-(5.0 * 8.0 + 7.0)));
-}
-
-TEST_CASE("smoothing extrapolates over no outage", "[estimator]") {
-  EstimatorConfig config = usual_config();
-  for (SensorConfig& sensor : config.sensors) sensor.smoothing.period_s = 10.0;
-  Machine machine(config);
-  double temp_degC = 20.0;
-  for (int i = 0; i < 250; ++i) machine.step({temp_degC += 0.02, 20.0});
-  machine.steps(70, {lost, lost});
-  for (int i = 0; i < 60; ++i) {
-    machine.step({25.0, 20.0});
-    if (machine.report().inputs[0].good) CHECK(machine.report().inputs[0].temp_degC == 25.0);
-  }
-  CHECK(machine.report().inputs[0].good);
-}
-
 TEST_CASE("a unit that is changed under way holds the offset and is told, for as long as it lasts",
           "[estimator]") {
   Machine machine(usual_config());
@@ -94,33 +59,6 @@ TEST_CASE("a unit that is changed under way holds the offset and is told, for as
   machine.steps(11, {21.5, 20.0});
   CHECK(machine.report().mode == Mode::compensating);
   CHECK_FALSE(machine.says(Reason::sensor_unconfirmed));
-}
-
-TEST_CASE("zeros after power-on become no reference and move no axis", "[estimator]") {
-  const int zeros = GENERATE(3, 45, 600);
-  Machine machine(usual_config());
-  machine.steps(zeros, {0.0, 0.0});
-  CHECK_FALSE(machine.report().mode == Mode::compensating);
-  machine.steps(12, {23.3, 24.8});
-  CHECK(machine.report().mode == Mode::compensating);
-  CHECK(machine.report().inputs[0].reference_degC == 23.3);
-  CHECK(machine.report().inputs[1].reference_degC == 24.8);
-  CHECK(machine.offset_um() == 0.0);
-}
-
-TEST_CASE("a module that comes up under way moves no axis before it is ready", "[estimator]") {
-  ThermalModel model = small_model();
-  model.reference_degC = {20.0, 20.0};
-  Machine machine(usual_config(), model);
-  machine.steps(300, {23.0, 24.0});
-  const double before_um = machine.offset_um();
-  machine.steps(70, {lost, lost});
-  for (int i = 0; i < 200; ++i) {
-    const bool ready = i >= 45;
-    machine.step({ready ? 23.1 : 0.0, ready ? 24.0 : 0.0});
-    CHECK(std::abs(machine.offset_um() - before_um) <= 0.51);
-  }
-  CHECK(machine.offset_um() == Approx(before_um - 0.5));
 }
 
 TEST_CASE("a module whose channels all show the same after an outage is not ready", "[estimator]") {
