@@ -59,14 +59,6 @@ def test_a_broken_configuration_is_refused_by_daemon_and_check_alike(tmp_path, n
     assert not (tmp_path / "history.db").exists() and not (tmp_path / "state.json").exists()
 
 
-def test_several_problems_are_said_at_once(tmp_path):
-    config = GOOD.replace("rate_hz = 100", "rate_hz = 0").replace("unit = 1", "unit = 999")
-    status, said = run_daemon(write(tmp_path, config, MODEL.replace("-1.5", '"x"')))
-    assert status == 2
-    for key in ("rate_hz", "unit", "matrix_um_per_K"):
-        assert key in said, said
-
-
 def test_a_good_configuration_passes_the_check(tmp_path):
     status, out, said = run_tool("check", write(tmp_path, GOOD))
     assert status == 0 and "OK" in out, said

@@ -46,12 +46,3 @@ def test_a_command_that_hangs_is_ended_and_the_page_goes_on(lab, machine):
                "the next one gets its turn")
     assert gateway.ask("/")[0] == 200
     assert "is ended after 1" in gateway.log.read_text()
-
-
-def test_not_more_than_so_many_an_hour(lab, machine):
-    out = lab.folder / "alarms.txt"
-    out.touch()
-    gateway = start(lab, machine, HOOK.format(out=out), "per_hour_max = 1")
-    machine.module.stop()
-    eventually(lambda: "more than 1 in an hour" in gateway.log.read_text(), "the limit is told")
-    assert len(out.read_text().splitlines()) == 1

@@ -155,24 +155,6 @@ def test_thermocouple_frames_become_offset_frames(lab):
     assert_replays_exactly(daemon.history, lab.folder / "out.csv")
 
 
-def test_an_open_circuit_in_a_frame_holds_the_offset(lab):
-    pytest.importorskip("can")
-    (lab.folder / "model.toml").write_text(MODEL)
-    candump = lab.also_end(Candump(lab.folder / "candump.log"))
-    lab.also_end(Controller())
-    daemon = lab.daemon(CONFIG.replace("stale_after_s = 60.0", "stale_after_s = 3.0")).start()
-    send_temperatures(22.0, 20.0)
-    eventually(lambda: (candump.newest_offset() or [0])[0] == -600, "the offset")
-    send_temperatures(327.67, 20.0)
-    eventually(lambda: "column" in daemon.status()["sensors_bad"], "the fault is seen")
-    # The last good value stands until it is stale; then there is none.
-    daemon.wait_for_mode("holding")
-    time.sleep(0.3)
-    assert candump.newest_offset()[0] == -600
-    send_temperatures(21.0, 20.0)
-    eventually(lambda: candump.newest_offset()[0] == -300, "the circuit closed again")
-
-
 def test_a_message_of_the_controller_ends_a_machining_cycle(lab):
     pytest.importorskip("can")
     (lab.folder / "model.toml").write_text(MODEL)

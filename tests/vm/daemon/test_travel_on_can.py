@@ -14,7 +14,7 @@ import pytest
 
 import moving_slide
 import rig as rigs
-from lab import eventually, run_tool
+from lab import eventually
 from moving_slide import (LINE_DEVIATION_UM, NODES_MM, ROUNDING_UM, WARM_K, Moving,
                           write_standing_run)
 
@@ -296,26 +296,3 @@ def test_frames_of_two_sets_are_never_applied(lab):
     assert shown() == ([-500, 20], [9000, 20])
     rigs.write_frame("vcan1", ORDER, bytes([1, 0]))
     eventually(lambda: shown() == ([111, 22], [222, 22]), "the set with its valid bit")
-
-
-def test_check_and_scan_show_the_frames(lab):
-    moving = slide(lab, "line")
-    config = moving.daemon.config
-    status, said, _ = run_tool("check", config)
-    assert status == 0 and "axes: x (2 nodes)" in said
-    assert "largest deviation from the model's curve for 10 K: 2.50 um of 40.00 um" in said
-    status, said, _ = run_tool("check", "--registers", config)
-    assert status == 0
-    for part in ("frame 0x210", "number of the set of axis x", "K0, offset at 100 mm of axis x",
-                 "its newest frames carry the same number, none older than 1 s",
-                 "offset = K0 + slope (x_mm - 100 mm)", "everywhere on the travel within +-60 um"):
-        assert part in said, said
-    status, said, _ = run_tool("scan", config)
-    for part in ("applied K0, offset at 100 mm of axis x", "applied slope of axis x",
-                 "number of the applied set of axis x"):
-        assert part in said, said
-    text = config.read_text()
-    config.write_text(text.replace(place(SLOPE, 24, 8, 0), place(K0, 40, 8, 0)))
-    status, _, said = run_tool("check", config)
-    assert status == 2
-    assert "axis[x].line.slope_um_per_m.id = 529: the frame carries no number of the set" in said
