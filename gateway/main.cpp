@@ -12,15 +12,12 @@
 #include <thread>
 #include <vector>
 
-#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/sinks/systemd_sink.h>
 #include <spdlog/spdlog.h>
 #include <systemd/sd-daemon.h>
 
-#include "config/text/clean_output.hpp"
-#include "config/text/problems.hpp"
 #include "daemon/socket/status_client.hpp"
 #include "gateway/alarms/alarm_watch.hpp"
 #include "gateway/alarms/hook_runner.hpp"
@@ -33,6 +30,7 @@
 #include "gateway/settings/gateway_settings.hpp"
 #include "gateway/shdr/shdr_adapter.hpp"
 #include "gateway/texts/shdr_text.hpp"
+#include "report/command.hpp"
 #include "status/status_json.hpp"
 
 namespace thermocomp::gateway {
@@ -148,7 +146,6 @@ void run_gateway(const GatewaySettings& settings) {
   // Blocked before the first thread, so that only the wait below gets them.
   const sigset_t signals = ending_signals();
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
-  std::signal(SIGPIPE, SIG_IGN);
   Gateway gateway(settings);
   std::printf("%s\n", gateway.ready_line().c_str());
   std::fflush(stdout);
@@ -203,23 +200,13 @@ int run(const GatewayOptions& options) {
 }  // namespace thermocomp::gateway
 
 int main(int argc, char** argv) {
-  using namespace thermocomp::gateway;
-  thermocomp::clean_standard_output();
-  CLI::App app;
-  GatewayOptions options;
-  declare_gateway_command_line(app, options);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
-  try {
-    return run(options);
-  } catch (const thermocomp::ConfigurationError& error) {
-    std::fprintf(stderr, "%s\n", error.what());
-    return 2;
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "thermocomp-gateway: %s\n", error.what());
-    return 1;
-  }
+  using namespace thermocomp;
+  gateway::GatewayOptions options;
+  return cli::run_program(
+      argc, argv, "thermocomp-gateway",
+      [&](CLI::App& app, cli::Action& action) {
+        gateway::declare_gateway_command_line(app, options);
+        action = [&] { return gateway::run(options); };
+      },
+      cli::exit_no);
 }

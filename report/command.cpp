@@ -1,13 +1,43 @@
 #include "report/command.hpp"
 
 #include <algorithm>
+#include <csignal>
+#include <cstdio>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 
+#include "config/text/clean_output.hpp"
+#include "config/text/problems.hpp"
 #include "config/toml/toml_reader.hpp"
 
 namespace thermocomp::cli {
+
+int run_program(int argc, char** argv, const char* name,
+                const std::function<void(CLI::App&, Action&)>& declare, int failed) {
+  clean_standard_output();
+  std::signal(SIGPIPE, SIG_IGN);
+  try {
+    CLI::App app;
+    Action action;
+    declare(app, action);
+    try {
+      app.parse(argc, argv);
+    } catch (const CLI::ParseError& error) {
+      return app.exit(error) == 0 ? exit_success : exit_bad_use;
+    }
+    return action();
+  } catch (const ConfigurationError& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return exit_bad_use;
+  } catch (const Failure& failure) {
+    std::fprintf(stderr, "%s: %s\n", name, failure.what());
+    return failure.status();
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s: %s\n", name, error.what());
+    return failed;
+  }
+}
 
 std::string command_slip_text(const CLI::App* app, const CLI::Error& error) {
   const CLI::App* group = app;

@@ -1,6 +1,6 @@
-/// What every command group of `thermocomp` shares: exit statuses, how a group hands its work to
-/// main(), the failure that ends a command with one line, and what is said of a command line that
-/// cannot be taken.
+/// What the programs with a command line share: main(), exit statuses, how a group of commands
+/// hands its work to main(), the failure that ends a command with one line, and what is said of a
+/// command line that cannot be taken.
 #pragma once
 
 #include <functional>
@@ -38,6 +38,16 @@ class Failure : public std::runtime_error {
  private:
   int status_;
 };
+
+/// What main() of a program does: ignores SIGPIPE, so that a closed pipe is an error of writing;
+/// parses; runs the action; writes an error to stderr, with the program's name before it unless it
+/// names a file's place.
+/// @param declare  the command line; what it refers to outlives the call
+/// @param failed   exit status after an error that is neither of a configuration nor a Failure
+/// @return the exit status; exit_bad_use where the command line or a configuration cannot be taken
+[[nodiscard]] int run_program(int argc, char** argv, const char* name,
+                              const std::function<void(CLI::App&, Action&)>& declare,
+                              int failed = exit_bad_use);
 
 /// A word that should have been a command, of the program or of a group of commands: by that word
 /// and the command that was probably meant. None at all: by those that there are. Anything else as

@@ -3,16 +3,12 @@
 #include <charconv>
 #include <cstdint>
 #include <cstdio>
-#include <exception>
-#include <iostream>
 #include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-
-#include "config/text/clean_output.hpp"
+#include "report/command.hpp"
 #include "simulator/command_line.hpp"
 #include "simulator/files/machine_file.hpp"
 #include "simulator/session/session.hpp"
@@ -91,22 +87,15 @@ void apply(const SimulatorArguments& arguments, MachineConfig& machine, SessionO
 }  // namespace
 
 int main(int argc, char** argv) {
-  thermocomp::clean_standard_output();
-  CLI::App app;
+  using namespace thermocomp;
   SimulatorArguments arguments;
-  thermocomp::declare_simulator_command_line(app, arguments);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
-  try {
-    MachineConfig machine = thermocomp::load_machine(arguments.machine);
-    apply(arguments, machine, arguments.session);
-    thermocomp::run_session(machine, arguments.session);
-  } catch (const std::exception& error) {
-    std::cerr << "thermocomp-sim: " << error.what() << std::endl;
-    return 2;
-  }
-  return 0;
+  return cli::run_program(argc, argv, "thermocomp-sim", [&](CLI::App& app, cli::Action& action) {
+    declare_simulator_command_line(app, arguments);
+    action = [&] {
+      MachineConfig machine = load_machine(arguments.machine);
+      apply(arguments, machine, arguments.session);
+      run_session(machine, arguments.session);
+      return cli::exit_success;
+    };
+  });
 }

@@ -10,18 +10,16 @@
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 #include <systemd/sd-daemon.h>
 
-#include "config/text/clean_output.hpp"
-#include "config/text/problems.hpp"
 #include "config/toml/toml_reader.hpp"
 #include "fleet/page/command_line.hpp"
 #include "fleet/store/store.hpp"
 #include "gateway/door/http_door.hpp"
+#include "report/command.hpp"
 
 namespace thermocomp::fleet {
 namespace {
@@ -142,7 +140,6 @@ void run(const PageSettings& settings) {
   sigaddset(&signals, SIGTERM);
   sigaddset(&signals, SIGINT);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
-  std::signal(SIGPIPE, SIG_IGN);
   spdlog::set_default_logger(spdlog::stderr_color_mt("thermocomp-fleet-page"));
   Page page(settings);
   std::printf("{\"ready\":true,\"http\":%u}\n", static_cast<unsigned>(page.port()));
@@ -159,22 +156,14 @@ void run(const PageSettings& settings) {
 }  // namespace thermocomp::fleet
 
 int main(int argc, char** argv) {
-  thermocomp::clean_standard_output();
-  CLI::App app;
+  using namespace thermocomp;
   std::string file;
-  thermocomp::fleet::declare_page_command_line(app, file);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
-  try {
-    thermocomp::fleet::run(thermocomp::fleet::load_settings(file));
-    return 0;
-  } catch (const thermocomp::ConfigurationError& error) {
-    std::fprintf(stderr, "%s\n", error.what());
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "thermocomp-fleet-page: %s\n", error.what());
-  }
-  return 2;
+  return cli::run_program(argc, argv, "thermocomp-fleet-page",
+                          [&](CLI::App& app, cli::Action& action) {
+                            fleet::declare_page_command_line(app, file);
+                            action = [&] {
+                              fleet::run(fleet::load_settings(file));
+                              return cli::exit_success;
+                            };
+                          });
 }

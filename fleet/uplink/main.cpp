@@ -6,14 +6,12 @@
 #include <exception>
 #include <string>
 
-#include <CLI/CLI.hpp>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
-#include "config/text/clean_output.hpp"
-#include "config/text/problems.hpp"
 #include "fleet/uplink/command_line.hpp"
 #include "fleet/uplink/uplink.hpp"
+#include "report/command.hpp"
 
 namespace thermocomp::fleet {
 namespace {
@@ -69,7 +67,6 @@ int run(const UplinkOptions& options) {
   sigaddset(&ending, SIGTERM);
   sigaddset(&ending, SIGINT);
   pthread_sigmask(SIG_BLOCK, &ending, nullptr);
-  std::signal(SIGPIPE, SIG_IGN);
   Pace pace(settings.cpu_percent_max, ending);
   Uplink uplink(settings, pace);
   try {
@@ -85,22 +82,10 @@ int run(const UplinkOptions& options) {
 }  // namespace thermocomp::fleet
 
 int main(int argc, char** argv) {
-  using namespace thermocomp::fleet;
-  thermocomp::clean_standard_output();
-  CLI::App app;
-  UplinkOptions options;
-  declare_uplink_command_line(app, options);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
-  try {
-    return run(options);
-  } catch (const thermocomp::ConfigurationError& error) {
-    std::fprintf(stderr, "%s\n", error.what());
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "thermocomp-uplink: %s\n", error.what());
-  }
-  return 2;
+  using namespace thermocomp;
+  fleet::UplinkOptions options;
+  return cli::run_program(argc, argv, "thermocomp-uplink", [&](CLI::App& app, cli::Action& action) {
+    fleet::declare_uplink_command_line(app, options);
+    action = [&] { return fleet::run(options); };
+  });
 }
