@@ -71,18 +71,19 @@ set(THERMOCOMP_STD_HEADERS
   <functional> <limits> <map> <memory> <optional> <set> <span> <stdexcept> <string> <string_view>
   <utility> <variant> <vector>)
 
-# thermocomp_precompiled(NAME HEADERS header... [LINKS target...]): what thermocomp_use_precompiled
-# names.
+# thermocomp_precompiled(NAME HEADERS header... [LINKS target...] [OPTIONS option...]): what
+# thermocomp_use_precompiled names.
 function(thermocomp_precompiled name)
   if(NOT THERMOCOMP_PRECOMPILED OR NOT CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
     return()
   endif()
-  cmake_parse_arguments(arg "" "" "HEADERS;LINKS" ${ARGN})
+  cmake_parse_arguments(arg "" "" "HEADERS;LINKS;OPTIONS" ${ARGN})
   set(empty ${CMAKE_BINARY_DIR}/precompiled/${name}.cpp)
   file(CONFIGURE OUTPUT ${empty} CONTENT "// Only here for the headers.\n")
   add_library(${name} OBJECT ${empty})
   target_link_libraries(${name} PRIVATE thermocomp_flags ${arg_LINKS})
-  target_compile_options(${name} PRIVATE -fpch-preprocess)  # for ccache, here and below
+  # -fpch-preprocess: for ccache, here and below.
+  target_compile_options(${name} PRIVATE -fpch-preprocess ${arg_OPTIONS})
   target_precompile_headers(${name} PRIVATE ${arg_HEADERS})
 endfunction()
 
@@ -97,6 +98,14 @@ function(thermocomp_use_precompiled target name)
 endfunction()
 
 thermocomp_precompiled(thermocomp_precompiled_std HEADERS ${THERMOCOMP_STD_HEADERS})
+
+# Command lines, files and texts run once, and the compiler spends a quarter of its time on making
+# them fast.
+if(CMAKE_BUILD_TYPE STREQUAL "Release")
+  set(THERMOCOMP_RUNS_ONCE -O1)
+endif()
+thermocomp_precompiled(thermocomp_precompiled_runs_once
+  HEADERS ${THERMOCOMP_STD_HEADERS} OPTIONS ${THERMOCOMP_RUNS_ONCE})
 
 # thermocomp_rooms(TARGET [VISIBILITY] FOLDER...): headers of FOLDER become visible as
 # "FOLDER/name.hpp" to TARGET and to whoever links it - and to nobody else. Each target gets an
@@ -119,13 +128,16 @@ function(thermocomp_rooms target visibility)
   target_include_directories(${target} ${visibility} ${root})
 endfunction()
 
-# thermocomp_library(NAME ROOMS folder... SOURCES file... LINKS target... [PRECOMPILED name])
+# thermocomp_library(NAME ROOMS folder... SOURCES file... LINKS target... [PRECOMPILED name] [RUNS_ONCE])
 function(thermocomp_library name)
-  cmake_parse_arguments(arg "" "PRECOMPILED" "ROOMS;SOURCES;LINKS;PRIVATE_LINKS" ${ARGN})
+  cmake_parse_arguments(arg "RUNS_ONCE" "PRECOMPILED" "ROOMS;SOURCES;LINKS;PRIVATE_LINKS" ${ARGN})
   add_library(${name} STATIC ${arg_SOURCES})
   target_link_libraries(${name} PUBLIC ${arg_LINKS} PRIVATE thermocomp_flags ${arg_PRIVATE_LINKS})
   thermocomp_rooms(${name} PUBLIC ${arg_ROOMS})
-  if(NOT arg_PRECOMPILED)
+  if(arg_RUNS_ONCE)
+    target_compile_options(${name} PRIVATE ${THERMOCOMP_RUNS_ONCE})
+    set(arg_PRECOMPILED thermocomp_precompiled_runs_once)
+  elseif(NOT arg_PRECOMPILED)
     set(arg_PRECOMPILED thermocomp_precompiled_std)
   endif()
   thermocomp_use_precompiled(${name} ${arg_PRECOMPILED})
