@@ -132,8 +132,7 @@ void EventLog::note_sensors(const Report& report, const EstimatorConfig& config)
   for (std::size_t i = 0; i < report.sensors.size(); ++i) {
     const SensorReport& sensor = report.sensors[i];
     // One that settles ends what was reported before only once it counts.
-    const bool settles = sensor.fault == Fault::unconfirmed && !sensor.jumped;
-    if (sensor.fault != faults_[i] && !settles) {
+    if (sensor.fault != faults_[i] && !sensor.settles()) {
       const Subject subject{SubjectKind::sensor, config.sensors[i].name};
       if (sensor.fault != Fault::none) {
         note_fault({.subject = subject, .code = std::string(to_string(sensor.fault))});

@@ -412,8 +412,7 @@ Status status_of(const StatusView& view) {
   for (std::size_t i = 0; i < view.report.sensors.size(); ++i) {
     const std::string& name = view.config.estimator.sensors[i].name;
     const SensorReport& sensor = view.report.sensors[i];
-    const bool settles = sensor.fault == Fault::unconfirmed && !sensor.jumped;
-    if (sensor.fault != Fault::none && !settles) status.sensors_bad.push_back(name);
+    if (sensor.fault != Fault::none && !sensor.settles()) status.sensors_bad.push_back(name);
     if (const auto jump = jump_of(view, view.report.sensors[i]))
       status.sensors_jumped.push_back({name, *jump});
     if (const auto suspicion = suspicion_of(view, view.report.sensors[i]))

@@ -32,6 +32,9 @@ struct SensorReport {
   bool weighed_down{false};  ///< ... and its blocks do without it
   double suspected_size_K{0.0};
   nanoseconds suspected_since{};
+
+  /// Too new to count, as every sensor at the start: nothing is wrong with it.
+  [[nodiscard]] bool settles() const noexcept { return fault == Fault::unconfirmed && !jumped; }
 };
 
 /// Judges one sensor's readings, each once, when it is new. A refused reading is as good as none:

@@ -338,7 +338,7 @@ void SegmentExport::tell_faults() {
     const Fault fault = fault_of(i);
     if (fault == faults_told_[i]) continue;
     // A value that settles is the end of what was written before, once it counts.
-    if (fault == Fault::unconfirmed && !report_.sensors[i].jumped) continue;
+    if (steps_ && report_.sensors[i].settles()) continue;
     const bool is_first_value = faults_told_[i] == Fault::never_read && fault == Fault::none;
     faults_told_[i] = fault;
     if (is_first_value) continue;  // that nothing was read before it is no news
