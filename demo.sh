@@ -2,7 +2,7 @@
 # A simulated machining centre works through an eight-hour shift in 48 s; thermocompd reads its
 # thermocouples and the height of its head over Modbus, and keeps its tool where it should be. At the
 # end: a picture, and what was left of the error. Everything it writes is in demo_output/.
-#   ./demo.sh fleet     instead: twelve machines of one type, two weeks, a PostgreSQL of its own; some three minutes
+#   ./demo.sh fleet     instead: twelve machines of one type, two weeks, a PostgreSQL of its own; some two minutes
 set -euo pipefail
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")"
 source scripts/common.sh
