@@ -82,7 +82,7 @@ def quick(model):
 class Mill:
     """Its folder holds what /etc and /var/lib hold beside a machine."""
 
-    def __init__(self, programs, workshop, folder, day, model):
+    def __init__(self, lab, programs, workshop, folder, day, model):
         self.programs, self.workshop, self.folder = programs, workshop, folder
         workshop.fleet("add", "mill_12", "--type", "mill", "--hall", 2, "--central", "-o", folder / "uplink.password")
         (folder / "approvers").mkdir()
@@ -93,10 +93,9 @@ class Mill:
         run = folder / "day.csv"
         measured_data.write(measured_data.Run("", after_standing(day, STANDS_MIN)), run)
         (folder / "model.toml").write_text(quick(model))
-        self.lab = Lab(folder)
-        self.machine = self.lab.simulator("format = 1\n" + buses(0, 0, is_machine=True), "--replay", run,
-                                          "--time-factor", FACTOR, "--start-on-heartbeat", "--stay")
-        self.daemon = self.lab.daemon(daemon_config(self.machine.port("cabinet"), self.machine.port("cnc")))
+        self.machine = lab.simulator("format = 1\n" + buses(0, 0, is_machine=True), "--replay", run,
+                                     "--time-factor", FACTOR, "--start-on-heartbeat", "--stay")
+        self.daemon = lab.daemon(daemon_config(self.machine.port("cabinet"), self.machine.port("cnc")))
         common = f'format = 1\nmachine = "mill_12"\noffer = "{folder}/offer.json"\n'
         (folder / "uplink.toml").write_text(
             common + f'store = "host=localhost port={workshop.server.port} dbname=fleet '
@@ -159,8 +158,9 @@ class Mill:
 def show(programs, workshop, folder, day, own, better, strange):
     """own, better, strange: model files of a machine whose day passes at its own pace."""
     folder.mkdir()
-    mill = Mill(programs, workshop, folder, day, own)
+    lab = Lab(folder)
     try:
+        mill = Mill(lab, programs, workshop, folder, day, own)
         mill.probe(4)
         release = mill.offer(better, "its sisters and its own day")
         print(mill.admit().strip())
@@ -172,6 +172,7 @@ def show(programs, workshop, folder, day, own, better, strange):
         print(f"the promoted model leaves {mill.probe(8):.1f} um at 8 probings")
         print(mill.order("rollback", release).strip())
         print(mill.admit().strip())
+        mill.probe(8)
         mill.offer(strange, "meant for mill_5")
         print(mill.admit().strip())
         mill.daemon.committed()
@@ -180,4 +181,4 @@ def show(programs, workshop, folder, day, own, better, strange):
         print(f"offsets changed by at most {largest_um_per_s:.1f} um/s, slew rate {SLEW_UM_PER_S:.0f} um/s: {verdict}")
         mill.daemon.end()
     finally:
-        mill.lab.end()
+        lab.end()
