@@ -92,6 +92,23 @@ std::vector<WallSpan> spans_of(const std::vector<SegmentInfo>& segments, const S
   return spans;
 }
 
+/// A proving move takes out nothing: its points have no offset.
+void leave_out(const RecordedEvent& prove, const ReplaySetup& setup, ThinnedHistory& course) {
+  const auto& axes = setup.estimator.axes;
+  const auto axis = std::find_if(axes.begin(), axes.end(), [&](const AxisConfig& each) {
+    return each.name == prove.subject.name;
+  });
+  if (axis == axes.end() || course.time_s.size() < 2) return;
+  const double half_s = 0.5 * (course.time_s[1] - course.time_s[0]);
+  const double moves_s = 2.0 * std::abs(prove.value) / axis->limiter.rate_um_per_s_max +
+                         setup.estimator.compensation.prove_hold_s;
+  for (ThinnedColumn& column : course.columns)
+    for (std::size_t i = 0; i < column.values.size(); ++i)
+      if (column.name == axis->name + "_offset_um" && course.time_s[i] > prove.wall_s - half_s &&
+          course.time_s[i] < prove.wall_s + moves_s + half_s)
+        column.values[i] = std::nan("");
+}
+
 /// Of the points at one place.
 OffsetRange range_of(const std::vector<double>& offsets, const std::vector<PointPlace>& places,
                      PointPlace place, double bound_um) {
@@ -390,6 +407,9 @@ MachineWeek machine_week(const std::filesystem::path& history, const WallSpan& s
   const Setups setups(reader, parser, week.damage);
   week.sent = spans_of(reader.segments(), setups, false, span);
   week.dry_runs = spans_of(reader.segments(), setups, true, span);
+  for (const RecordedEvent& event : events.events)
+    if (event.kind == EventKind::command && event.code == to_string(CommandKind::prove))
+      if (const ReplaySetup* setup = setups.at(event.wall_s)) leave_out(event, *setup, week.course);
   if (const ReplaySetup* setup = setups.at(span.to_s)) {
     week.dry_run = setup->dry_run;
     const std::vector<PointPlace> places = places_of(week.course, week.sent, week.dry_runs);

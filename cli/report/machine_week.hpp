@@ -84,6 +84,7 @@ struct SensorWeek {
 };
 
 struct MachineWeek {
+  std::string machine;  ///< its name, in the title; empty: none
   std::string history;
   WallSpan span;
   double recorded_s{0.0};        ///< the daemon ran

@@ -22,6 +22,7 @@ struct ReportOptions {
   std::string from;
   std::string to;
   std::string output;
+  std::string machine;
 };
 
 /// A wall time, or seconds since the history's start.
@@ -49,7 +50,8 @@ int run_report(const ReportOptions& options) {
   if (!(span.to_s > span.from_s)) throw Failure("--from must be before --to");
   if (!(span.within(recorded).length_s() > 0.0))
     throw Failure(options.history + ": nothing was recorded in that time");
-  const MachineWeek week = machine_week(options.history, span);
+  MachineWeek week = machine_week(options.history, span);
+  week.machine = options.machine;
   cli::write_file(options.output, week_html(week));
   for (const HistoryDamage& damage : week.damage)
     std::fprintf(stderr, "%s: %s\n", options.history.c_str(), to_string(damage).c_str());
@@ -71,6 +73,8 @@ void add_report_command(CLI::App& app, Action& action) {
                   "start, default a week before the end: a time such as 2026-03-01T08:30:00, "
                   "\"8 days ago\", -3d");
   sub->add_option("--to", options->to, "end, not included, default the last record; as --from");
+  sub->add_option("--machine", options->machine, "the machine's name, for the title")
+      ->type_name("NAME");
   sub->add_option("-o,--output", options->output, "page (HTML); - is standard output")
       ->type_name("FILE")
       ->required();

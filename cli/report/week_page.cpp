@@ -307,7 +307,8 @@ std::string picture(const MachineWeek& week) {
 }  // namespace
 
 std::string week_html(const MachineWeek& week) {
-  std::string html = html_begin("Thermal compensation: report");
+  std::string html = html_begin((week.machine.empty() ? "" : week.machine + ": ") +
+                                "report on the thermal compensation");
   const std::vector<std::string> lines = advice(week);
   html += lines.empty()
               ? html_paragraph("Good: nothing needs to be done.", "good")

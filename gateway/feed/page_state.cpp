@@ -43,37 +43,6 @@ std::string last_offsets(const Status& status) {
   return list.empty() ? "" : "; the last offsets stay at the controller: " + joined(list);
 }
 
-/// What happens again and again is one entry.
-struct EventGroup {
-  const Event* newest{nullptr};
-  std::size_t times{0};
-  double lasted_s{0.0};
-};
-
-/// Sensors of a silent module, inputs and reasons: what a link's event near in time explains.
-bool is_consequence(const Event& event, const std::vector<Event>& all) {
-  constexpr double near_s = 5.0;
-  const bool may_be =
-      event.subject.kind == SubjectKind::sensor || event.subject.kind == SubjectKind::input ||
-      event.subject.kind == SubjectKind::estimate || event.code == to_string(Reason::block_lost) ||
-      event.code == to_string(Reason::block_estimated);
-  return may_be && std::any_of(all.begin(), all.end(), [&](const Event& other) {
-           const bool is_link =
-               other.subject.kind == SubjectKind::device || other.subject.kind == SubjectKind::bus;
-           return is_link && other.kind == event.kind &&
-                  std::abs(other.wall_s - event.wall_s) < near_s;
-         });
-}
-
-std::string group_text(const EventGroup& group) {
-  std::string text = event_text(*group.newest);
-  if (group.times < 2) return text;
-  if (group.newest->kind == EventKind::recovery) text.erase(text.rfind(": over"));
-  text += ": " + std::to_string(group.times) + " times";
-  if (group.lasted_s > 0.0) text += ", " + duration_text(group.lasted_s) + " in all";
-  return text + (group.newest->kind == EventKind::fault ? ", and still" : "");
-}
-
 void keep(json& object, std::initializer_list<const char*> keys) {
   json kept = json::object();
   for (const char* key : keys)
@@ -193,36 +162,6 @@ json page_state(const Snapshot& snapshot, const std::string& machine) {
   state["model"]["made_from"] = model.is_object() ? model.value("made_from", json()) : json();
   keep_what_is_shown(state);
   return state;
-}
-
-json page_events(const Snapshot& snapshot, std::size_t most) {
-  const std::vector<Event>& events = *snapshot.events;
-  std::vector<EventGroup> groups;
-  const auto is_same = [](const Event& a, const Event& b) {
-    const bool is_outage = a.kind == EventKind::fault || a.kind == EventKind::recovery;
-    const bool was_outage = b.kind == EventKind::fault || b.kind == EventKind::recovery;
-    return (is_outage ? was_outage : a.kind == EventKind::mode && b.kind == a.kind) &&
-           a.subject == b.subject && a.code == b.code;
-  };
-  for (auto event = events.rbegin(); event != events.rend(); ++event) {
-    if (is_consequence(*event, events)) continue;
-    auto group = std::find_if(groups.begin(), groups.end(), [&](const EventGroup& known) {
-      return is_same(*known.newest, *event);
-    });
-    if (group == groups.end()) group = groups.insert(group, {&*event});
-    // An outage has two events: it counts by its beginning, which may be older than the list.
-    if (event->kind != EventKind::recovery) ++group->times;
-    if (event->kind == EventKind::recovery) group->lasted_s += event->duration_s;
-  }
-  json list = json::array();
-  for (const EventGroup& group : groups) {
-    if (list.size() == most) break;
-    list.push_back({{"number", group.newest->number},
-                    {"wall_s", group.newest->wall_s},
-                    {"kind", to_string(group.newest->kind)},
-                    {"text", group_text(group)}});
-  }
-  return list;
 }
 
 }  // namespace thermocomp::gateway

@@ -23,8 +23,9 @@ namespace thermocomp::gateway {
 [[nodiscard]] std::optional<nlohmann::json> state_change(const nlohmann::json& before,
                                                          const nlohmann::json& after);
 
-/// The newest `most` happenings with their words, newest first: what happened several times is one,
-/// and what a silent module explains is left out. [{"number", "wall_s", "kind", "text"}].
+/// The newest `most` happenings with their words, newest first, one a cause: what happened several
+/// times is one, and what a link, a sensor or a command explains is left out. [{"number", "wall_s",
+/// "kind", "text"}].
 [[nodiscard]] nlohmann::json page_events(const Snapshot& snapshot, std::size_t most);
 
 /// Everything that is wrong: [{"what", "remedy", "about", "detail"}]; the last two where known,

@@ -1,11 +1,14 @@
 #include "gateway/http/http_server.hpp"
 
 #include <ctime>
+#include <filesystem>
 #include <optional>
 #include <utility>
 
 #include <nlohmann/json.hpp>
 
+#include "config/text/problems.hpp"
+#include "config/toml/toml_reader.hpp"
 #include "gateway/door/http_door.hpp"
 #include "gateway/door/request_rules.hpp"
 #include "gateway/feed/page_state.hpp"
@@ -43,6 +46,7 @@ struct HttpServer::Parts {
   void serve(HttpExchange& exchange);
   void take_command(HttpExchange& exchange);
   void tell_history(HttpExchange& exchange);
+  void show_report(HttpExchange& exchange) const;
   void of_daemon(HttpExchange& exchange, json (*part)(const Snapshot&)) const;
   [[nodiscard]] GatewayFigures figures();
 
@@ -80,9 +84,12 @@ void HttpServer::Parts::serve(HttpExchange& exchange) {
     return of_daemon(exchange, [](const Snapshot& all) { return json_of(all.sensors); });
   if (path == "/api/events") return exchange.stream(streams);
   if (path == "/api/history") return tell_history(exchange);
+  if (path == "/report") return show_report(exchange);
   if (path == "/api/commands") {
     json offered = commands.offered(exchange.user());
     offered["body"] = !settings.http.body.empty();
+    std::error_code none;
+    offered["report"] = std::filesystem::exists(settings.http.report, none);
     return exchange.answer(200, json_type, dumped(offered));
   }
   if (path == "/metrics")
@@ -121,6 +128,17 @@ void HttpServer::Parts::tell_history(HttpExchange& exchange) {
                             exchange.argument("points"), static_cast<double>(now.tv_sec), why);
   if (!asked) return exchange.answer(400, json_type, error_text(why));
   exchange.later(history_answers, [this, asked = *asked] { return history_answer(feed, asked); });
+}
+
+/// Read anew each time: it is written anew each week.
+void HttpServer::Parts::show_report(HttpExchange& exchange) const {
+  constexpr std::uintmax_t report_bytes_max = 4'000'000;
+  try {
+    exchange.answer(200, "text/html; charset=utf-8",
+                    read_text_file(settings.http.report, report_bytes_max));
+  } catch (const ConfigurationError& error) {
+    exchange.answer(404, json_type, error_text(std::string("there is no report: ") + error.what()));
+  }
 }
 
 GatewayFigures HttpServer::Parts::figures() {

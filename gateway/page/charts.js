@@ -298,6 +298,14 @@ function showOnly(sensor) {
   place('temperatures').scrollIntoView({block: 'start'});
 }
 
+// A range that begins before the history does.
+function recordedSince(from_s) {
+  const first = table.find(row => row.some((value, c) => c > 0 && value !== null));
+  if (!first) return 'nothing was recorded in this time';
+  const since_s = first[0].getTime() / 1000;
+  return since_s - from_s > 0.05 * range.seconds ? 'recorded since ' + minuteText(since_s) : '';
+}
+
 async function loadHistory() {
   const mine = ++asked;
   try {
@@ -315,7 +323,7 @@ async function loadHistory() {
     modes = history.modes;
     marks = history.events;
     spacing_s = history.span_s;
-    setText(place('history-note'), '');
+    setText(place('history-note'), recordedSince(history.from_s));
     drawAll();
   } catch (error) {
     setText(place('history-note'), 'no history: ' + error.message);

@@ -31,13 +31,15 @@ function duration(seconds) {
   return Math.floor(s / 86400) + ' d ' + Math.floor(s % 86400 / 3600) + ' h';
 }
 
-function clockText(wall_s) {
+function clockText(wall_s, parts = {hour: '2-digit', minute: '2-digit', second: '2-digit'}) {
   if (!isNumber(wall_s)) return '';
   const at = new Date(wall_s * 1000);
   const sameDay = at.toDateString() === new Date().toDateString();
-  const time = at.toLocaleTimeString([], {hour12: false});
-  return sameDay ? time : at.toLocaleDateString() + ' ' + time;
+  const time = at.toLocaleTimeString([], {hour12: false, ...parts});
+  return sameDay ? time : at.toLocaleDateString([], {day: 'numeric', month: 'short'}) + ', ' + time;
 }
+
+const minuteText = wall_s => clockText(wall_s, {hour: '2-digit', minute: '2-digit'});
 
 // ------------------------------------------------------------------ state
 
@@ -173,8 +175,9 @@ function axisMarks(axis) {
 // "taken out 21 of at most 150 um; 1.2 um left at the last probing, 40 min ago"
 function axisSentence(axis, now_s) {
   const unit = '\u00a0' + unitText(axis.unit);
-  const taken = 'taken out ' + fixed(Math.abs(axis.offset), 1) +
-    (isNumber(axis.offset_max) ? ' of at most ' + axis.offset_max : '') + unit;
+  const of = isNumber(axis.offset_max) ? ' of at most ' + axis.offset_max : '';
+  const taken = axis.proving ? 'moved to show its sign, ' + fixed(Math.abs(axis.offset), 1) + of + unit
+                             : 'taken out ' + fixed(Math.abs(axis.offset), 1) + of + unit;
   const last = probings.filter(each => each.axis === axis.name && isNumber(each.left_um)).pop();
   return taken + '; ' + (last ? fixed(Math.abs(last.left_um), 1) + unit + ' left at the last probing, ' +
     duration(now_s - last.time_s) + ' ago' : 'not probed in the last 30 days');
@@ -198,12 +201,15 @@ function showAxes(axes) {
   }
 }
 
-// A probing, or a time without compensation, is in the history once that is committed.
+// What happens, a probing too, is in the history once that is committed.
 let newestDrawn = null;
+let reload = 0;
 function followEvents(events) {
-  const found = events.find(event => event.kind === 'mode' || event.kind === 'command' && event.text.startsWith('measured'));
-  const number = found ? found.number : 0;
-  if (newestDrawn !== null && number !== newestDrawn) setTimeout(loadHistory, historyCommit_ms);
+  const number = events.length ? events[0].number : 0;
+  if (newestDrawn !== null && number !== newestDrawn) {
+    clearTimeout(reload);
+    reload = setTimeout(loadHistory, historyCommit_ms);
+  }
   newestDrawn = number;
 }
 
@@ -330,7 +336,7 @@ function showEvents(events) {
   list.dataset.key = key;
   list.replaceChildren(...events.map(event => {
     const item = make('li');
-    item.append(make('time', clockText(event.wall_s)), make('span', withUnits(event.text)));
+    item.append(make('time', minuteText(event.wall_s)), make('span', withUnits(event.text)));
     return item;
   }));
   if (events.length === 0) list.append(make('li', 'nothing has happened'));
@@ -392,6 +398,7 @@ async function offerCommands() {
     const told = await (await fetch('/api/commands')).json();
     place('commands').hidden = told.commands.length === 0;
     place('body').hidden = !told.body;
+    place('report').hidden = !told.report;
     place('command-buttons').replaceChildren(...told.commands.map(method => {
       const button = make('button', commandNames[method]);
       button.addEventListener('click', () => {

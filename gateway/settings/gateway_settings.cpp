@@ -198,6 +198,7 @@ HttpSettings read_http(const TomlTable& table, const fs::path& folder) {
   http.key = existing_in(table, "key", folder);
   http.passwords = existing_in(table, "passwords", folder);
   http.body = existing_in(table, "body", folder);
+  http.report = path_in(table, "report", folder);  // made on a Monday
   http.connections_max = table.integer<unsigned>("connections_max", 4, 2000, http.connections_max);
   if (http.certificate.empty() != http.key.empty())
     table.problem(http.key.empty() ? "key" : "certificate",

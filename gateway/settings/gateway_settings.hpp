@@ -21,6 +21,7 @@ struct HttpSettings {
   std::filesystem::path key;          ///< PEM
   std::filesystem::path passwords;    ///< lines `user:hash`; empty: everybody may read
   std::filesystem::path body;         ///< page of `structure --page`; empty: none
+  std::filesystem::path report;       ///< page of `thermocomp report`; empty: none
   unsigned connections_max{100};
   bool operator==(const HttpSettings&) const = default;
   [[nodiscard]] bool has_tls() const { return !certificate.empty(); }

@@ -175,6 +175,15 @@ PartFigures part_figures(const std::string& path) {
   return figures;
 }
 
+Tolerance tolerance_of(const PartFigures& figures, double tolerance_um) {
+  Tolerance all = Tolerance::kept;
+  for (const auto& [feature, axis, shift] : figures.shifts) {
+    if (shift.low > tolerance_um || shift.high < -tolerance_um) return Tolerance::exceeded;
+    if (shift.low < -tolerance_um || shift.high > tolerance_um) all = Tolerance::undecided;
+  }
+  return all;
+}
+
 namespace {
 
 constexpr const char* without_colour = "#c05621";
@@ -213,11 +222,12 @@ std::vector<std::string> instructions(const PartSheet& sheet) {
 }
 
 /// Each feature's shift as a line from its lower to its upper bound, without and with compensation.
-std::string picture(const PartFigures& before, const std::optional<PartFigures>& after) {
+std::string picture(const PartTest& test) {
+  const auto& [before, after, tolerance_um] = test;
   constexpr double left = 90.0;
   constexpr double width = 720.0;
   constexpr double row = 17.0;
-  double reach = 1.0;
+  double reach = std::max(1.0, tolerance_um.value_or(0.0));
   for (const PartFigures* figures : {&before, after ? &*after : nullptr})
     if (figures != nullptr)
       for (const PartShift& each : figures->shifts)
@@ -243,6 +253,10 @@ std::string picture(const PartFigures& before, const std::optional<PartFigures>&
     const double x = middle + scale * tick;
     line(x, 20.0, x, height - 22.0, tick == 0.0 ? "stroke:#4a5568" : "stroke:#cbd5e0");
     text(x, height - 6.0, figure_text(tick) + (tick == 0.0 ? " µm" : ""), "middle");
+  }
+  for (const double side : {-1.0, 1.0}) {
+    const double x = middle + side * scale * tolerance_um.value_or(0.0);
+    if (tolerance_um) line(x, 14.0, x, height - 22.0, "stroke:#1a202c;stroke-dasharray:5 4");
   }
   const auto mark = [&](const Figure& shift, double y, const std::string& colour) {
     const double from = middle + scale * shift.low;
@@ -288,11 +302,45 @@ nlohmann::json figures_json(const PartFigures& figures) {
   return result;
 }
 
+/// The shift whose interval reaches farthest from 0.
+const PartShift& farthest(const PartFigures& figures) {
+  const auto reach = [](const PartShift& each) {
+    return std::max(std::abs(each.shift_um.low), std::abs(each.shift_um.high));
+  };
+  return *std::max_element(
+      figures.shifts.begin(), figures.shifts.end(),
+      [&](const PartShift& a, const PartShift& b) { return reach(a) < reach(b); });
+}
+
+const char* name_of(Tolerance tolerance) {
+  switch (tolerance) {
+    case Tolerance::kept:
+      return "kept";
+    case Tolerance::exceeded:
+      return "exceeded";
+    default:
+      return "undecided";
+  }
+}
+
+std::string tolerance_sentence(const PartFigures& figures, const char* which, double tolerance_um) {
+  const Tolerance tolerance = tolerance_of(figures, tolerance_um);
+  const PartShift& most = farthest(figures);
+  std::string text = "Tolerance ±" + figure_text(tolerance_um) + " µm, " + which +
+                     " compensation: " + name_of(tolerance) + ". Farthest: " + most.feature + " in " +
+                     most.axis + ", " + figure_words(most.shift_um, "um") + ".";
+  if (tolerance == Tolerance::undecided)
+    text += " An interval reaches beyond the tolerance: more repeats make it narrower.";
+  return text;
+}
+
 }  // namespace
 
-std::vector<std::string> part_sentences(const PartFigures& before,
-                                        const std::optional<PartFigures>& after) {
+std::vector<std::string> part_sentences(const PartTest& test) {
+  const auto& [before, after, tolerance_um] = test;
   std::vector<std::string> sentences;
+  if (tolerance_um) sentences.push_back(tolerance_sentence(before, "without", *tolerance_um));
+  if (tolerance_um && after) sentences.push_back(tolerance_sentence(*after, "with", *tolerance_um));
   for (const PartAxis& axis : before.axes) {
     const PartAxis* compensated = after ? find(*after, axis.axis) : nullptr;
     std::string text =
@@ -305,13 +353,14 @@ std::vector<std::string> part_sentences(const PartFigures& before,
   return sentences;
 }
 
-std::string part_html(const PartFigures& before, const std::optional<PartFigures>& after) {
+std::string part_html(const PartTest& test) {
+  const auto& [before, after, tolerance_um] = test;
   std::string html = html_begin("Test part: how far heat moves its features");
-  html += html_list(part_sentences(before, after));
-  html += html_figure(picture(before, after),
-                      after ? "Shift of each feature from cold to warm with its 95 % interval: "
-                              "brown without, blue with compensation."
-                            : "Shift of each feature from cold to warm with its 95 % interval.");
+  html += html_list(part_sentences(test));
+  html += html_figure(picture(test),
+                      std::string("Shift of each feature from cold to warm with its 95 % interval") +
+                          (after ? ": brown without, blue with compensation" : "") +
+                          (tolerance_um ? "; dashed: the tolerance." : "."));
   std::vector<std::vector<std::string>> rows{{"feature", "axis", "shift, µm"}};
   if (after) rows.front().insert(rows.front().end(), {"with compensation, µm", "remains"});
   for (const PartShift& each : before.shifts) {
@@ -330,6 +379,10 @@ std::string part_html(const PartFigures& before, const std::optional<PartFigures
       "the feature's own error, its clamping and the probe's calibration go out.",
       "In brackets: 95 % by Student's t from the scatter of the repeats, with as many degrees of "
       "freedom as there are repeats less one, since the features of one repeat share its warmth."};
+  if (tolerance_um)
+    method.emplace_back(
+        "The tolerance is kept where every interval is within it, exceeded where one lies outside "
+        "as a whole; else these repeats do not decide.");
   for (const PartFigures* figures : {&before, after ? &*after : nullptr})
     if (figures != nullptr) {
       std::string scatter = figures->file + ": the standard deviation of one repeat is";
@@ -341,8 +394,14 @@ std::string part_html(const PartFigures& before, const std::optional<PartFigures
   return html + html_heading("How these figures were made") + html_list(method) + html_end();
 }
 
-std::string part_json(const PartFigures& before, const std::optional<PartFigures>& after) {
+std::string part_json(const PartTest& test) {
+  const auto& [before, after, tolerance_um] = test;
   nlohmann::json result{{"test", "part"}, {"before", figures_json(before)}};
+  if (tolerance_um) {
+    result["tolerance"] = {{"um", *tolerance_um},
+                           {"before", name_of(tolerance_of(before, *tolerance_um))}};
+    if (after) result["tolerance"]["after"] = name_of(tolerance_of(*after, *tolerance_um));
+  }
   if (after) {
     result["after"] = figures_json(*after);
     for (const PartAxis& axis : before.axes)

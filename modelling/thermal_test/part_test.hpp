@@ -36,6 +36,11 @@ struct PartFigures {
   std::vector<PartAxis> axes;
 };
 
+/// Whether every shift is within +-`tolerance_um`: kept where every interval is, exceeded where an
+/// interval lies outside as a whole, else undecided.
+enum class Tolerance { kept, exceeded, undecided };
+[[nodiscard]] Tolerance tolerance_of(const PartFigures& figures, double tolerance_um);
+
 /// Reads columns repeat, state (cold or warm), feature and x_um, y_um, z_um as far as they are
 /// there; empty values are left out, and with them the feature's repeat.
 /// @throws ConfigurationError naming file, line and rule
@@ -51,13 +56,18 @@ struct PartSheet {
 /// @throws ConfigurationError naming the option
 [[nodiscard]] std::string part_sheet(const PartSheet& sheet, bool as_page);
 
+/// The two filled-in sheets, and the tolerance that they are judged by.
+struct PartTest {
+  PartFigures before;
+  std::optional<PartFigures> after;  ///< with compensation
+  std::optional<double> tolerance_um;
+};
+
 /// One page to be signed: without and, where there is one, with compensation.
-[[nodiscard]] std::string part_html(const PartFigures& before,
-                                    const std::optional<PartFigures>& after);
-[[nodiscard]] std::string part_json(const PartFigures& before,
-                                    const std::optional<PartFigures>& after);
-/// "Z: heat moves the 6 features by 21.3 um RMS (18.0 to 24.6); with compensation 3.1 ..."
-[[nodiscard]] std::vector<std::string> part_sentences(const PartFigures& before,
-                                                      const std::optional<PartFigures>& after);
+[[nodiscard]] std::string part_html(const PartTest& test);
+[[nodiscard]] std::string part_json(const PartTest& test);
+/// "Z: heat moves the 6 features by 21.3 um RMS (18.0 to 24.6); with compensation 3.1 ..."; first
+/// of all the verdicts by the tolerance.
+[[nodiscard]] std::vector<std::string> part_sentences(const PartTest& test);
 
 }  // namespace thermocomp::thermal_test

@@ -41,6 +41,7 @@ struct ReportOptions {
   std::string after;
   std::string kind;
   TestOptions test;
+  std::optional<double> tolerance_um;  ///< of a part
   std::string columns;
   std::string output;
   std::string json;
@@ -55,18 +56,19 @@ std::string sentences(const TestFigures& figures) {
 }
 
 int run_part_report(const ReportOptions& options) {
-  const PartFigures before = part_figures(options.before);
-  std::optional<PartFigures> after;
-  if (!options.after.empty()) after = part_figures(options.after);
-  cli::write_file(options.output, part_html(before, after));
-  if (!options.json.empty()) cli::write_file(options.json, part_json(before, after));
+  PartTest test{part_figures(options.before), {}, options.tolerance_um};
+  if (!options.after.empty()) test.after = part_figures(options.after);
+  cli::write_file(options.output, part_html(test));
+  if (!options.json.empty()) cli::write_file(options.json, part_json(test));
   if (options.output != "-" && options.json != "-")
-    for (const std::string& sentence : part_sentences(before, after)) std::puts(sentence.c_str());
+    for (const std::string& sentence : part_sentences(test)) std::puts(sentence.c_str());
   return cli::exit_success;
 }
 
 int run_report(ReportOptions options) {
   if (options.kind == part) return run_part_report(options);
+  if (options.tolerance_um)
+    throw cli::Failure("--tolerance-um: only with --test part, whose features it is of");
   options.test.kind = kinds.at(options.kind);
   cli::RunLoader loader(options.columns);
   TestData before = test_data(cli::load_record(options.before, loader), options.test);
@@ -142,6 +144,10 @@ void add_report(CLI::App& group, std::function<int()>& action) {
   sub->add_option("--noise-um", options->test.noise_um,
                   "standard deviation of one value of the probe; left out: from the values")
       ->check(CLI::NonNegativeNumber)
+      ->type_name("UM");
+  sub->add_option("--tolerance-um", options->tolerance_um,
+                  "with --test part: how far heat may shift a feature; a verdict is given")
+      ->check(CLI::PositiveNumber)
       ->type_name("UM");
   sub->add_option("--columns", options->columns, cli::columns_help)->type_name("FILE");
   sub->add_option("-o,--output", options->output, "page (HTML); - is standard output")

@@ -1,6 +1,7 @@
 #include "modelling/identification/families/families.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -29,6 +30,10 @@ constexpr double less_than_simpler = 0.01;
 /// What is left of a fold counts as at least so much of what no model leaves of all: below, a
 /// family is as good as another.
 constexpr double least_share = 0.01;
+/// A run decides where it leaves so many times the RMS of all others; what it does differently must
+/// be beyond the others by this share of a column's range. Both set by hand.
+constexpr double decides_from = 2.0;
+constexpr double differs_from = 0.25;
 constexpr double penalty_of_few = 0.003;  ///< in the middle of the bank's
 
 std::size_t index_of_family(Family family) {
@@ -346,6 +351,85 @@ ThermalModel few_model(const MeasuredTests& tests, const HeatEquation& equation)
   return model;
 }
 
+/// A column of a run as it was recorded: temperatures, then signals.
+Eigen::VectorXd recorded(const TestRun& run, std::size_t column) {
+  const Eigen::Index rows = run.time_s.size() - run.begin;
+  const auto at = static_cast<Eigen::Index>(column);
+  const Eigen::Index places = run.places_K.cols();
+  if (at >= places) return run.signals.col(at - places).tail(rows);
+  return run.places_K.col(at).tail(rows).array() + run.reference_degC[at];
+}
+
+/// "; it starts at spindle_rpm = 10000, the others at 0": what sets a run apart most; empty:
+/// nothing that was recorded.
+std::string difference_of(const MeasuredTests& tests, std::size_t run) {
+  struct View {
+    const char* words;
+    const char* of_others;
+    double (*of)(const Eigen::VectorXd&);
+  };
+  const std::array<View, 3> views{
+      View{"starts at", "at", [](const Eigen::VectorXd& values) { return values[0]; }},
+      View{"goes up to", "to", [](const Eigen::VectorXd& values) { return values.maxCoeff(); }},
+      View{"goes down to", "to", [](const Eigen::VectorXd& values) { return values.minCoeff(); }}};
+  double most = differs_from;
+  std::string text;
+  for (std::size_t column = 0; column < tests.places.size() + tests.signals.size(); ++column) {
+    std::vector<Eigen::VectorXd> values;
+    for (const TestRun& each : tests.runs) values.push_back(recorded(each, column));
+    double low = std::numeric_limits<double>::infinity();
+    double high = -low;
+    for (const Eigen::VectorXd& each : values) {
+      low = std::min(low, each.minCoeff());
+      high = std::max(high, each.maxCoeff());
+    }
+    for (const auto& [words, of_others, of] : views) {
+      double least = std::numeric_limits<double>::infinity();
+      double largest = -least;
+      for (std::size_t other = 0; other < values.size(); ++other) {
+        if (other == run) continue;
+        least = std::min(least, of(values[other]));
+        largest = std::max(largest, of(values[other]));
+      }
+      const double own = of(values[run]);
+      const double beyond = std::max(own - largest, least - own) / (high - low);
+      if (!(beyond > most)) continue;
+      most = beyond;
+      const std::string& name = column < tests.places.size()
+                                    ? tests.places[column]
+                                    : tests.signals[column - tests.places.size()];
+      text = printed("; it %s %s = %.4g, the others %s %.4g", words, name.c_str(), own, of_others,
+                     least);
+      if (largest > least) text += printed(" to %.4g", largest);
+    }
+  }
+  return text;
+}
+
+/// Names a run, left out, whose remainder makes most of the figure.
+void add_deciding_run(const MeasuredTests& tests, const FamilyResult& result, std::size_t output,
+                      std::vector<std::string>& warnings) {
+  const std::vector<double>& fold_um = result.fold_um[output];
+  if (tests.runs.size() < 2) return;
+  const auto worst = static_cast<std::size_t>(
+      std::max_element(fold_um.begin(), fold_um.end()) - fold_um.begin());
+  double squares = 0.0;
+  double rows = 0.0;
+  for (std::size_t f = 0; f < fold_um.size(); ++f) {
+    if (f == worst) continue;
+    const auto count = static_cast<double>(tests.folds[f].end - tests.folds[f].begin);
+    squares += count * fold_um[f] * fold_um[f];
+    rows += count;
+  }
+  const double others_um = std::sqrt(squares / rows);
+  if (!(fold_um[worst] > decides_from * others_um)) return;
+  warnings.push_back(tests.outputs[output] + ": " + tests.fold_name(worst) +
+                     printed(" decides: left out, %s leaves %.3g um of it and %.3g of the others",
+                             std::string(to_string(result.family)).c_str(), fold_um[worst],
+                             others_um) +
+                     difference_of(tests, tests.folds[worst].run));
+}
+
 void add_warnings(const MeasuredTests& tests, FamiliesFit& fit) {
   if (tests.runs.size() < 2)
     fit.warnings.emplace_back(
@@ -358,6 +442,9 @@ void add_warnings(const MeasuredTests& tests, FamiliesFit& fit) {
                            " stayed at a level within each run or went one way once: what it does "
                            "cannot be told from what time does, it gets no gain. Next: a run in "
                            "which it goes up and down");
+  const FamilyResult& best = fit.chosen == Family::none ? fit.results.back() : chosen;
+  for (std::size_t o = 0; o < tests.outputs.size(); ++o)
+    add_deciding_run(tests, best, o, fit.warnings);
   if (fit.chosen == Family::none) {
     fit.warnings.emplace_back("no model is better than none on what was left out: its matrix is 0");
     return;

@@ -451,6 +451,30 @@ TEST_CASE("a family that is worse than no model on a run left out is not chosen"
   CHECK(fit.chosen_because.find("lag_bank is worse than no model on ") != std::string::npos);
 }
 
+TEST_CASE("the run that makes most of the error is named with how it differs", "[families]") {
+  for (const bool one_differs : {false, true}) {
+    std::vector<RunFile> files;
+    for (std::size_t i = 0; i < 4; ++i)
+      files.push_back(
+          machine_run(std::string("run").append(std::to_string(i)), i + 1,
+                      [](double quick, double, double, double) { return 5.0 * quick; }));
+    for (std::size_t row = 0; row < 200 && one_differs; ++row) {
+      files[3].values[3][row] = 10000.0;
+      if (row > 0) files[3].values[4][row] += 30.0;
+    }
+    TestOptions options;
+    options.outputs = {"z_um"};
+    options.signals = true;
+    const MeasuredTests tests = measured_tests(files, options);
+    const std::string said = families_text(tests, fitted(tests, Family::static_few));
+    CAPTURE(said);
+    CHECK((said.find("z_um: run3 decides: left out, static_few leaves ") != std::string::npos) ==
+          one_differs);
+    CHECK((said.find("of the others; it starts at spindle_rpm = 10000, the others at 0 to 3500") !=
+           std::string::npos) == one_differs);
+  }
+}
+
 TEST_CASE("two heaters that ran together share the gain, so that one alone is foretold",
           "[families]") {
   // Only the first bends the machine; both are heated alike but for the noise of their sensors.

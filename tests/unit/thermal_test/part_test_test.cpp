@@ -62,6 +62,22 @@ TEST_CASE("shifts of a part and their intervals, by hand", "[part]") {
   CHECK(axis.rms_um.low == 0.0);
 }
 
+TEST_CASE("a tolerance is kept, exceeded or not decided by whole intervals", "[part]") {
+  const auto figure = [](double low, double high) { return Figure{(low + high) / 2.0, low, high}; };
+  PartFigures figures{"on.csv", {{"P1", "Z", figure(-2.0, 3.0)}, {"P2", "Z", figure(4.0, 8.0)}}, {}};
+  CHECK(tolerance_of(figures, 8.0) == Tolerance::kept);
+  CHECK(tolerance_of(figures, 7.9) == Tolerance::undecided);
+  CHECK(tolerance_of(figures, 3.9) == Tolerance::exceeded);
+  figures.shifts[1].shift_um = figure(-8.0, -4.0);
+  CHECK(tolerance_of(figures, 3.9) == Tolerance::exceeded);
+  const PartTest test{figures, figures, 7.0};
+  const std::vector<std::string> sentences = part_sentences(test);
+  REQUIRE(sentences.size() == 2);
+  CHECK_THAT(sentences[1], Contains("with compensation: undecided. Farthest: P2 in Z") &&
+                               Contains("more repeats"));
+  CHECK_THAT(part_json(test), Contains("\"after\": \"undecided\""));
+}
+
 TEST_CASE("a sheet that cannot be judged names line, column and rule", "[part]") {
   const std::string cold = "1,cold,P1,,1\n";
   const auto says = [](const std::string& text, const std::string& words) {

@@ -1,0 +1,174 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
+
+#include <nlohmann/json.hpp>
+
+#include "estimator/pipeline/mode.hpp"
+#include "gateway/feed/page_state.hpp"
+#include "status/codes.hpp"
+#include "status/figures.hpp"
+
+namespace thermocomp::gateway {
+namespace {
+
+using nlohmann::json;
+
+/// What a cause explains begins so near to it.
+constexpr double near_s = 5.0;
+constexpr double unknown_end_s = std::numeric_limits<double>::infinity();
+
+/// A cause explains what stands behind it here: a link its sensors, these the inputs of the model
+/// and the reasons, all of them and commands the mode.
+enum class Rank { link, sensor, input, order, mode, alone };
+
+Rank rank_of(const Event& event) {
+  if (event.kind == EventKind::mode) return Rank::mode;
+  if (event.kind == EventKind::command || event.kind == EventKind::daemon) return Rank::order;
+  switch (event.subject.kind) {
+    case SubjectKind::bus:
+    case SubjectKind::device:
+    case SubjectKind::controller:
+      return Rank::link;
+    case SubjectKind::sensor:
+      return Rank::sensor;
+    case SubjectKind::input:
+    case SubjectKind::estimate:
+      return Rank::input;
+    case SubjectKind::reason: {
+      const std::optional<Reason> reason = reason_named(event.code);
+      const bool has_cause = reason == Reason::block_lost || reason == Reason::block_estimated ||
+                             reason == Reason::sensor_unconfirmed ||
+                             reason == Reason::controller_offline || reason == Reason::not_written;
+      return reason == Reason::operator_disabled ? Rank::mode
+             : has_cause                         ? Rank::input
+                                                 : Rank::alone;
+    }
+    default:
+      return Rank::alone;
+  }
+}
+
+/// From the first fault of a subject until it is well again; of all else a moment.
+struct Outage {
+  const Event* first{nullptr};
+  Rank rank{Rank::alone};
+  double from_s{0.0};
+  double to_s{unknown_end_s};
+};
+
+/// @param of_event  for each event its outage
+std::vector<Outage> outages_of(const std::vector<Event>& events,
+                               std::vector<std::size_t>& of_event) {
+  std::vector<Outage> outages;
+  std::map<Subject, std::size_t> open;
+  for (const Event& event : events) {
+    const bool ends = event.kind == EventKind::recovery;
+    const auto known = open.find(event.subject);
+    if ((ends || event.kind == EventKind::fault) && known != open.end()) {
+      of_event.push_back(known->second);
+    } else {
+      of_event.push_back(outages.size());
+      // The beginning of an outage may be older than the list.
+      outages.push_back(
+          {&event, rank_of(event), ends ? event.wall_s - event.duration_s : event.wall_s});
+      if (event.kind == EventKind::fault) open[event.subject] = of_event.back();
+      if (event.kind != EventKind::fault) outages.back().to_s = event.wall_s;
+    }
+    if (!ends) continue;
+    outages[of_event.back()].to_s = event.wall_s;
+    open.erase(event.subject);
+  }
+  return outages;
+}
+
+/// What explains an outage: of a lower rank, and there when it began.
+const Outage* cause_of(const Outage& outage, const std::vector<Outage>& all) {
+  const Outage* cause = nullptr;
+  for (const Outage& other : all) {
+    const bool explains = other.rank < outage.rank && outage.rank != Rank::order &&
+                          outage.rank != Rank::alone && outage.from_s >= other.from_s - near_s &&
+                          outage.from_s <= other.to_s + near_s;
+    if (explains && (cause == nullptr || other.rank < cause->rank)) cause = &other;
+  }
+  return cause;
+}
+
+/// What happens again and again is one entry.
+struct Group {
+  const Event* newest{nullptr};
+  std::size_t times{0};
+  double lasted_s{0.0};
+  double idle_s{0.0};  ///< not compensated because of it
+};
+
+bool is_outage(const Event& event) {
+  return event.kind == EventKind::fault || event.kind == EventKind::recovery;
+}
+
+bool is_same(const Event& a, const Event& b) {
+  if (a.subject != b.subject || a.code != b.code) return false;
+  return is_outage(a) ? is_outage(b) : a.kind == EventKind::mode && b.kind == a.kind;
+}
+
+std::string text_of(const Group& group) {
+  std::string text = event_text(*group.newest);
+  if (group.times > 1) {
+    if (group.newest->kind == EventKind::recovery) text.erase(text.rfind(": over"));
+    text += ": " + std::to_string(group.times) + " times";
+    if (group.lasted_s > 0.0) text += ", " + duration_text(group.lasted_s) + " in all";
+    if (group.newest->kind == EventKind::fault) text += ", and still";
+  }
+  return group.idle_s > 0.0 ? text + "; not compensated for " + duration_text(group.idle_s) : text;
+}
+
+/// How long a mode that does not compensate lasted, of the event that ended it.
+double idle_s(const Event& event) {
+  const bool counts = event.kind == EventKind::mode && std::isfinite(event.duration_s) &&
+                      event.code == to_string(Mode::compensating) &&
+                      event.subject.name != to_string(Mode::starting);
+  return counts ? event.duration_s : 0.0;
+}
+
+}  // namespace
+
+json page_events(const Snapshot& snapshot, std::size_t most) {
+  const std::vector<Event>& events = *snapshot.events;
+  std::vector<std::size_t> of_event;
+  const std::vector<Outage> outages = outages_of(events, of_event);
+  std::vector<Group> groups;
+  const auto group_of = [&groups](const Event& event) {
+    return std::find_if(groups.begin(), groups.end(),
+                        [&](const Group& known) { return is_same(*known.newest, event); });
+  };
+  std::vector<std::pair<const Event*, double>> idle;  // of which event how long
+  for (std::size_t i = events.size(); i-- > 0;) {
+    const Event& event = events[i];
+    if (const Outage* cause = cause_of(outages[of_event[i]], outages)) {
+      idle.emplace_back(cause->first, idle_s(event));
+      continue;
+    }
+    auto group = group_of(event);
+    if (group == groups.end()) group = groups.insert(group, {&event});
+    // An outage has two events: it counts by its beginning, which may be older than the list.
+    if (event.kind != EventKind::recovery) ++group->times;
+    if (event.kind == EventKind::recovery) group->lasted_s += event.duration_s;
+  }
+  for (const auto& [first, lasted_s] : idle) {
+    const auto group = group_of(*first);
+    if (group != groups.end()) group->idle_s += lasted_s;
+  }
+  json list = json::array();
+  for (const Group& group : groups) {
+    if (list.size() == most) break;
+    list.push_back({{"number", group.newest->number},
+                    {"wall_s", group.newest->wall_s},
+                    {"kind", to_string(group.newest->kind)},
+                    {"text", text_of(group)}});
+  }
+  return list;
+}
+
+}  // namespace thermocomp::gateway
