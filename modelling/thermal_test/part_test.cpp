@@ -327,8 +327,8 @@ std::string tolerance_sentence(const PartFigures& figures, const char* which, do
   const Tolerance tolerance = tolerance_of(figures, tolerance_um);
   const PartShift& most = farthest(figures);
   std::string text = "Tolerance ±" + figure_text(tolerance_um) + " µm, " + which +
-                     " compensation: " + name_of(tolerance) + ". Farthest: " + most.feature + " in " +
-                     most.axis + ", " + figure_words(most.shift_um, "um") + ".";
+                     " compensation: " + name_of(tolerance) + ". Farthest: " + most.feature +
+                     " in " + most.axis + ", " + figure_words(most.shift_um, "um") + ".";
   if (tolerance == Tolerance::undecided)
     text += " An interval reaches beyond the tolerance: more repeats make it narrower.";
   return text;
@@ -357,10 +357,10 @@ std::string part_html(const PartTest& test) {
   const auto& [before, after, tolerance_um] = test;
   std::string html = html_begin("Test part: how far heat moves its features");
   html += html_list(part_sentences(test));
-  html += html_figure(picture(test),
-                      std::string("Shift of each feature from cold to warm with its 95 % interval") +
-                          (after ? ": brown without, blue with compensation" : "") +
-                          (tolerance_um ? "; dashed: the tolerance." : "."));
+  html += html_figure(
+      picture(test), std::string("Shift of each feature from cold to warm with its 95 % interval") +
+                         (after ? ": brown without, blue with compensation" : "") +
+                         (tolerance_um ? "; dashed: the tolerance." : "."));
   std::vector<std::vector<std::string>> rows{{"feature", "axis", "shift, µm"}};
   if (after) rows.front().insert(rows.front().end(), {"with compensation, µm", "remains"});
   for (const PartShift& each : before.shifts) {

@@ -398,9 +398,9 @@ std::string difference_of(const MeasuredTests& tests, std::size_t run) {
       const std::string& name = column < tests.places.size()
                                     ? tests.places[column]
                                     : tests.signals[column - tests.places.size()];
-      text = printed("; it %s %s = %.4g, the others %s %.4g", words, name.c_str(), own, of_others,
+      text = printed("; it %s %s = %.6g, the others %s %.6g", words, name.c_str(), own, of_others,
                      least);
-      if (largest > least) text += printed(" to %.4g", largest);
+      if (largest > least) text += printed(" to %.6g", largest);
     }
   }
   return text;
@@ -411,8 +411,8 @@ void add_deciding_run(const MeasuredTests& tests, const FamilyResult& result, st
                       std::vector<std::string>& warnings) {
   const std::vector<double>& fold_um = result.fold_um[output];
   if (tests.runs.size() < 2) return;
-  const auto worst = static_cast<std::size_t>(
-      std::max_element(fold_um.begin(), fold_um.end()) - fold_um.begin());
+  const auto worst =
+      static_cast<std::size_t>(std::max_element(fold_um.begin(), fold_um.end()) - fold_um.begin());
   double squares = 0.0;
   double rows = 0.0;
   for (std::size_t f = 0; f < fold_um.size(); ++f) {
