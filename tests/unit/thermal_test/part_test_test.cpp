@@ -64,7 +64,8 @@ TEST_CASE("shifts of a part and their intervals, by hand", "[part]") {
 
 TEST_CASE("a tolerance is kept, exceeded or not decided by whole intervals", "[part]") {
   const auto figure = [](double low, double high) { return Figure{(low + high) / 2.0, low, high}; };
-  PartFigures figures{"on.csv", {{"P1", "Z", figure(-2.0, 3.0)}, {"P2", "Z", figure(4.0, 8.0)}}, {}};
+  PartFigures figures{
+      "on.csv", {{"P1", "Z", figure(-2.0, 3.0)}, {"P2", "Z", figure(4.0, 8.0)}}, {}};
   CHECK(tolerance_of(figures, 8.0) == Tolerance::kept);
   CHECK(tolerance_of(figures, 7.9) == Tolerance::undecided);
   CHECK(tolerance_of(figures, 3.9) == Tolerance::exceeded);
