@@ -17,7 +17,7 @@ from fleet_lab import BIN
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "daemon"))
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "gateway"))
 
-from chromium import headless  # noqa: E402
+from chromium import accessibility_problems, headless  # noqa: E402
 from lab import eventually  # noqa: E402
 
 PHONE, DESKTOP = (390, 844), (1400, 1000)
@@ -119,6 +119,7 @@ def test_three_clicks_from_a_hall_to_the_curve_of_a_sensor(page, browser, size):
     assert "200 machines, 1 depart" in browser.find_element("id", "summary").text
     assert ODD in texts(browser, "#machines tbody tr")[0]  # what is wrong stands first
     assert fits(browser, size)
+    assert accessibility_problems(browser) == []
     picture(browser, name + "_machines")
     click(browser, "nav button", "hall 2")
     rows = eventually(lambda: 0 < len(texts(browser, "#machines tbody tr")) < MACHINES and
@@ -130,10 +131,12 @@ def test_three_clicks_from_a_hall_to_the_curve_of_a_sensor(page, browser, size):
     assert not any("undefined" in text or "NaN" in text for text in texts(browser, "section"))
     assert len(texts(browser, "main table tr")) >= 13  # months
     assert "departs from its sisters in z: head_degC 80 % (9.1 \u00b5m)" in texts(browser, "section")[0]
+    assert accessibility_problems(browser) == []
     picture(browser, name + "_machine")
     click(browser, ".places a", "head")
     eventually(lambda: len(all_of(browser, "svg path")) == 21, "its curve and those of twenty sisters")
     assert len(all_of(browser, "svg path.own")) == 1 and fits(browser, size)
+    assert accessibility_problems(browser) == []
     picture(browser, name + "_place")
     click(browser, "nav button", "8 h")
     eventually(lambda: texts(browser, "nav button[aria-pressed=true]") == ["8 h"], "the other span")

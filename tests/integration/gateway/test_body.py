@@ -8,7 +8,7 @@ import subprocess
 
 import pytest
 
-from chromium import headless
+from chromium import accessibility_problems, headless
 from gateway_lab import BIN, Gateway
 from lab import eventually
 
@@ -106,6 +106,7 @@ def choose(browser, place, value):
 def test_the_page_needs_nothing_else(page, browser):
     browser.get(page.as_uri())
     assert console(browser) == []
+    assert accessibility_problems(browser) == []
     assert "://" not in browser.execute_script(
         "return [...document.querySelectorAll('[src],link')].map(e => e.src || e.href).join()")
     choose(browser, "group", "column_degC 1 K warm")

@@ -8,9 +8,10 @@ import time
 
 import pytest
 
-from chromium import headless
+from chromium import accessibility_problems, headless
 from gateway_lab import Broker, Gateway
 from lab import eventually
+
 
 class Keys:  # of selenium, which may be missing
     ARROW_LEFT = "\ue012"
@@ -84,6 +85,7 @@ def test_it_loads_without_an_error_and_fits_the_screen(machine, gateway, browser
     eventually(lambda: browser.execute_script(
         "return document.querySelectorAll('.axis canvas').length") > 0, "a chart")
     assert no_wider_than_the_screen(browser)
+    assert accessibility_problems(browser) == []
     assert console(browser) == []
     assert browser.find_element("id", "sensors").is_displayed() == (query == "")
     if query == "":
@@ -245,27 +247,13 @@ def test_on_the_wall_a_cause_is_whole_and_the_charts_fill_the_rest(machine, gate
     picture(browser, f"wall_{size[0]}")
 
 
-CONTRAST = """
-const parse = text => (text.match(/[\\d.]+/g) || []).map(Number);
-const light = rgb => rgb.slice(0, 3).map(c => (c /= 255) <= 0.03928 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4)
-  .reduce((sum, c, i) => sum + c * [0.2126, 0.7152, 0.0722][i], 0);
-const under = e => { for (; e; e = e.parentElement) {
-  const c = parse(getComputedStyle(e).backgroundColor); if (c.length === 3 || c[3] === 1) return c; } return [255, 255, 255]; };
-return [...document.querySelectorAll('body *')].filter(e => e.offsetParent &&
-    [...e.childNodes].some(n => n.nodeType === 3 && n.textContent.trim() && n.textContent !== '\u25cf'))
-  .map(e => { const a = light(parse(getComputedStyle(e).color)), b = light(under(e));
-    return [(Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05), e.textContent.slice(0, 40)]; })
-  .filter(([ratio]) => ratio < 4.5);
-"""
-
-
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_everything_can_be_read_and_touched(machine, gateway, browser, scheme):
     browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {
         "features": [{"name": "prefers-color-scheme", "value": scheme}]})
     show(browser, gateway, PHONE)
     drawn(browser)
-    assert browser.execute_script(CONTRAST) == []
+    assert accessibility_problems(browser) == []
     small = browser.execute_script(
         "return [...document.querySelectorAll('button')].filter(e => e.offsetParent).map(e =>"
         "[e.textContent, e.getBoundingClientRect()]).filter(([, b]) => b.width < 44 || b.height < 44)"
@@ -276,7 +264,10 @@ def test_everything_can_be_read_and_touched(machine, gateway, browser, scheme):
     picture(browser, "phone_" + scheme)
     machine.daemon.kill()
     eventually(lambda: "does not answer" in text(browser, "detail"), "the daemon is away")
-    assert browser.execute_script(CONTRAST) == []
+    assert accessibility_problems(browser) == []
+    browser.execute_script("document.body.append(document.createElement('button'), Object.assign("
+                           "document.createElement('p'), {textContent: 'faint', style: 'color: #999; background: #aaa'}))")
+    assert [each.split(":")[-1] for each in accessibility_problems(browser)] == [" faint", "a button without a name"]
 
 
 def test_a_broker_that_is_gone_is_told_and_found_again(lab, machine, browser):
