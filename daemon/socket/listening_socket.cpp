@@ -70,7 +70,7 @@ AccessGroups look_up_groups(const SocketConfig& config) {
 }
 
 PeerAccess access_of(const Peer& peer, uid_t daemon_user, const AccessGroups& groups) {
-  if (peer.user == 0) return {true, true, true, true};
+  if (peer.user == 0) return PeerAccess::of_root();
   const bool is_own_user = peer.user == daemon_user;
   const auto allowed = [&](const std::optional<gid_t>& group) {
     // Without the groups this is a development daemon, and its own user stands for all of them.

@@ -39,6 +39,7 @@ struct PeerAccess {
   bool model{false};
   bool bridge{false};
 
+  [[nodiscard]] static constexpr PeerAccess of_root() noexcept { return {true, true, true, true}; }
   [[nodiscard]] bool any() const noexcept { return read || operate || model || bridge; }
   bool operator==(const PeerAccess&) const = default;
 };
