@@ -97,7 +97,8 @@ def change_over(machine, package, from_um, to_um):
     # 0.1 s: between an offset's computation and its arrival the guest does something else.
     service.assert_slewed(orders, slack_s=0.1)
     assert min(from_um, to_um) < orders[held][1] < max(from_um, to_um)
-    assert steps[held] < 0.25, "the new daemon goes on from where the one before stopped"
+    # The longest pause may be the guest's own, within which the axis was on its way.
+    assert steps[held] < service.SLEW_UM_PER_S * pauses[held] + 0.05, "it goes on from where the one before stopped"
 
     eventually(lambda: service.recorded_spans()[-1][1] > orders[-1][0], "all of it is committed")
     assert chunks <= service.committed_chunks()
