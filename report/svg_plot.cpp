@@ -93,10 +93,13 @@ std::string straight(double x, double y, const std::string& along, const char* k
   return svg.append("\"/>");
 }
 
-std::string begin(double whole_width, double height) {
+/// @param name  what a reader gets who does not see it
+std::string begin(double whole_width, double height, const std::string& name) {
   return std::string("<svg viewBox=\"0 0 ")
       .append(place(whole_width, height))
-      .append("\" role=\"img\">");
+      .append("\" role=\"img\" aria-label=\"")
+      .append(xml_text(name))
+      .append("\">");
 }
 
 /// A frame in which values stand.
@@ -253,11 +256,12 @@ std::string panel_svg(const PlotPanel& panel, const Box& box, Values time, const
 Drawing panels_drawing(Values along, const std::string& along_title,
                        const std::vector<PlotPanel>& panels, const std::vector<PlotSpan>& spans,
                        const std::vector<TimeTick>& ticks) {
-  Drawing drawing{width, axis_height, ""};
+  Drawing drawing{width, axis_height, "", ""};
   const Range x = range_of({along});
   for (const PlotPanel& panel : panels) {
     const double top = drawing.height - axis_height + title_height;
     const Box box{left, top, width - left - right, panel.height};
+    drawing.name += (drawing.name.empty() ? "" : "; ") + panel.title;
     std::string& svg = drawing.body;
     for (const PlotSpan& span : spans) svg += span_svg(span, box, x, &panel == &panels.front());
     for (const TimeTick& tick : ticks)
@@ -278,7 +282,7 @@ const char* const svg_style =
     ".span{fill:#2b6cb0;fill-opacity:.07}";
 
 std::string Drawing::svg() const {
-  return begin(width, height) + body + "</svg>\n";
+  return begin(width, height, name) + body + "</svg>\n";
 }
 
 std::string svg_file(const std::vector<Drawing>& drawings) {
@@ -329,7 +333,7 @@ Drawing heat_map_drawing(const HeatMap& map) {
   for (const std::string& name : map.names)
     names_width = std::max(names_width, 1.2 * text_width(name) + 8.0);
   Drawing drawing{std::max(width, names_width + at(count) + right),
-                  title_height + at(count) + names_width, ""};
+                  title_height + at(count) + names_width, "", map.title};
   std::string& svg = drawing.body;
   svg += label(4, 14, map.title, "class=\"title\"");
   for (std::size_t i = 0; i < count; ++i) {
@@ -355,7 +359,8 @@ std::string scatter_plot(const PlotDots& dots) {
   const Range up = range_of({dots.y});
   const Box box{left, title_height + 4, small_width - left - right,
                 small_height - title_height - 4 - axis_height};
-  std::string svg = begin(small_width, small_height) + label(4, 14, dots.title, "class=\"title\"");
+  std::string svg =
+      begin(small_width, small_height, dots.title) + label(4, 14, dots.title, "class=\"title\"");
   svg += vertical_axis(box, up, 4) + horizontal_axis(box, across, dots.x_unit, 3);
   svg += "<path class=\"dots\" d=\"";
   const std::size_t stride = 1 + (dots.x.size() - 1) / dots_max;
@@ -370,7 +375,13 @@ std::string scatter_plot(const PlotDots& dots) {
 
 std::string bars_plot(const std::vector<NamedBar>& bars) {
   const double height = title_height + static_cast<double>(bars.size()) * (bar_height + gap);
-  std::string svg = begin(width, height + gap);
+  std::string shares;
+  for (const NamedBar& bar : bars) {
+    shares += (shares.empty() ? "" : "; ") + bar.name;
+    for (const BarPart& part : bar.parts)
+      shares += ", " + part.label + " " + number(std::round(100.0 * part.share)) + " %";
+  }
+  std::string svg = begin(width, height + gap, shares);
   double legend = bar_left;
   if (!bars.empty())
     for (const BarPart& part : bars.front().parts) {

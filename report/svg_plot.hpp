@@ -19,6 +19,7 @@ struct Drawing {
   double width{0.0};
   double height{0.0};
   std::string body;
+  std::string name;                       ///< for who does not see it
   [[nodiscard]] std::string svg() const;  ///< the element <svg>, for a page with svg_style
 };
 

@@ -235,7 +235,7 @@ std::string picture(const PartTest& test) {
   const double middle = (left + width) / 2.0;
   const double scale = (width - left - 20.0) / 2.0 / reach;
   const double height = 44.0 + row * static_cast<double>(before.shifts.size());
-  Drawing drawing{width, height, ""};
+  Drawing drawing{width, height, "", "shift of each feature with its 95 % interval"};
   const auto number = [](double value) {
     char text[32];
     std::snprintf(text, sizeof text, "%.1f", value);

@@ -20,7 +20,7 @@ constexpr double share_told_min = 0.25;
 constexpr const char* own_style =
     "<style>svg .share{fill:#fff}.dots{stroke:#2b6cb0;stroke-width:2}.few{display:flex;"
     "flex-wrap:wrap}.few svg{width:32%;min-width:240px}summary{cursor:pointer;margin:.4em "
-    "0}summary h3{display:inline}"
+    "0;overflow-wrap:anywhere}summary h3{display:inline}"
     ".zoom4:checked~.wide svg{width:400%}.zoom16:checked~.wide svg{width:1600%}</style>\n";
 
 std::string fixed(double value, int digits = 2) {

@@ -5,6 +5,7 @@
 #include <span>
 
 #include "modelling/diagnosis/report/diagnosis_report.hpp"
+#include "report/html_page.hpp"
 #include "report/svg_plot.hpp"
 
 namespace thermocomp::diagnosis {
@@ -113,7 +114,7 @@ std::string headroom_picture(const Diagnosis& diagnosis) {
                        {"predictable, without a name", "#b7791f", of.headroom->predictable},
                        {"in nothing that was recorded", "#c53030", of.headroom->not_recorded},
                        {"noise of a single value", "#a0aec0", of.headroom->noise}}});
-  return bars.empty() ? std::string() : bars_plot(bars);
+  return bars.empty() ? std::string() : html_figure(bars_plot(bars), "");
 }
 
 }  // namespace thermocomp::diagnosis

@@ -10,7 +10,7 @@ import pytest
 
 from chromium import accessibility_problems, headless
 from gateway_lab import Broker, Gateway
-from lab import eventually
+from lab import eventually, run_tool
 
 
 class Keys:  # of selenium, which may be missing
@@ -245,6 +245,23 @@ def test_on_the_wall_a_cause_is_whole_and_the_charts_fill_the_rest(machine, gate
             " document.getElementById('axes-section').getBoundingClientRect().bottom)"),
             "the times stand inside the card")
     picture(browser, f"wall_{size[0]}")
+
+
+def test_the_weeks_report_is_one_click_away(lab, machine, browser):
+    report = lab.folder / "week.html"
+    gateway = lab.also_end(Gateway(lab, machine.daemon, http=f'report = "{report}"')).start()
+    assert gateway.ask("/report")[0] == 404  # the timer has not made it yet
+    machine.warm_by(6.0)
+    machine.daemon.wait_for_offset(6.0)
+    eventually(lambda: run_tool("report", machine.daemon.history, "--machine", "mill 3", "-o", report)[0] == 0, "rows are committed")
+    show(browser, gateway, PHONE)
+    link = browser.find_element("id", "report")
+    eventually(link.is_displayed, "the page leads to it")
+    link.click()
+    eventually(lambda: browser.title.startswith("mill 3: "), "the machine's report")
+    assert no_wider_than_the_screen(browser)
+    assert accessibility_problems(browser) == []
+    picture(browser, "week")
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
