@@ -118,8 +118,8 @@ class StateKeeper {
   /// What went wrong at the last attempt; empty: what was given last is on disk or on its way.
   [[nodiscard]] const std::string& error() const noexcept { return error_; }
 
-  /// Until an operator takes a new one, the reference is unknown: compensating would take the
-  /// machine for straight as it stood when the daemon happened to start. Kept in the file.
+  /// Until an operator takes a new one, the reference is unknown: compensating would count
+  /// displacement from how the machine stood when the daemon happened to start. Kept in the file.
   [[nodiscard]] bool is_reference_lost() const noexcept { return reference_lost_; }
   /// An operator has taken a reference. Written with the next save().
   void reference_taken() noexcept;

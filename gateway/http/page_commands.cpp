@@ -79,9 +79,8 @@ std::string confirmation_text(const CommandRequest& asked, const Status& status)
     return "Switch the compensation off. The axes will move, no faster than their slew rates: " +
            moves_to(status, false) + ".";
   if (method == "reference")
-    return "Take the machine as it is now for straight. Displacement is counted from here on; "
-           "right "
-           "only with the machine cold and even and the offsets at zero.";
+    return "Take the machine as it is now as the reference: displacement is counted from here on. "
+           "Right only with the machine cold and even and the offsets at zero.";
   if (method == "accept")
     return "Take the reading of sensor " + asked.sensor +
            " for right, though it jumped. The axes will follow it, no faster than their slew "

@@ -1,5 +1,5 @@
 """A state file that is gone or cannot be read is no first start where there was an earlier one: the
-warm machine is not taken for straight, and an operator's "off" stays."""
+warm machine is not taken for the reference, and an operator's "off" stays."""
 
 import contextlib
 import sqlite3
