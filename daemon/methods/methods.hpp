@@ -15,7 +15,7 @@
 
 namespace thermocomp {
 
-/// A new reference may be taken only while nothing says that the machine is not straight.
+/// A new reference may be taken only while nothing says that the machine is bent.
 /// @return why none should be taken now: an axis is being proved, an offset is applied, the machine
 /// warms or cools. Empty: nothing speaks against it, and what is not known does not either.
 [[nodiscard]] std::string why_no_reference(const StatusView& view);
