@@ -91,7 +91,7 @@ struct Verdict {
   nlohmann::json answer = nullptr;  ///< "departure" of `inspect`
 };
 
-/// By the answer: the exit status is 1 for a fault of the recording, too.
+/// Takes the answer, since the exit status is 1 for a fault of the recording, too.
 Verdict compared(const WorkFolder& folder, const fs::path& run, const std::string& series) {
   write_text(folder / "series.toml", series);
   run_modelling({"inspect", run.string(), "--series", folder / "series.toml", "--json",
@@ -218,8 +218,8 @@ WorkFolder::~WorkFolder() {
   fs::remove_all(path_, ignored);
 }
 
-int run_program(const std::string& program, const std::vector<std::string>& arguments,
-                const fs::path& log) {
+int run_and_wait(const std::string& program, const std::vector<std::string>& arguments,
+                 const fs::path& log) {
   std::vector<char*> words{const_cast<char*>(program.c_str())};
   for (const std::string& argument : arguments)
     words.push_back(const_cast<char*>(argument.c_str()));
@@ -243,7 +243,7 @@ int run_program(const std::string& program, const std::vector<std::string>& argu
 
 int run_modelling(const std::vector<std::string>& arguments, const fs::path& log) {
   const fs::path folder = fs::read_symlink("/proc/self/exe").parent_path();
-  const int status = run_program((folder / "thermocomp-modelling").string(), arguments, log);
+  const int status = run_and_wait((folder / "thermocomp-modelling").string(), arguments, log);
   if (status > 1)
     throw std::runtime_error(std::string(arguments.front()).append(": ").append(last_line(log)));
   return status;
@@ -355,7 +355,8 @@ struct Ready {
   std::string statistics;
 };
 
-/// Of a night that is over: `--slurm` makes the series before any night was worked off.
+/// Makes the minute means of a night that is over. `--slurm` makes the series before the nights
+/// themselves, which otherwise make them.
 constexpr const char* make_missing_minutes =
     "SELECT fleet.make_minutes($1, $2::date) FROM fleet.uplink WHERE machine = $1 AND NOT EXISTS"
     " (SELECT FROM fleet.minute WHERE machine = $1 AND at >= $2::date AND at < $2::date + 1)"

@@ -32,8 +32,8 @@ class WorkFolder {
 
 /// Runs a program to its end. @param log  of its output; empty: the output is ours
 /// @return its exit status, or 128 and the signal that ended it. @throws std::system_error
-int run_program(const std::string& program, const std::vector<std::string>& arguments,
-                const std::filesystem::path& log);
+int run_and_wait(const std::string& program, const std::vector<std::string>& arguments,
+                 const std::filesystem::path& log);
 
 /// Runs `thermocomp-modelling`, of the program's own folder, with these arguments.
 /// @return its exit status, 0 or 1. @throws std::runtime_error with its last words otherwise

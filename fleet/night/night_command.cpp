@@ -79,7 +79,7 @@ Nights::const_iterator end_of_date(Nights::const_iterator begin, Nights::const_i
                       [&](const MachineNight& each) { return each.night != begin->night; });
 }
 
-/// What these nights of one date are compared with.
+/// Makes the series that these nights of one date are compared with.
 void make_all_series(pqxx::connection& store, Nights::const_iterator begin,
                      Nights::const_iterator end) {
   std::set<std::string> types;
@@ -158,7 +158,7 @@ int run_by_slurm(const std::string& conninfo, const NightOptions& options) {
     const std::string task = "'" + std::filesystem::read_symlink("/proc/self/exe").string() +
                              "' night --machine-number $SLURM_ARRAY_TASK_ID --nights " +
                              std::to_string(options.nights) + "; [ $? -lt 2 ]";
-    run_program(
+    run_and_wait(
         "sbatch",
         {"--wait", "--requeue", "--job-name=thermocomp-night", "--output=thermocomp-night-%A.log",
          "--open-mode=append", "--array=" + ranges(machines), "--wrap=" + task},

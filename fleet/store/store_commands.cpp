@@ -100,8 +100,7 @@ std::string night_text(const pqxx::row& row) {
   return text.append(", p ").append(row["probability"].c_str());
 }
 
-/// Of each machine the newest release, until it is promoted or has ended: what the machine makes of
-/// it.
+/// Prints each machine's newest release with its last step, until it is promoted or has ended.
 void print_releases(pqxx::read_transaction& work) {
   for (const pqxx::row& row :
        work.exec("SELECT release.id, machine.name, last.step, last.detail, release.note FROM "
