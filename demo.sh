@@ -2,6 +2,7 @@
 # A simulated machining centre works through an eight-hour shift in 48 s; thermocompd reads its
 # thermocouples and the height of its head over Modbus, and keeps its tool where it should be. At the
 # end: a picture, and what was left of the error. Everything it writes is in demo_output/.
+#   ./demo.sh body      after it: the shift in three dimensions, for a browser; builds the modelling tools
 #   ./demo.sh fleet     instead: twelve machines of one type, two weeks, a PostgreSQL of its own; some two minutes
 set -euo pipefail
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")"
@@ -13,8 +14,8 @@ if [[ ${1:-} == fleet ]]; then
   stage "build" cmake --build --preset release -j "$(build_jobs)" \
     --target thermocomp thermocomp-modelling thermocomp-fleet thermocomp-uplink thermocompd thermocomp-sim
   exec "$python" scripts/demo_fleet.py build/release/bin demo_output
-elif (($# > 0)); then
-  echo "usage: ./demo.sh [fleet]" >&2
+elif [[ $# -gt 1 || -n ${1:-} && $1 != body ]]; then
+  echo "usage: ./demo.sh [body|fleet]" >&2
   exit 2
 fi
 
@@ -57,7 +58,7 @@ is_running() { kill -0 "$1" 2>/dev/null; }
 
 prepare() {
   mkdir -p "$out"
-  rm -f "$out"/{history.db*,state.json,truth.csv,ports.json,*.log,demo.png,demo.svg}
+  rm -f "$out"/{history.db*,state.json,truth.csv,ports.json,*.log,demo.png,demo.svg,body.html,shift.csv}
 }
 
 simulated_machine_is_ready() {
@@ -148,6 +149,27 @@ list_events() {
     END { emit() }' config/demo/machine.toml >"$out/events.dat"
 }
 
+# The temperatures that the daemon had, on the machine's finite elements, with the clock of the shift.
+draw_body() {
+  "$bin/thermocomp" export "$out/history.db" -o - 2>"$out/structure.log" |
+    awk -F, -v OFS=, -v factor="$time_factor" '/^[0-9]/ { $1 *= factor } { print }' >"$out/shift.csv" ||
+    fail "no temperatures in $out/history.db: $(tail -n 1 "$out/structure.log")"
+  "$bin/thermocomp" structure config/demo/structure.toml -o "$out/structure_model.toml" \
+    --page "$out/body.html" --run "$out/shift.csv" >"$out/structure.log" 2>&1 ||
+    fail "the body was not drawn: $(tail -n 1 "$out/structure.log")"
+  rm -f "$out"/structure{_model.toml,.log}
+  echo "in three dimensions: $out/body.html (for a browser)"
+}
+
+if [[ ${1:-} == body ]]; then
+  [[ -s $out/history.db ]] || fail "there is no shift yet; first run ./demo.sh"
+  stage "packages" scripts/setup.sh modelling
+  stage "configure" cmake --preset release
+  stage "build" cmake --build --preset release -j "$(build_jobs)" --target thermocomp thermocomp-modelling
+  draw_body
+  exit
+fi
+
 stage "packages" scripts/setup.sh demo
 stage "configure" cmake --preset release
 stage "build" cmake --build --preset release -j "$(build_jobs)" \
@@ -162,6 +184,11 @@ list_events
 draw
 echo
 echo "picture: $out/demo.png and $out/demo.svg"
+if [[ -x $bin/thermocomp-modelling ]]; then
+  draw_body
+else
+  echo "in three dimensions: ./demo.sh body (builds the modelling tools first)"
+fi
 echo "history: $out/history.db, truth: $out/truth.csv, logs: $out/*.log"
 grep -E '^error rms at the tool: ' "$out/thermocomp-sim.log" | tail -n 1 | grep . ||
   fail "no result in $out/thermocomp-sim.log"

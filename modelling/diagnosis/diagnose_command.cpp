@@ -18,6 +18,9 @@
 #include "report/output_file.hpp"
 #include "report/run_loader.hpp"
 #include "report/terminal.hpp"
+#ifdef THERMOCOMP_WITH_STRUCTURE
+#include "modelling/diagnosis/network/thermal_body.hpp"
+#endif
 
 namespace thermocomp::diagnosis {
 namespace {
@@ -27,6 +30,7 @@ constexpr double probability_told_min = 0.001;
 struct Options {
   std::string model;
   std::string thermal;
+  std::string structure;
   std::vector<std::string> train;
   std::vector<std::string> test;
   std::string columns;
@@ -108,16 +112,51 @@ void print_weighed(const Diagnosis& diagnosis) {
                   100 * each.share_of_remainder);
 }
 
+constexpr const char* searching = "searching what the model gets wrong";
+
+Diagnosis thermal_diagnosis_of(const Options& options, const std::vector<RunFile>& train,
+                               const std::vector<RunFile>& test, const ThermalPlant& plant,
+                               ReportData* report, const NetworkView& view = nullptr) {
+  cli::Progress line(searching);
+  return diagnose_thermal(
+      plant, train, options.train, test, options.test, report, [&line] { line.update(-1.0); },
+      view);
+}
+
+#ifdef THERMOCOMP_WITH_STRUCTURE
+/// Also writes the body's page into the folder.
+Diagnosis diagnosis_with_body(const Options& options, const std::vector<RunFile>& train,
+                              const std::vector<RunFile>& test, ReportData* report) {
+  const cli::ProgressLines lines;
+  ThermalBody body(options.structure, [&](std::string_view what) { lines.say(what); });
+  const Diagnosis diagnosis = thermal_diagnosis_of(
+      options, train, test, load_thermal_plant(options.thermal, &body.body()), report,
+      [&body](const ThermalRuns& runs, const HeatNetwork& before, const HeatNetwork& after) {
+        body.show(runs, before, after);
+      });
+  std::string note = "Rise of the temperature since the start of each test run.";
+  if (diagnosis.findings.empty()) note += " Nothing was found wrong.";
+  for (const NamedFinding& finding : diagnosis.findings)
+    note += " Found: " + title_of(finding) + ".";
+  std::filesystem::create_directories(options.folder);
+  cli::write_file((std::filesystem::path(options.folder) / "body.html").string(),
+                  body.page(std::filesystem::path(options.thermal).stem().string(), note));
+  return diagnosis;
+}
+#endif
+
 Diagnosis diagnosis_of(const Options& options, ReportData* report) {
   cli::RunLoader loader(options.columns);
   std::vector<RunFile> train = loader.load(options.train);
   std::vector<RunFile> test = loader.load(options.test);
   refuse_overlap(train, test);
-  cli::Progress line("searching what the model gets wrong");
-  const auto progress = [&line] { line.update(-1.0); };
+#ifdef THERMOCOMP_WITH_STRUCTURE
+  if (!options.structure.empty()) return diagnosis_with_body(options, train, test, report);
+#endif
   if (!options.thermal.empty())
-    return diagnose_thermal(load_thermal_plant(options.thermal), train, options.train, test,
-                            options.test, report, progress);
+    return thermal_diagnosis_of(options, train, test, load_thermal_plant(options.thermal), report);
+  cli::Progress line(searching);
+  const auto progress = [&line] { line.update(-1.0); };
   const ThermalModel model = load_model(options.model);
   for (std::vector<RunFile>* runs : {&train, &test})
     for (RunFile& run : *runs)
@@ -148,6 +187,8 @@ void write_folder(const Options& options, const Diagnosis& diagnosis, const Repo
 int run(const Options& options) {
   if (options.model.empty() == options.thermal.empty())
     throw std::runtime_error("diagnose needs either --model or --thermal");
+  if (!options.structure.empty() && (options.thermal.empty() || options.folder.empty()))
+    throw std::runtime_error("--structure needs --thermal and --out, where it writes body.html");
   const std::filesystem::path corrected = std::filesystem::path(options.folder) / "machine.toml";
   if (!options.folder.empty() && std::filesystem::exists(corrected) &&
       std::filesystem::exists(options.thermal) &&
@@ -173,6 +214,11 @@ void add_diagnose_command(CLI::App& app, std::function<int()>& action) {
   command->add_option(
       "--thermal", options->thermal,
       "machine file with a [plant], in place of --model: temperatures are compared");
+#ifdef THERMOCOMP_WITH_STRUCTURE
+  command->add_option("--structure", options->structure,
+                      "structure file of the machine's body: --out also receives body.html, the "
+                      "test runs in three dimensions and what the findings change");
+#endif
   command
       ->add_option("--train", options->train, "runs from which causes are found: RUN.csv[@T0:T1]")
       ->required();

@@ -92,7 +92,7 @@ class Reducer {
   Reducer(const StructureSpec& spec, const Structure& structure, const HeatModel& heat)
       : spec_(spec), structure_(structure), heat_(heat), free_(free_model()) {}
 
-  ReducedBody reduce(const Statics& statics, bool with_parts) {
+  BodyReduction reduce(const Statics& statics, bool with_parts) {
     const auto sensitivities = statics.sensitivities(structure_.rows);
     std::vector<Vector> outputs;
     for (std::size_t i = 0; i < spec_.outputs.size(); ++i) {
@@ -100,7 +100,8 @@ class Reducer {
     }
     if (with_parts) find_parts();
     find_basis(outputs);
-    ReducedBody body;
+    BodyReduction reduction{{}, fields()};
+    ReducedBody& body = reduction.body;
     const Matrix coolant_part = times(free_.flooded, basis_) - times(free_.dry, basis_);
     const Matrix coolant = basis_.transpose() * coolant_part;
     body.conductance = plain(Matrix(rates_.asDiagonal()));
@@ -119,10 +120,10 @@ class Reducer {
     }
     add_guideways(sensitivities, body);
     if (with_parts) {
-      add_couplings(body);
+      add_couplings(reduction);
       add_capacities(body);
     }
-    return body;
+    return reduction;
   }
 
  private:
@@ -141,22 +142,27 @@ class Reducer {
     }
   }
 
+  /// The states' fields, on all nodes.
+  [[nodiscard]] std::vector<std::vector<double>> fields() const {
+    std::vector<std::vector<double>> all;
+    for (const auto& field : basis_.colwise())
+      all.push_back(
+          heat_.reduction.expanded({field.data(), static_cast<std::size_t>(field.size())}));
+    return all;
+  }
+
   /// Each coupling is strength w w', so that its projection is strength v v' with v = V' w.
-  void add_couplings(ReducedBody& body) const {
-    Matrix everywhere(static_cast<Eigen::Index>(structure_.mesh.nodes_m.size()), basis_.cols());
-    for (Eigen::Index j = 0; j < basis_.cols(); ++j) {
-      const Vector field = basis_.col(j);
-      const std::vector<double> full =
-          heat_.reduction.expanded({field.data(), static_cast<std::size_t>(field.size())});
-      everywhere.col(j) = Eigen::Map<const Vector>(full.data(), everywhere.rows());
-    }
+  void add_couplings(BodyReduction& reduction) const {
+    ReducedBody& body = reduction.body;
     for (const NamedCouplings& named : heat_.named) {
       Matrix matrix = Matrix::Zero(basis_.cols(), basis_.cols());
       Vector inflow = Vector::Zero(basis_.cols());
       for (const Coupling& coupling : named.couplings) {
         Vector at = Vector::Zero(basis_.cols());
         for (std::size_t i = 0; i < coupling.count; ++i)
-          at += coupling.weight[i] * everywhere.row(coupling.nodes[i]).transpose();
+          for (Eigen::Index j = 0; j < at.size(); ++j)
+            at[j] += coupling.weight[i] *
+                     reduction.fields[static_cast<std::size_t>(j)][coupling.nodes[i]];
         matrix += coupling.strength[0] * at * at.transpose();
         inflow += coupling.strength[0] * at;
       }
@@ -294,8 +300,8 @@ class Reducer {
 
 }  // namespace
 
-ReducedBody reduce_body(const StructureSpec& spec, const Structure& structure,
-                        const HeatModel& heat, const Statics& statics, bool with_parts) {
+BodyReduction reduce_body(const StructureSpec& spec, const Structure& structure,
+                          const HeatModel& heat, const Statics& statics, bool with_parts) {
   std::vector<Problem> problems;
   const auto problem = [&](const char* key, const char* rule) {
     problems.push_back({spec.file.string(), 0, key, "", rule});

@@ -50,6 +50,12 @@ struct RiseField {
 /// Heat of a source where its signal has a value [W].
 [[nodiscard]] double heat_W(const HeatSpec& heat, double signal);
 
+/// A body for the simulator, with the temperature field that each of its states stands for.
+struct BodyReduction {
+  ReducedBody body;
+  std::vector<std::vector<double>> fields;  ///< shape (states)(nodes)
+};
+
 /// Galerkin projection on rational Krylov vectors: V holds the uniform field and
 /// (L + s C)^-1 b for every input b (heats, room, coolant) and every output's sensitivity, at some
 /// shifts s, without and with coolant; orthonormal in C, then turned so that V^T L V is diagonal.
@@ -58,8 +64,8 @@ struct RiseField {
 /// Source: E. J. Grimme, Krylov projection methods for model reduction, 1997.
 /// @param with_parts  also what each film, joint and part has in the matrices
 /// @throws ConfigurationError: sensors outside their part, no sensors
-[[nodiscard]] ReducedBody reduce_body(const StructureSpec& spec, const Structure& structure,
-                                      const HeatModel& heat, const Statics& statics,
-                                      bool with_parts = false);
+[[nodiscard]] BodyReduction reduce_body(const StructureSpec& spec, const Structure& structure,
+                                        const HeatModel& heat, const Statics& statics,
+                                        bool with_parts = false);
 
 }  // namespace thermocomp::structure

@@ -262,6 +262,14 @@ std::string vtu_file(const Structure& structure, const std::vector<NodeValues>& 
   return text + "\n</AppendedData>\n</VTKFile>\n";
 }
 
+std::vector<std::size_t> moments(std::size_t first, std::size_t last) {
+  constexpr std::size_t most = 24;
+  const std::size_t count = std::min(most, last - first);
+  std::vector<std::size_t> chosen;
+  for (std::size_t i = 1; i <= count; ++i) chosen.push_back(first + (last - first) * i / count);
+  return chosen;
+}
+
 SurfacePicture::SurfacePicture(const StructureSpec& spec, const Structure& structure) {
   picture_.title = spec.file.stem().string();
   std::map<Index, std::uint32_t> number_of;

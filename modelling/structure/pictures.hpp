@@ -33,6 +33,10 @@ struct NodeValues {
 [[nodiscard]] std::string svg_picture(const Structure& structure,
                                       const std::vector<BlockShape>& shapes);
 
+/// Up to 24 of the numbers from first + 1 to last, evenly, last among them: a page with so many
+/// moments of some thousand nodes stays below ten megabytes.
+[[nodiscard]] std::vector<std::size_t> moments(std::size_t first, std::size_t last);
+
 /// A page of the structure's surface, with the sensors of its file and the points of its outputs.
 class SurfacePicture {
  public:

@@ -15,11 +15,14 @@
 #include <sys/resource.h>
 
 #include "config/model/model_file.hpp"
+#include "config/runs/model_inputs.hpp"
+#include "config/text/problems.hpp"
 #include "config/text/units.hpp"
 #include "modelling/structure/heat_model.hpp"
 #include "modelling/structure/pictures.hpp"
 #include "modelling/structure/structure_model.hpp"
 #include "report/output_file.hpp"
+#include "report/run_loader.hpp"
 #include "report/terminal.hpp"
 
 namespace thermocomp::structure {
@@ -44,6 +47,7 @@ struct Options {
   std::string vtu;
   std::string picture;
   std::string page;
+  std::string run;
   std::string plant;
   bool plant_parts{false};
   bool all{false};
@@ -77,9 +81,36 @@ std::vector<BlockShape> block_shapes(const Structure& structure, const Statics& 
   return shapes;
 }
 
-std::string page_of(const StructureSpec& spec, const Structure& structure,
-                    const std::vector<BlockShape>& shapes) {
+/// Moments of a run: the blocks' shapes, each times its rise since the run's first row.
+void add_run(const RunFile& run, const ThermalModel& model, const Structure& structure,
+             const std::vector<BlockShape>& shapes, SurfacePicture& picture) {
+  const ModelInputs inputs = model_inputs(model, run);
+  if (inputs.rows.size() < 2)
+    throw ConfigurationError({{run.name, 0, "", "", "must have two rows with every block"}});
+  for (const std::size_t moment : moments(0, inputs.rows.size() - 1)) {
+    const std::size_t row = inputs.rows[moment];
+    std::vector<double> rise_K(structure.mesh.nodes_m.size(), 0.0);
+    std::vector<double> displacement_m(3 * rise_K.size(), 0.0);
+    std::vector<double> block_K;
+    for (std::size_t block = 0; block < shapes.size(); ++block) {
+      const std::vector<double>& column = *inputs.temperatures[block];
+      block_K.push_back(column[row] - column[inputs.rows.front()]);
+      for (std::size_t i = 0; i < displacement_m.size(); ++i)
+        displacement_m[i] += block_K.back() * shapes[block].displacement_m[i];
+    }
+    for (std::size_t node = 0; node < rise_K.size(); ++node)
+      rise_K[node] = block_K[structure.block_of_node[node]];
+    const std::string name = std::filesystem::path(run.name).stem().string();
+    const double time_s = run.time_s()[row] - run.time_s()[inputs.rows.front()];
+    picture.add_state({name, name, time_s, "", {}, {}}, rise_K, displacement_m);
+  }
+}
+
+std::string page_of(const Options& options, const StructureSpec& spec, const ThermalModel& model,
+                    const Structure& structure, const std::vector<BlockShape>& shapes) {
   SurfacePicture picture(spec, structure);
+  if (!options.run.empty())
+    add_run(cli::RunLoader("").load(options.run), model, structure, shapes, picture);
   for (Index block = 0; block < shapes.size(); ++block) {
     BodyState state;
     state.group = state.name = shapes[block].block + " 1 K warm";
@@ -100,6 +131,8 @@ std::string body_text(const Options& options, const Structure& structure, const 
 }
 
 int run(const Options& options) {
+  if (!options.run.empty() && options.page.empty())
+    throw std::runtime_error("--run needs --page, which shows it");
   const cli::ProgressLines progress;
   const StructureSpec spec = load_structure(options.structure);
   const Structure structure =
@@ -112,16 +145,18 @@ int run(const Options& options) {
   const ThermalModel model = block_model(spec, structure, statics.sensitivities(structure.rows));
   if (!options.vtu.empty() || !options.picture.empty() || !options.page.empty()) {
     const auto shapes = block_shapes(structure, statics, progress);
-    if (!options.page.empty()) cli::write_file(options.page, page_of(spec, structure, shapes));
+    if (!options.page.empty())
+      cli::write_file(options.page, page_of(options, spec, model, structure, shapes));
     if (!options.vtu.empty()) cli::write_file(options.vtu, vtu_file(structure, values_of(shapes)));
     if (!options.picture.empty()) cli::write_file(options.picture, svg_picture(structure, shapes));
   }
   if (!options.plant.empty()) {
     progress.say("a small state space for the simulator");
     const HeatModel heat = build_heat_model(spec, structure);
-    cli::write_file(options.plant,
-                    body_text(options, structure,
-                              reduce_body(spec, structure, heat, statics, options.plant_parts)));
+    cli::write_file(
+        options.plant,
+        body_text(options, structure,
+                  reduce_body(spec, structure, heat, statics, options.plant_parts).body));
   }
   cli::write_file(options.model, write_model(model));
   progress.say("done");
@@ -146,6 +181,9 @@ void add_structure_command(CLI::App& app, std::function<int()>& action) {
   sub->add_option("--picture", options->picture, "the same as a picture (SVG)");
   sub->add_option("--page", options->page,
                   "the same in three dimensions, for a browser and the gateway (HTML)");
+  sub->add_option("--run", options->run,
+                  "RUN.csv with the blocks' temperatures (thermocomp export): its course is on "
+                  "the page too");
   sub->add_option(
       "--plant", options->plant,
       "the machine's body for thermocomp-sim: a reduced model of heat and displacement");

@@ -153,15 +153,34 @@ void add_thermocouples(const PlantConfig& config, ThermalPlant& plant) {
   }
 }
 
+/// Sources and sensors alike, and rates, which are sorted, as a file's digits have them.
+bool same_structure(const ReducedBody& a, const ReducedBody& b) {
+  constexpr double digits = 1e-4;
+  const auto same_names = [](const auto& rows, const auto& others) {
+    return std::equal(rows.begin(), rows.end(), others.begin(), others.end(),
+                      [](const auto& row, const auto& other) { return row.name == other.name; });
+  };
+  if (a.states() != b.states() || !same_names(a.sources, b.sources) ||
+      !same_names(a.sensors, b.sensors))
+    return false;
+  const Vector rates = square_of(a.conductance, a.states()).diagonal();
+  return rates.isApprox(square_of(b.conductance, b.states()).diagonal(), digits);
+}
+
 }  // namespace
 
-ThermalPlant load_thermal_plant(const std::filesystem::path& path) {
-  const MachineConfig machine = load_machine(path);
+ThermalPlant load_thermal_plant(const std::filesystem::path& path, const ReducedBody* body) {
+  MachineConfig machine = load_machine(path);
   const auto refuse = [&](const char* key, const char* rule) {
     throw ConfigurationError({{path.string(), 0, key, "(missing)", rule}});
   };
   if (!machine.plant) refuse("plant", "the thermal network of a machine stands in its [plant]");
-  const PlantConfig& config = *machine.plant;
+  PlantConfig& config = *machine.plant;
+  if (body != nullptr) {
+    if (!config.body || !same_structure(*config.body, *body))
+      refuse("body", "must be what `thermocomp structure --plant` makes of the --structure given");
+    config.body = *body;
+  }
   ThermalPlant plant;
   plant.coolant_degC = config.coolant.temp_degC;
   plant.coolant_room_share = config.coolant.room_share;

@@ -13,6 +13,10 @@
 
 #include <Eigen/Core>
 
+namespace thermocomp {
+struct ReducedBody;
+}
+
 namespace thermocomp::diagnosis {
 
 struct NetworkSource {
@@ -72,8 +76,10 @@ struct ThermalPlant {
 };
 
 /// @param path  a machine file of the simulator: its [plant] with lumps or a body, thermocouples
+/// @param body  taken in place of the file's body, whose structure it must be
 /// @throws ConfigurationError: what the simulator refuses; no thermocouple in the room or on the
 ///         machine; a part that no heat can leave
-[[nodiscard]] ThermalPlant load_thermal_plant(const std::filesystem::path& path);
+[[nodiscard]] ThermalPlant load_thermal_plant(const std::filesystem::path& path,
+                                              const ReducedBody* body = nullptr);
 
 }  // namespace thermocomp::diagnosis

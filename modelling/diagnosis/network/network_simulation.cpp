@@ -226,9 +226,7 @@ ThermalRuns thermal_runs(const ThermalPlant& plant, const std::vector<RunFile>& 
   return all;
 }
 
-std::vector<Column> NetworkSimulation::readings_degC(const ThermalRuns& runs,
-                                                     std::size_t index) const {
-  const ThermalRun& run = runs.runs[index];
+Matrix NetworkSimulation::modal_states(const ThermalRuns& runs, const ThermalRun& run) const {
   const Matrix drive = drives(network_, runs, run);
   const Matrix between = 0.5 * (drive.leftCols(run.rows() - 1) + drive.rightCols(run.rows() - 1));
   const Modes* const modes[2] = {dry_.get(), flooded_.get()};
@@ -236,7 +234,7 @@ std::vector<Column> NetworkSimulation::readings_degC(const ThermalRuns& runs,
   for (const bool flows : {false, true})
     into[flows].noalias() = Matrix(modes[flows]->into_modes * inflows(network_, flows)) * between;
   bool flows = run.coolant_flows[0] > 0.0;
-  Matrix states(network_.capacity.rows(), run.rows());  // in the modes of its own row
+  Matrix states(network_.capacity.rows(), run.rows());
   Vector state = modes[flows]->to_modes * start_state(network_, run);
   Eigen::ArrayXd keep;
   Eigen::ArrayXd gain;
@@ -256,16 +254,35 @@ std::vector<Column> NetworkSimulation::readings_degC(const ThermalRuns& runs,
     state = keep * state.array() + gain * into[flows].col(row).array();
   }
   states.rightCols(1) = state;
+  return states;
+}
+
+/// A row's own; the last row's state is in the modes of the step that led to it.
+const NetworkSimulation::Modes& NetworkSimulation::modes_of(const ThermalRun& run,
+                                                            Eigen::Index row) const {
+  const Eigen::Index of = std::min(row, std::max<Eigen::Index>(0, run.rows() - 2));
+  return run.coolant_flows[of] > 0.0 ? *flooded_ : *dry_;
+}
+
+Matrix NetworkSimulation::states(const ThermalRuns& runs, std::size_t index) const {
+  const ThermalRun& run = runs.runs[index];
+  Matrix states = modal_states(runs, run);
+  for (Eigen::Index row = 0; row < run.rows(); ++row)
+    states.col(row) = modes_of(run, row).from_modes * states.col(row).eval();
+  return states;
+}
+
+std::vector<Column> NetworkSimulation::readings_degC(const ThermalRuns& runs,
+                                                     std::size_t index) const {
+  const ThermalRun& run = runs.runs[index];
+  const Matrix states = modal_states(runs, run);
   std::vector<Column> readings;
   for (const NetworkSensor& sensor : network_.sensors) {
-    const Eigen::RowVectorXd rows[2] = {sensor.row * modes[0]->from_modes,
-                                        sensor.row * modes[1]->from_modes};
+    const Eigen::RowVectorXd dry = sensor.row * dry_->from_modes;
+    const Eigen::RowVectorXd flooded = sensor.row * flooded_->from_modes;
     Column values(run.rows());
-    for (Eigen::Index row = 0; row < run.rows(); ++row) {
-      // The last row's state is in the modes of the step that led to it.
-      const Eigen::Index of = std::min(row, std::max<Eigen::Index>(0, run.rows() - 2));
-      values[row] = rows[run.coolant_flows[of] > 0.0] * states.col(row);
-    }
+    for (Eigen::Index row = 0; row < run.rows(); ++row)
+      values[row] = (&modes_of(run, row) == flooded_.get() ? flooded : dry).dot(states.col(row));
     lag(run.time_s, sensor.lag_s, values);
     readings.push_back(std::move(values));
   }

@@ -51,10 +51,17 @@ class NetworkSimulation {
   ///
   ///   x_0 = argmin x'Kx / 2 - q'x  with  row_s . x = reading_s of every sensor
   [[nodiscard]] std::vector<Column> readings_degC(const ThermalRuns& runs, std::size_t run) const;
+  /// x of every row, shape (states)(rows).
+  [[nodiscard]] Eigen::MatrixXd states(const ThermalRuns& runs, std::size_t run) const;
   [[nodiscard]] const HeatNetwork& network() const noexcept { return network_; }
 
  private:
   struct Modes;
+
+  /// The states, each row in its modes_of().
+  [[nodiscard]] Eigen::MatrixXd modal_states(const ThermalRuns& runs, const ThermalRun& run) const;
+  [[nodiscard]] const Modes& modes_of(const ThermalRun& run, Eigen::Index row) const;
+
   HeatNetwork network_;
   std::shared_ptr<const Modes> dry_;
   std::shared_ptr<const Modes> flooded_;

@@ -92,7 +92,7 @@ Diagnosis diagnose_thermal(const ThermalPlant& plant, const std::vector<RunFile>
                            const std::vector<std::string>& train_names,
                            const std::vector<RunFile>& test,
                            const std::vector<std::string>& test_names, ReportData* report,
-                           const std::function<void()>& progress) {
+                           const std::function<void()>& progress, const NetworkView& view) {
   std::vector<RunFile> all = train;
   all.insert(all.end(), test.begin(), test.end());
   const std::vector<std::string> signals = shared_signals(all);
@@ -140,6 +140,7 @@ Diagnosis diagnose_thermal(const ThermalPlant& plant, const std::vector<RunFile>
     add_runs(*report, diagnosis, data_of(plant, test_runs), base, residuals_of(network, test_runs),
              true);
   }
+  if (view) view(test_runs, plant.network, network);
   return diagnosis;
 }
 

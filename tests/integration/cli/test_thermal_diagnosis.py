@@ -1,7 +1,10 @@
 """From a machine to what is wrong with its heat flow: structure --plant-parts, simulate,
 diagnose --thermal, and the machine file that it corrects."""
+import csv
 import json
+import math
 import pathlib
+import re
 import tomllib
 
 import pytest
@@ -234,6 +237,47 @@ def test_the_corrected_machine_file_gives_what_was_measured(tmp_path, changed, k
         assert after["baseline"][sensor]["test_rms_K"] == pytest.approx(said["test_rms_K"], rel=1e-6)
     worst = max(before["baseline"], key=lambda name: before["baseline"][name]["test_rms_K"])
     assert after["baseline"][worst]["test_rms_K"] < 0.3 * before["baseline"][worst]["test_rms_K"]
+
+
+def rises_at(page, at_mm):
+    """What the page of a body shows at the node nearest to a place: {group: {time_s: rise_K}}."""
+    body = json.loads(re.search(r'<script id="body" type="application/json">(.*?)</script>',
+                                page.read_text(), re.DOTALL)[1])
+    node = min(range(len(body["nodes_mm"]) // 3),
+               key=lambda i: math.dist(body["nodes_mm"][3 * i:3 * i + 3], at_mm))
+    groups = {}
+    for state in body["states"]:
+        name = state["group"].split(", ")[1]
+        groups.setdefault(name, {})[state["time_s"]] = state["rise_K"][node]
+    return groups
+
+
+@pytest.mark.skipif(not pathlib.Path("/usr/share/javascript/three").exists(),
+                    reason="libjs-three is not installed")
+def test_the_body_is_as_warm_as_its_sensors_once_the_cause_is_found(model, tmp_path):
+    runs = measured(machine(tmp_path / "truth", size=100, column_film=20.0))
+    diagnosis(model, runs, "--structure", model / "structure.toml", "--out", tmp_path)
+    rise_K = rises_at(tmp_path / "body.html", [0, 150, 200])
+    assert list(rise_K) == ["as in the file", "as found", "what the findings change"]
+    with open(runs[1]) as file:
+        rows = list(csv.DictReader(line for line in file if line[0] != "#"))
+    read_K = {float(row["time_s"]): float(row["column_low_degC"]) - float(rows[0]["column_low_degC"])
+              for row in rows}
+    left_K = {name: math.sqrt(sum((of[at] - read_K[at]) ** 2 for at in of) / len(of))
+              for name, of in rise_K.items()}
+    assert len(rise_K["as found"]) == 24
+    assert left_K["as found"] < 0.6 * left_K["as in the file"], left_K
+    assert left_K["as found"] < 0.06, left_K
+
+
+def test_a_structure_that_is_not_the_body_s_is_refused(model, tmp_path):
+    runs = measured(machine(tmp_path / "other", size=100))
+    answer = run("diagnose", "--thermal", model / "machine.toml", "--structure",
+                 tmp_path / "other" / "structure.toml", "--train", runs[0], "--test", runs[1],
+                 "--out", tmp_path / "out")
+    assert answer.returncode == 2
+    assert "machine.toml: body" in answer.stderr and "--structure given" in answer.stderr
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_machine_file_is_not_written_over(tmp_path):

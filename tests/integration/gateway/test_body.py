@@ -62,11 +62,17 @@ tool = { part = "spindle", at_mm = [100, 100, 800] }
 """
 
 
+# Two hours: the column warms by 4 K, the spindle by 10 K; a reading is missing.
+COURSE = "time_s,column_degC,spindle_degC\n" + "".join(
+    f"{60 * row},{20 + 4 * row / 120},{'' if row == 60 else 20 + 10 * row / 120}\n" for row in range(121))
+
+
 @pytest.fixture
 def page(tmp_path):
     (tmp_path / "small.toml").write_text(STRUCTURE)
-    made = subprocess.run([MODELLING, "structure", "small.toml", "-o", "model.toml", "--page", "body.html"],
-                          cwd=tmp_path, capture_output=True, text=True)
+    (tmp_path / "monday.csv").write_text(COURSE)
+    made = subprocess.run([MODELLING, "structure", "small.toml", "-o", "model.toml", "--page", "body.html",
+                           "--run", "monday.csv"], cwd=tmp_path, capture_output=True, text=True)
     assert made.returncode == 0, made.stderr
     return tmp_path / "body.html"
 
@@ -115,6 +121,12 @@ def test_the_page_needs_nothing_else(page, browser):
     assert 6.0 < float(text(browser, "high").split()[0]) < 7.2, text(browser, "high")
     assert colours_drawn(browser) > 20
     assert "z_um at 100, 100, 800 mm" in text(browser, "points")
+    choose(browser, "group", "monday")
+    assert text(browser, "when") == "monday after 2.00 h"
+    # 600 mm by 4 K and 200 mm by 10 K are 48 um.
+    assert 44.0 < float(text(browser, "high").split()[0]) < 51.0, text(browser, "high")
+    choose(browser, "quantity", "rise")
+    assert text(browser, "high") == "10.0 K"
 
 
 def test_behind_the_gateway_it_shows_the_machine_as_it_is_now(page, lab, machine, browser):

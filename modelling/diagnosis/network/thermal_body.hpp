@@ -1,0 +1,39 @@
+/// The body of a machine in three dimensions, as the thermal diagnosis has it. Needs the finite
+/// elements (CHOLMOD and Gmsh): where the build has none, so has `diagnose` no `--structure`.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "modelling/diagnosis/network/network_simulation.hpp"
+#include "modelling/structure/structure_model.hpp"
+#include "simulator/plant/reduced_body.hpp"
+
+namespace thermocomp::diagnosis {
+
+/// The states of a reduced body are amplitudes of temperature fields, which only the structure has:
+/// it is reduced anew, and its fields and stiffness make a picture of every state.
+class ThermalBody {
+ public:
+  /// @throws ConfigurationError  what `thermocomp structure` refuses
+  ThermalBody(const std::filesystem::path& structure, const structure::Progress& progress);
+  ~ThermalBody();
+  ThermalBody(const ThermalBody&) = delete;
+  ThermalBody& operator=(const ThermalBody&) = delete;
+
+  /// With its parts.
+  [[nodiscard]] const ReducedBody& body() const;
+  /// Adds moments of each run: the rise since the run's start as the machine file has it, and where
+  /// something was found the rise with it and what it changes.
+  /// @param before, after  of this body
+  void show(const ThermalRuns& runs, const HeatNetwork& before, const HeatNetwork& after);
+  /// A page for a browser.
+  [[nodiscard]] std::string page(const std::string& title, const std::string& note);
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace thermocomp::diagnosis
