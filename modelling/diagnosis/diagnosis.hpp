@@ -21,8 +21,7 @@ struct ReportData;
 struct ThermalRuns;
 
 /// Receives the test runs, the network as the file has it and the network with what was found.
-using NetworkView =
-    std::function<void(const ThermalRuns&, const HeatNetwork&, const HeatNetwork&)>;
+using NetworkView = std::function<void(const ThermalRuns&, const HeatNetwork&, const HeatNetwork&)>;
 
 /// @param train, test  taken: their memory is free for the search
 /// @param train_names, test_names  the runs' arguments as given
@@ -42,14 +41,11 @@ using NetworkView =
 ///         corrected values stand in the findings' parameters
 /// @param view  if given, called at the end
 /// @throws ConfigurationError when a run lacks the room, a signal of the network or every sensor
-[[nodiscard]] Diagnosis diagnose_thermal(const ThermalPlant& plant,
-                                         const std::vector<RunFile>& train,
-                                         const std::vector<std::string>& train_names,
-                                         const std::vector<RunFile>& test,
-                                         const std::vector<std::string>& test_names,
-                                         ReportData* report = nullptr,
-                                         const std::function<void()>& progress = nullptr,
-                                         const NetworkView& view = nullptr);
+[[nodiscard]] Diagnosis diagnose_thermal(
+    const ThermalPlant& plant, const std::vector<RunFile>& train,
+    const std::vector<std::string>& train_names, const std::vector<RunFile>& test,
+    const std::vector<std::string>& test_names, ReportData* report = nullptr,
+    const std::function<void()>& progress = nullptr, const NetworkView& view = nullptr);
 
 /// Films, conductances, capacities and heats are multiplied by their factor, missing sources and
 /// lags of thermocouples are added; what no key carries stands in comments at the top. Comments of
