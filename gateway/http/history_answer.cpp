@@ -111,14 +111,14 @@ JsonAnswer history_answer(const DaemonFeed& feed, const HistoryRequest& request)
   if (file.empty()) return error_answer(503, "it is not known where the history is");
   try {
     const ThinnedHistory history = thin_history(file, request.from_s, request.to_s, request.points);
-    const double span_s = (request.to_s - request.from_s) / static_cast<double>(request.points);
+    const double span_s = (request.to_s - history.from_s) / static_cast<double>(request.points);
     json damage = json::array();
     for (const HistoryDamage& part : history.damage) damage.push_back(to_string(part));
     std::string text = R"({"columns":{)";
     text += "\"time_s\":" + dumped(history.time_s);
     for (const ThinnedColumn& column : history.columns)
       append_column(text, column.name, column.values);
-    json rest = {{"from_s", request.from_s},
+    json rest = {{"from_s", history.from_s},
                  {"to_s", request.to_s},
                  {"span_s", span_s},
                  {"probings", probings_json(history.probings)},

@@ -323,7 +323,7 @@ async function loadHistory() {
     modes = history.modes;
     marks = history.events;
     spacing_s = history.span_s;
-    setText(place('history-note'), recordedSince(history.from_s));
+    setText(place('history-note'), recordedSince(history.to_s - range.seconds));
     drawAll();
   } catch (error) {
     setText(place('history-note'), 'no history: ' + error.message);

@@ -39,6 +39,15 @@ class Means {
   std::vector<std::uint32_t> count_;
 };
 
+/// The later of `from_s` and the beginning of the history, where that is before `to_s`.
+double stretch_from(const HistoryReader& reader, double from_s, double to_s) {
+  constexpr double wander_s = 1.0;  // of the clocks between a segment's start and its first commit
+  double begins_s = to_s;
+  for (const SegmentInfo& segment : reader.segments())
+    begins_s = std::min(begins_s, 1e-9 * static_cast<double>(segment.wall_ns) - wander_s);
+  return begins_s < to_s ? std::max(from_s, begins_s) : from_s;
+}
+
 /// Which chunks of a segment lie in the stretch: [first, end) of their numbers.
 struct ChunkRange {
   const SegmentInfo* segment{nullptr};
@@ -60,10 +69,11 @@ class Thinning {
         file_(file),
         database_(file, DatabaseMode::read_only),
         setups_(reader_, parser),
-        from_s_(from_s),
-        span_s_((to_s - from_s) / static_cast<double>(points)),
+        from_s_(stretch_from(reader_, from_s, to_s)),
+        span_s_((to_s - from_s_) / static_cast<double>(points)),
         points_(points) {
     result_.damage = reader_.damage();
+    result_.from_s = from_s_;
   }
 
   ThinnedHistory run(std::uint64_t chunks_max) {

@@ -28,6 +28,7 @@ struct Probing {
 };
 
 struct ThinnedHistory {
+  double from_s{0.0};          ///< as asked, or when the history begins
   std::vector<double> time_s;  ///< middle of each point's span, wall clock since 1970
   std::vector<ThinnedColumn> columns;
   std::vector<Probing> probings;      ///< of the stretch, and of each axis the last one before it
@@ -42,10 +43,11 @@ struct ThinningLimits {
   std::uint64_t chunks_max{4000};  ///< read at most, spread evenly; one is a commit of the daemon
 };
 
-/// Divides [from_s, to_s) into `points` equal spans; a value is the mean of what was recorded in
-/// its span (readings without a fault, offsets as sent). Where the stretch has more chunks than
-/// `chunks_max`, as many of them are read, evenly spread: the time this takes does not grow with
-/// the stretch, and temperatures change little within what is passed over.
+/// Divides [from_s, to_s), from the history's beginning on, into `points` equal spans; a value is
+/// the mean of what was recorded in its span (readings without a fault, offsets as sent). Where the
+/// stretch has more chunks than `chunks_max`, as many of them are read, evenly spread: the time
+/// this takes does not grow with the stretch, and temperatures change little within what is passed
+/// over.
 /// @param from_s, to_s  wall clock, seconds since 1970
 /// @pre to_s > from_s, 1 <= points <= points_max (checked: std::invalid_argument)
 /// @throws HistoryError when nothing can be taken from the file

@@ -74,7 +74,7 @@ TEST_CASE("one point is the mean of all that was recorded", "[gateway][history]"
   CHECK(history.chunks == history.chunks_read);
   CHECK(history.chunks >= 3);
   REQUIRE(history.time_s.size() == 1);
-  CHECK(history.time_s[0] == Approx(recorded.begin_s));
+  CHECK(history.time_s[0] == Approx(recorded.begin_s + 49.5).epsilon(0).margin(1e-3));
   std::ostringstream csv;
   export_run(recorded.config.file, {}, {}, csv, {}, parse_test_setup);
   CHECK(column_of(history, "z_offset_um").values[0] ==
@@ -84,16 +84,22 @@ TEST_CASE("one point is the mean of all that was recorded", "[gateway][history]"
   CHECK(bed_degC < 20.3);
 }
 
-TEST_CASE("many points have gaps where nothing was recorded, and no others", "[gateway][history]") {
+TEST_CASE("the points begin with the history and end where it was asked to", "[gateway][history]") {
   const TempFolder folder;
   const Recorded recorded(folder);
   const ThinnedHistory history = thin_history(recorded.config.file, recorded.begin_s - 100.0,
                                               recorded.begin_s + 100.0, 200, {}, parse_test_setup);
   const auto& values = column_of(history, "z_offset_um").values;
   REQUIRE(values.size() == 200);
-  CHECK(std::isnan(values.front()));
+  CHECK(history.from_s == Approx(recorded.begin_s - 1.0).epsilon(0).margin(1e-3));
+  CHECK(history.time_s.back() ==
+        Approx(recorded.begin_s + 100.0 - 0.5 * 101.0 / 200.0).epsilon(0).margin(1e-3));
+  CHECK(std::any_of(values.begin(), values.begin() + 4, [](double v) { return std::isfinite(v); }));
   CHECK(std::isnan(values.back()));
-  CHECK(std::any_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); }));
+  const double later_s = recorded.begin_s + 0.5;
+  CHECK(
+      thin_history(recorded.config.file, later_s, later_s + 1.0, 2, {}, parse_test_setup).from_s ==
+      later_s);
 }
 
 TEST_CASE("a long stretch is read in samples, evenly", "[gateway][history]") {
