@@ -138,12 +138,11 @@ std::string horizontal_axis(const Box& box, const Range& range, const std::strin
   return svg + label(box.x + box.width, box.y + box.height + 28, unit, "text-anchor=\"end\"");
 }
 
-std::string named_axis(const Box& box, const Range& hours, const std::vector<TimeTick>& ticks) {
+std::string named_axis(const Box& box, const Range& x, const std::vector<TimeTick>& ticks) {
   std::string svg = straight(box.x, box.y + box.height, way('h', box.width), "axis");
   for (std::size_t i = 0; i < ticks.size(); ++i) {
-    const double at = box.across(hours, ticks[i].at_s / 3600.0);
-    const double next =
-        i + 1 < ticks.size() ? box.across(hours, ticks[i + 1].at_s / 3600.0) : box.x + box.width;
+    const double at = box.across(x, ticks[i].at_s);
+    const double next = i + 1 < ticks.size() ? box.across(x, ticks[i + 1].at_s) : box.x + box.width;
     svg += straight(at, box.y + box.height, "v16", "axis");
     if (at + text_width(ticks[i].label) + 8 < next)
       svg += label(at + 4, box.y + box.height + 14, ticks[i].label);
@@ -206,9 +205,9 @@ std::string curve(const Box& box, const Range& x, const Range& y, Values time, c
   return svg + "\"/>";
 }
 
-std::string span_svg(const PlotSpan& span, const Box& box, const Range& hours, bool named) {
-  const double from = box.across(hours, std::max(hours.low, span.from_s / 3600.0));
-  const double to = box.across(hours, std::min(hours.high, span.to_s / 3600.0));
+std::string span_svg(const PlotSpan& span, const Box& box, const Range& x, bool named) {
+  const double from = box.across(x, std::max(x.low, span.from_s));
+  const double to = box.across(x, std::min(x.high, span.to_s));
   if (!(to > from)) return "";
   std::string svg = "<path class=\"span\" d=\"M";
   svg.append(place(from, box.y)).append(way('h', to - from)).append(way('v', box.height));
@@ -239,20 +238,22 @@ std::string panel_svg(const PlotPanel& panel, const Box& box, Values time, const
   const std::string title = panel.title + (panel.unit.empty() ? "" : ", " + panel.unit);
   std::string svg = label(4, box.y - title_up, title, "class=\"title\"");
   svg += vertical_axis(box, y, panel.height > 100 ? 5 : 3);
-  double legend = width - right;
-  for (std::size_t i = panel.lines.size(); i > 0; --i) {
-    const PlotLine& line = panel.lines[i - 1];
+  std::string legend;
+  for (const PlotLine& line : panel.lines) {
     if (line.label.empty()) continue;
-    svg += label(legend, box.y - title_up, line.label,
-                 "text-anchor=\"end\" fill=\"" + line.colour + "\"");
-    legend -= 14.0 + text_width(line.label);
+    legend.append(legend.empty() ? "" : "&#160;&#160; ");
+    legend.append("<tspan fill=\"").append(line.colour).append("\">");
+    legend.append(xml_text(line.label)).append("</tspan>");
   }
+  svg += "<text x=\"" + coordinate(width - right) + "\" y=\"" + coordinate(box.y - title_up) +
+         "\" text-anchor=\"end\">" + legend + "</text>";
   const auto points =
       std::min(points_max, panel_points_max / std::max<std::size_t>(1, panel.lines.size()));
   for (const PlotLine& line : panel.lines) svg += curve(box, x, y, time, line, points);
   return svg;
 }
 
+/// @param spans, ticks  in the unit of `along`
 Drawing panels_drawing(Values along, const std::string& along_title,
                        const std::vector<PlotPanel>& panels, const std::vector<PlotSpan>& spans,
                        const std::vector<TimeTick>& ticks) {
@@ -265,7 +266,7 @@ Drawing panels_drawing(Values along, const std::string& along_title,
     std::string& svg = drawing.body;
     for (const PlotSpan& span : spans) svg += span_svg(span, box, x, &panel == &panels.front());
     for (const TimeTick& tick : ticks)
-      svg += straight(box.across(x, tick.at_s / 3600.0), box.y, way('v', box.height), "grid");
+      svg += straight(box.across(x, tick.at_s), box.y, way('v', box.height), "grid");
     svg += panel_svg(panel, box, along, x);
     if (&panel == &panels.back())
       svg += ticks.empty() ? horizontal_axis(box, x, along_title, 10) : named_axis(box, x, ticks);
@@ -316,10 +317,19 @@ std::vector<double> round_ticks(double low, double high, int wanted) {
 }
 
 std::string panels_plot(Values time_s, const std::vector<PlotPanel>& panels,
-                        const std::vector<PlotSpan>& spans, const std::vector<TimeTick>& ticks) {
-  std::vector<double> hours(time_s.begin(), time_s.end());
-  for (double& hour : hours) hour /= 3600.0;
-  return panels_drawing(hours, "time, h", panels, spans, ticks).svg();
+                        std::vector<PlotSpan> spans, std::vector<TimeTick> ticks) {
+  const double length_s = time_s.empty() ? 0.0 : time_s.back() - time_s.front();
+  const auto [unit, unit_s] = length_s > 5400.0  ? std::pair{"time, h", 3600.0}
+                              : length_s > 120.0 ? std::pair{"time, min", 60.0}
+                                                 : std::pair{"time, s", 1.0};
+  std::vector<double> time(time_s.begin(), time_s.end());
+  for (double& at : time) at /= unit_s;
+  for (PlotSpan& span : spans) {
+    span.from_s /= unit_s;
+    span.to_s /= unit_s;
+  }
+  for (TimeTick& tick : ticks) tick.at_s /= unit_s;
+  return panels_drawing(time, unit, panels, spans, ticks).svg();
 }
 
 Drawing curves_drawing(Values x, const std::string& x_title, const std::vector<PlotPanel>& panels) {

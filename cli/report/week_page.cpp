@@ -295,13 +295,13 @@ std::string picture(const MachineWeek& week) {
           {"", spell.span.from_s - week.span.from_s, spell.span.to_s - week.span.from_s});
   constexpr double days_told_s = 36.0 * 3600.0;
   const bool by_days = week.span.length_s() > days_told_s;
+  const double mean_s = week.span.length_s() / static_cast<double>(week.course.time_s.size());
   return html_figure(
       panels_plot(since_s, all.panels, spans,
                   by_days ? days_of(week.span) : std::vector<TimeTick>{}),
-      (by_days ? "A day begins at its line" : "Hours from " + local_text(week.span.from_s)) +
+      (by_days ? "A day begins at its line" : "From " + local_text(week.span.from_s)) +
           "; shaded: compensating. Means of " +
-          duration_text(week.span.length_s() / static_cast<double>(week.course.time_s.size())) +
-          " each.");
+          (mean_s < 1.0 ? "less than a second" : duration_text(mean_s)) + " each.");
 }
 
 }  // namespace

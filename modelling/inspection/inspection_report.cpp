@@ -59,7 +59,8 @@ std::string neighbour_of(const Inspection& inspection, const Finding& finding, c
 std::string finding_html(const std::vector<RunFile>& runs, const Inspection& inspection,
                          const Finding& finding) {
   const RunFile& run = runs[finding.run];
-  std::string html = html_heading(std::to_string(std::lround(100 * finding.probability)) + " %") +
+  std::string html = html_heading((finding.column.empty() ? finding.kind : finding.column) + ", " +
+                                  std::to_string(std::lround(100 * finding.probability)) + " %") +
                      html_paragraph(finding.text + " (" + run.name + ")");
   if (!run.find(finding.column)) return html;
   const double first_s = run.time_s().front();
@@ -92,7 +93,8 @@ std::string inspection_html(const std::vector<RunFile>& runs, const Inspection& 
   std::string html = html_begin("Faults of the recordings");
   html += html_paragraph(inspection.findings.empty()
                              ? "No faults were found in these recordings."
-                             : "The likeliest fault stands first, with its probability.");
+                             : std::to_string(inspection.findings.size()) +
+                                   " found; the likeliest stands first, with its probability.");
   for (const Finding& finding : inspection.findings)
     html += finding_html(runs, inspection, finding);
   html += runs_table(inspection);

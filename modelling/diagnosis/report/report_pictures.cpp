@@ -68,7 +68,7 @@ std::string course_picture(const ReportRun& run, const ReportData& report,
     const Column& model = models.emplace_back(measured - run.before_um[output]);
     const Column& extended = models.emplace_back(measured - run.after_um[output]);
     panels.push_back({name,
-                      units[output],
+                      units[output] == "K" ? "°C" : units[output],  // errors alone are differences
                       {{"measured", measured_colour, all_of(measured)},
                        {"model", model_colour, all_of(model)},
                        {"extended model", extended_colour, all_of(extended)}},

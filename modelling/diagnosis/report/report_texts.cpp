@@ -153,15 +153,13 @@ std::string sentence_of(const NamedFinding& finding) {
   if (finding.run) text.append(" (in ").append(*finding.run).append(")");
   for (const Parameter& parameter : finding.parameters)
     text.append("; ").append(parameter_words(finding.cause, parameter, finding.subject));
-  for (const auto& [output, gain] : finding.test)
-    text.append(gain.reduction > 0 ? "; knowing it takes the error of "
-                                   : "; on the test runs it makes the error larger: that of ")
-        .append(name_of_column(output))
-        .append(gain.reduction > 0 ? "" : " goes")
-        .append(" from ")
-        .append(figure(gain.before_um))
-        .append(" to ")
-        .append(figure(gain.after_um));
+  const char* before = ". Error on the test runs without and with it: ";
+  for (const auto& [output, gain] : finding.test) {
+    text.append(before).append(name_of_column(output)).append(" ").append(figure(gain.before_um));
+    text.append(" and ").append(figure(gain.after_um));
+    if (!(gain.reduction > 0)) text += " (larger)";
+    before = "; ";
+  }
   return text + ".";
 }
 
