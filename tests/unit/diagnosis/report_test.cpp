@@ -83,7 +83,8 @@ TEST_CASE("a finding that the test runs do not bear out is not recommended", "[d
   REQUIRE_FALSE(fails_on_test_runs(finding));
   finding.test["z_um"] = {2.4, 3.0, -0.25, {-0.4, -0.1}};
   CHECK(fails_on_test_runs(finding));
-  CHECK(sentence_of(finding).find("makes the error larger: that of z goes from 2.4 to 3.0") !=
+  CHECK(sentence_of(finding).find(
+            "Error on the test runs without and with it: z 2.4 and 3.0 (larger)") !=
         std::string::npos);
   CHECK(what_to_do(finding).starts_with("Do not use it yet"));
   CHECK(what_to_do(finding).ends_with(usual));
@@ -118,7 +119,7 @@ TEST_CASE("each finding is a sentence with its figures, what to do and what woul
   }
   CHECK(has(html, "time constant 30 min (28 min to 33 min)"));
   CHECK(has(html, "Heat that no sensor sees"));
-  CHECK(has(html, "from 6.7 to 2.4"));
+  CHECK(has(html, "6.7 and 2.4"));
   CHECK(has(html, xml_text(experiment_between(
                       {diagnosis.findings[0].cause, diagnosis.findings[0].subject, 1.0},
                       diagnosis.findings[0].alternatives[0]))));
