@@ -39,12 +39,12 @@ std::string html_begin(const std::string& title) {
       "<!DOCTYPE html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
       "content=\"width=device-width,initial-scale=1\"><title>";
   html.append(xml_text(title)).append("</title><style>").append(style).append(svg_style);
-  html.append("</style></head><body>\n<h1>").append(xml_text(title));
+  html.append("</style></head><body><main>\n<h1>").append(xml_text(title));
   return html.append("</h1>\n");
 }
 
 std::string html_end() {
-  return "</body></html>\n";
+  return "</main></body></html>\n";
 }
 
 std::string html_paragraph(const std::string& text, const std::string& kind) {
@@ -65,13 +65,13 @@ std::string html_list(const std::vector<std::string>& items) {
 
 std::string html_table(const std::vector<std::vector<std::string>>& rows) {
   if (rows.size() < 2) return "";
-  std::string html = "<div class=\"wide\"><table>\n" + row(rows.front(), "th");
+  std::string html = "<div class=\"wide\" tabindex=\"0\"><table>\n" + row(rows.front(), "th");
   for (std::size_t i = 1; i < rows.size(); ++i) html += row(rows[i], "td");
   return html + "</table></div>\n";
 }
 
 std::string html_figure(const std::string& svg, const std::string& caption) {
-  std::string html = "<figure>" + svg;
+  std::string html = "<figure tabindex=\"0\">" + svg;
   if (!caption.empty()) html += "<figcaption>" + xml_text(caption) + "</figcaption>";
   return html + "</figure>\n";
 }

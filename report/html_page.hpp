@@ -6,7 +6,7 @@
 
 namespace thermocomp {
 
-/// From the doctype to the opening of the body, with the title as its heading.
+/// From the doctype to the opening of the main part, with the title as its heading.
 [[nodiscard]] std::string html_begin(const std::string& title);
 [[nodiscard]] std::string html_end();
 
@@ -16,7 +16,8 @@ namespace thermocomp {
 [[nodiscard]] std::string html_list(const std::vector<std::string>& items);
 /// The first row is the head; empty without a second one.
 [[nodiscard]] std::string html_table(const std::vector<std::vector<std::string>>& rows);
-/// A picture that can be moved sideways where the screen is narrower than it can be read.
+/// A picture that can be moved sideways, by key too, where the screen is narrower than it can be
+/// read.
 /// @param svg  markup, taken as it is
 [[nodiscard]] std::string html_figure(const std::string& svg, const std::string& caption);
 

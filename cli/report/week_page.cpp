@@ -56,7 +56,7 @@ std::string summary(const MachineWeek& week) {
 }
 
 std::string time_table(const MachineWeek& week) {
-  std::vector<std::vector<std::string>> rows{{"", "time", "share of the whole"}};
+  std::vector<std::vector<std::string>> rows{{"mode", "time", "share of the whole"}};
   const auto add = [&](const std::string& what, double seconds) {
     constexpr double told_s_min = 30.0;
     if (seconds < told_s_min) return;

@@ -315,7 +315,9 @@ std::string zoomed(const std::string& picture, const std::string& group) {
     html.append("><label for=\"").append(id);
     html.append("\">").append(times).append(" x</label>");
   }
-  return html.append("<div class=\"wide\">").append(picture).append("</div></div>\n");
+  return html.append("<div class=\"wide\" tabindex=\"0\">")
+      .append(picture)
+      .append("</div></div>\n");
 }
 
 std::string role_text(const ReportRun& run) {

@@ -287,7 +287,8 @@ def test_everything_can_be_read_and_touched(machine, gateway, browser, scheme):
     assert accessibility_problems(browser) == []
     browser.execute_script("document.body.append(document.createElement('button'), Object.assign("
                            "document.createElement('p'), {textContent: 'faint', style: 'color: #999; background: #aaa'}))")
-    assert [each.split(":")[-1] for each in accessibility_problems(browser)] == [" faint", "a button without a name"]
+    assert {each.split(":")[0] for each in accessibility_problems(browser)} == {
+        "color-contrast", "button-name", "region"}  # outside of main
 
 
 def test_a_broker_that_is_gone_is_told_and_found_again(lab, machine, browser):
