@@ -109,6 +109,7 @@ bool is_outage(const Event& event) {
 }
 
 bool is_same(const Event& a, const Event& b) {
+  if (&a == &b) return true;
   if (a.subject != b.subject || a.code != b.code) return false;
   return is_outage(a) ? is_outage(b) : a.kind == EventKind::mode && b.kind == a.kind;
 }

@@ -74,6 +74,15 @@ def test_started_it_answers_with_what_the_daemon_says(machine):
     eventually(lambda: metric("thermocomp_up") == 1.0, "the daemon is back")
 
 
+def test_it_may_read_the_report_that_the_timer_makes():
+    SETTINGS.write_text(GATEWAY + 'report = "/var/lib/thermocomp/reports/week.html"\n')
+    run("systemctl", "restart", UNIT)
+    eventually(lambda: metric("thermocomp_up") == 1.0, "it answers")
+    run("systemctl", "start", "thermocomp-report.service")
+    status, page = ask("/report")
+    assert status == 200 and "report on the thermal compensation" in page, page[:500]
+
+
 def test_it_is_nobody_in_its_sandbox():
     pid = int(show("MainPID"))
     assert pathlib.Path(f"/proc/{pid}").stat().st_uid == pwd.getpwnam("thermocomp-gateway").pw_uid

@@ -210,16 +210,54 @@ TEST_CASE("a change holds what a receiver of the state before lacks", "[gateway]
   CHECK_FALSE(state_change(json(), after));
 }
 
-TEST_CASE("what happens again and again is one line, without what it explains", "[gateway][page]") {
-  const auto event = [](double wall_s, EventKind kind, Subject subject, const char* code) {
-    Event made;
-    made.wall_s = wall_s;
-    made.kind = kind;
-    made.subject = std::move(subject);
-    made.code = code;
-    if (kind == EventKind::recovery) made.duration_s = 2.0;
-    return made;
+namespace {
+
+Event event(double wall_s, EventKind kind, Subject subject, const char* code,
+            double duration_s = 2.0) {
+  Event made;
+  made.wall_s = wall_s;
+  made.kind = kind;
+  made.subject = std::move(subject);
+  made.code = code;
+  if (kind == EventKind::recovery || kind == EventKind::mode) made.duration_s = duration_s;
+  return made;
+}
+
+std::vector<std::string> texts_of(std::vector<Event> events) {
+  Snapshot snapshot;
+  snapshot.events = std::make_shared<const std::vector<Event>>(std::move(events));
+  std::vector<std::string> texts;
+  for (const json& each : page_events(snapshot, 10)) texts.push_back(each["text"]);
+  return texts;
+}
+
+}  // namespace
+
+TEST_CASE("what a fault or a command does to the mode is no line of its own", "[gateway][page]") {
+  const Subject module{SubjectKind::device, "bed_module"};
+  const auto mode = [](double wall_s, const char* before, const char* now, double lasted_s) {
+    return event(wall_s, EventKind::mode, {SubjectKind::nothing, before}, now, lasted_s);
   };
+  const Event fault = event(100.0, EventKind::fault, module, "not_connected");
+  const Event over = event(128.0, EventKind::recovery, module, "not_connected", 28.0);
+  CHECK(texts_of({fault, mode(102.0, "compensating", "holding", 100.0), over,
+                  mode(130.0, "holding", "compensating", 28.0)}) ==
+        std::vector<std::string>{event_text(over) + "; not compensated for 28 s"});
+
+  const Event disable = event(200.0, EventKind::command, {}, "disable");
+  const Event enable = event(260.0, EventKind::command, {}, "enable");
+  CHECK(texts_of({disable, mode(200.1, "compensating", "disabled", 70.0), enable,
+                  mode(260.1, "disabled", "compensating", 60.0)}) ==
+        std::vector<std::string>{event_text(enable) + "; not compensated for 1 min 0 s",
+                                 event_text(disable)});
+
+  // Long before or after the fault it is news of its own.
+  const Event later = mode(300.0, "compensating", "holding", 170.0);
+  CHECK(texts_of({fault, over, later}) ==
+        std::vector<std::string>{event_text(later), event_text(over)});
+}
+
+TEST_CASE("what happens again and again is one line, without what it explains", "[gateway][page]") {
   std::vector<Event> events;
   for (int i = 0; i < 3; ++i) {
     const Subject module{SubjectKind::device, "bed_module"};
