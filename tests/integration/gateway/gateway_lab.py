@@ -5,6 +5,7 @@ import http.client
 import json
 import shutil
 import socket
+import sqlite3
 import ssl
 import subprocess
 
@@ -187,3 +188,27 @@ class Subscriber:
         """The last message for which check(topic, retained, payload) holds."""
         return eventually(lambda: next((m for m in reversed(self.messages()) if check(*m)), None),
                           what)
+
+
+def stretch_history(history, days):
+    """The last segment becomes the days until now, as commits every five seconds: copies of one of its own."""
+    length_s, commit_s = days * 86400, 5
+    with contextlib.closing(sqlite3.connect(history)) as base:
+        base.execute("PRAGMA synchronous=OFF")
+        segment, period_ns, first = base.execute(
+            "SELECT id, period_ns, first_cycle FROM segment ORDER BY id DESC LIMIT 1").fetchone()
+        rows = base.execute("SELECT count, records, wall_minus_grid_ns FROM chunk "
+                            "WHERE segment = ? ORDER BY number", (segment,)).fetchall()
+        count, records, difference = rows[len(rows) // 2]
+        base.execute("DELETE FROM chunk WHERE segment = ?", (segment,))
+        cycles = commit_s * 10**9 // period_ns
+        chunks = length_s // commit_s
+        base.executemany(
+            "INSERT INTO chunk (segment, number, through_cycle, wall_minus_grid_ns, count, "
+            "records, checksum) VALUES (?, ?, ?, ?, ?, ?, NULL)",
+            ((segment, i, first + (i + 1) * cycles,
+              difference + ((i - len(rows) // 2) * commit_s - length_s) * 10**9, count, records)
+             for i in range(chunks)))
+        base.execute("UPDATE segment SET last_cycle = ?, wall_ns = wall_ns - ?, checksum = NULL WHERE id = ?",
+                     (first + chunks * cycles, length_s * 10**9, segment))
+        base.commit()

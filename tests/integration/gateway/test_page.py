@@ -9,7 +9,7 @@ import time
 import pytest
 
 from chromium import accessibility_problems, headless
-from gateway_lab import Broker, Gateway
+from gateway_lab import Broker, Gateway, stretch_history
 from lab import eventually, run_tool
 
 
@@ -222,6 +222,22 @@ def test_a_gap_stays_open(machine, gateway, browser):
         "table = [0, 10, 20, 30, 200, 210].map(s => [new Date(1000 * s), s === 10 ? null : 1]);"
         "table.splice(4, 0, [new Date(100000), null]); return withGaps(1).map(String)")
     assert values == ["1", "null", "1", "1", "NaN", "1", "1"]
+
+
+def test_a_week_of_history_is_a_curve_of_a_week(lab, machine, browser):
+    machine.warm_by(9.0)
+    machine.daemon.wait_for_offset(9.0)
+    machine.daemon.end()
+    stretch_history(machine.daemon.history, days=8)
+    machine.daemon.start()
+    gateway = lab.also_end(Gateway(lab, machine.daemon)).start()
+    show(browser, gateway, PHONE)
+    browser.execute_script("[...document.querySelectorAll('#ranges button')].find(e => e.textContent === 'week').click()")
+    days = "const [from, to] = wholeWindow(); return (to - from) / 86.4e6"
+    eventually(lambda: 6.9 < browser.execute_script(days) < 7.1, "a week")
+    assert browser.execute_script("return table.filter(row => isNumber(row[1])).length") > 100
+    assert text(browser, "history-note") == ""
+    picture(browser, "week_of_history")
 
 
 @pytest.mark.parametrize("size", [PHONE, WALL])
