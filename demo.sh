@@ -184,9 +184,8 @@ list_events
 draw
 echo
 echo "picture: $out/demo.png and $out/demo.svg"
-if [[ -x $bin/thermocomp-modelling ]]; then
-  draw_body
-else
+# With the modelling tools of this source, which the demo does not build.
+if [[ ! -x $bin/thermocomp-modelling ]] || ! (draw_body) 2>/dev/null; then
   echo "in three dimensions: ./demo.sh body (builds the modelling tools first)"
 fi
 echo "history: $out/history.db, truth: $out/truth.csv, logs: $out/*.log"
