@@ -29,7 +29,8 @@ struct Presence {
 constexpr Presence of_first{-2.69, 0.54, 0.49, 9.10};
 /// Beside what is named already, and more so beside coefficients fitted to the rows, what a model
 /// leaves anyway is taken for an effect more easily. Set so that of untouched machines as few are
-/// named as in the first round.
+/// named as in the first round. What a fit leaves is made of what it was fitted with, never a line,
+/// a jump or a shift of the datum.
 constexpr Presence of_later{-5.70, 0.54, 0.49, 9.10};
 constexpr Presence of_fitted{-7.70, 0.54, 0.49, 9.10};
 constexpr double left_out_min = -0.5;
@@ -92,7 +93,8 @@ bool adds_nothing(const Explanation& explanation, const std::vector<Explanation>
 
 }  // namespace
 
-Posterior weigh_against_each_other(std::vector<Explanation>& explanations, Round round) {
+Posterior weigh_against_each_other(std::vector<Explanation>& explanations, Round round,
+                                   bool beside_fit) {
   Posterior posterior;
   for (const char* family : {"structure", "heat", "datum", "sensor"})
     posterior.families[family] = 0.0;
@@ -102,9 +104,10 @@ Posterior weigh_against_each_other(std::vector<Explanation>& explanations, Round
       explanations.begin(), explanations.end(),
       [](const Explanation& a, const Explanation& b) { return utility(a) < utility(b); });
   const Figures of_best = figures_of(*best);
-  const Presence& presence = round == Round::first   ? of_first
-                             : round == Round::later ? of_later
-                                                     : of_fitted;
+  const bool as_fits_leave = beside_fit && family_of(best->hypothesis->cause) != "datum";
+  const Presence& presence = as_fits_leave           ? of_fitted
+                             : round == Round::first ? of_first
+                                                     : of_later;
   const double odds = std::exp(presence.constant + presence.score * of_best.score +
                                presence.witness * of_best.witness + presence.share * of_best.share);
   posterior.none = posterior.families["none"] = 1.0 / (1.0 + odds);

@@ -45,8 +45,7 @@ struct Posterior {
   std::map<std::string, double> families{};  ///< `none` among them
 };
 
-/// `beside_fit`: beside coefficients that were fitted to the rows.
-enum class Round { first, later, beside_fit };
+enum class Round { first, later };
 
 /// ln of an explanation's weight among the others, a weighted sum of
 ///
@@ -62,8 +61,9 @@ enum class Round { first, later, beside_fit };
 
 /// Sets the probability of each (0 where a simpler one that it contains is as likely): that there
 /// is something, by what the likeliest one takes, times exp(utility) over the sum of all.
+/// @param beside_fit  beside coefficients that were fitted to the rows
 [[nodiscard]] Posterior weigh_against_each_other(std::vector<Explanation>& explanations,
-                                                 Round round);
+                                                 Round round, bool beside_fit = false);
 
 /// What is to be named, and how probable it is.
 struct Choice {

@@ -59,6 +59,18 @@ TEST_CASE("beside what is named already the same evidence makes a cause less lik
   CHECK(none_beside(alone, Round::later) > none_beside(alone));
 }
 
+TEST_CASE("beside fitted coefficients a line of the datum is as likely, a lag less",
+          "[diagnosis]") {
+  const Hypothesis line = hypothesis("periodic_disturbance", "x_um");
+  const Hypothesis lag = hypothesis("thermal_lag", "t1_degC");
+  const auto none_of = [](const Hypothesis& of, bool beside_fit) {
+    std::vector<Explanation> alone = {explanation(of, 60.0, 0.8)};
+    return weigh_against_each_other(alone, Round::first, beside_fit).none;
+  };
+  CHECK(none_of(line, true) == none_of(line, false));
+  CHECK(none_of(lag, true) > none_of(lag, false));
+}
+
 TEST_CASE("what the reading itself says of its fault counts", "[diagnosis]") {
   const Hypothesis step = hypothesis("sensor_step", "t1_degC");
   const auto utility_of = [&](double witness) {
