@@ -203,8 +203,7 @@ Cause sensor_loose() {
                        .unit = "1",
                        .low = kept(lost_max),
                        .high = kept(lost_min),
-                       .says = "of its motion left:",
-                       .of_a_jump = true}};
+                       .says = "of its motion left:"}};
   cause.texts = {"A sensor has come loose",
                  "from a time on this sensor shows more of the room than of its place",
                  "Fasten the sensor; leave the rest of the run out of any fit."};
