@@ -31,8 +31,8 @@ namespace {
 using namespace thermocomp;
 using bench::GateStructure;
 using bench::Oil;
-using identification::GateMachine;
-using identification::TieCoefficients;
+using identification::TiedCoefficients;
+using identification::TiedColumns;
 
 constexpr double step_s = 10.0;
 constexpr double temperature_noise_K = 0.0316;  // 0.1 K a reading, one a second, ten in a step
@@ -51,19 +51,19 @@ void compare_coefficients() {
   double worst_kc = 0.0;
   for (const double height_mm : {150.0, 250.0, 300.0, 400.0, 500.0, 600.0, 750.0, 900.0}) {
     const GateStructure gate(height_mm, step_s);
-    const GateMachine& m = gate.machine();
-    const TieCoefficients beam = identification::tie_coefficients(m);
-    const TieCoefficients fe = gate.coefficients();
+    const TiedColumns& m = gate.columns();
+    const TiedCoefficients beam = identification::tied_coefficients(m);
+    const TiedCoefficients fe = gate.coefficients();
     const double l1_mm = m.heated_height_mm;
     const double free_um_per_K = 1000 * m.column_expansion_per_K * l1_mm *
                                  (2 * m.working_height_mm - l1_mm) / (2 * m.column_width_mm);
     const double ki = (fe.ki_um_per_K - beam.ki_um_per_K) / free_um_per_K;
-    const double kc = fe.kc_um_per_K / beam.kc_um_per_K - 1;
+    const double kc = fe.kc_um_per_K[0] / beam.kc_um_per_K[0] - 1;
     worst_ki = std::max(worst_ki, std::abs(ki));
     worst_kc = std::max(worst_kc, std::abs(kc));
     std::printf("  %5.0f  %5.2f  %8.3f %8.3f  %+5.1f %%   %8.3f %8.3f  %+5.1f %%\n", height_mm,
                 m.working_height_mm / height_mm, beam.ki_um_per_K, fe.ki_um_per_K, 100 * ki,
-                beam.kc_um_per_K, fe.kc_um_per_K, 100 * kc);
+                beam.kc_um_per_K[0], fe.kc_um_per_K[0], 100 * kc);
   }
   std::printf("ki_difference_of_free_max %.4f ratio\nkc_difference_max %.4f ratio\n", worst_ki,
               worst_kc);
@@ -162,13 +162,13 @@ Left residual(const Course& course, const Measured& readings, const CorrectionCo
 const std::vector<std::string> inputs{"a_degC", "b_degC", "c_degC"};
 
 ThermalModel formula_model(double ki_share, double kc_share) {
-  const TieCoefficients k =
-      identification::tie_coefficients(GateStructure(tie_mm, step_s).machine());
+  const TiedCoefficients k =
+      identification::tied_coefficients(GateStructure(tie_mm, step_s).columns());
   const double ki = ki_share * k.ki_um_per_K;
   ThermalModel model;
   model.inputs = inputs;
   model.outputs = {"x_um"};
-  model.matrix_um_per_K = {{ki, -ki, -kc_share * k.kc_um_per_K}};
+  model.matrix_um_per_K = {{ki, -ki, -kc_share * k.kc_um_per_K[0]}};
   return model;
 }
 

@@ -43,23 +43,23 @@ StructureSpec with_tie_at(double height_m) {
   return spec;
 }
 
-identification::GateMachine beams_of(StructureSpec& spec) {
+identification::TiedColumns beams_of(StructureSpec& spec) {
   const auto& column = part_of(spec, "warm_column");
   const Box& zone = column.boxes.front().box;
   const Box& tie = part_of(spec, "tie").boxes.front().box;
   const Material& material = spec.materials[column.material];
   const double width_mm = mm * (zone.high_m[0] - zone.low_m[0]);
   const double depth_mm = mm * (zone.high_m[1] - zone.low_m[1]);
-  identification::GateMachine m;
+  identification::TiedColumns m;
   m.working_height_mm = mm * spec.outputs.front().places.front().at_m.front()[2];
   m.heated_height_mm = mm * zone.high_m[2];
-  m.tie_height_mm = mm * (tie.low_m[2] + tie.high_m[2]) / 2.0;
   m.column_width_mm = width_mm;
-  m.tie_length_mm = mm * (tie.high_m[0] - tie.low_m[0]);
   m.column_inertia_mm4 = depth_mm * width_mm * width_mm * width_mm / 12.0;
-  m.column_modulus_MPa = m.tie_modulus_MPa = 1e-6 * material.youngs_modulus_Pa;
-  m.column_expansion_per_K = m.tie_expansion_per_K = material.expansion_per_K;
-  m.tie_area_mm2 = mm * mm * (tie.high_m[1] - tie.low_m[1]) * (tie.high_m[2] - tie.low_m[2]);
+  m.column_modulus_MPa = 1e-6 * material.youngs_modulus_Pa;
+  m.column_expansion_per_K = material.expansion_per_K;
+  m.ties = {{mm * (tie.low_m[2] + tie.high_m[2]) / 2.0, mm * (tie.high_m[0] - tie.low_m[0]),
+             mm * mm * (tie.high_m[1] - tie.low_m[1]) * (tie.high_m[2] - tie.low_m[2]),
+             m.column_modulus_MPa, m.column_expansion_per_K}};
   return m;
 }
 
@@ -115,7 +115,7 @@ struct GateStructure::Parts {
   }
 
   StructureSpec spec;
-  identification::GateMachine beams;
+  identification::TiedColumns beams;
   Structure structure;
   HeatModel heat;
   Conduction empty;  ///< the tank
@@ -132,14 +132,14 @@ GateStructure::GateStructure(double tie_height_mm, double step_s)
     : parts_(std::make_unique<Parts>(tie_height_mm, step_s)) {}
 GateStructure::~GateStructure() = default;
 
-const identification::GateMachine& GateStructure::machine() const {
+const identification::TiedColumns& GateStructure::columns() const {
   return parts_->beams;
 }
 
-identification::TieCoefficients GateStructure::coefficients() const {
+identification::TiedCoefficients GateStructure::coefficients() const {
   const auto in_tie = nodes_of_part(parts_->structure.mesh, 2);
   const std::vector<double> tie(in_tie.begin(), in_tie.end());
-  return {parts_->displacement_um(parts_->linear_field()), -parts_->displacement_um(tie)};
+  return {parts_->displacement_um(parts_->linear_field()), {-parts_->displacement_um(tie)}};
 }
 
 void GateStructure::advance(const Oil& oil) {

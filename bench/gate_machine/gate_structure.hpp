@@ -4,7 +4,7 @@
 
 #include <memory>
 
-#include "modelling/identification/gate/gate_machine.hpp"
+#include "modelling/identification/gate/tied_columns.hpp"
 
 namespace thermocomp::bench {
 
@@ -24,10 +24,10 @@ class GateStructure {
   GateStructure& operator=(const GateStructure&) = delete;
 
   /// The same machine to the beam formulas.
-  [[nodiscard]] const identification::GateMachine& machine() const;
+  [[nodiscard]] const identification::TiedColumns& columns() const;
   /// Ki and Kc as finite elements have them: a temperature that is linear across the heated zone,
   /// and a tie 1 K warm.
-  [[nodiscard]] identification::TieCoefficients coefficients() const;
+  [[nodiscard]] identification::TiedCoefficients coefficients() const;
 
   void advance(const Oil& oil);  ///< one step, from everything at the room's temperature on
   [[nodiscard]] double theta_a_K() const;        ///< side A, middle of the heated zone

@@ -102,26 +102,25 @@ void leave_out_spikes(RunFile& run, std::vector<std::string>& notes) {
   }
 }
 
-/// Temperatures that all runs have, apart from those that hold too little.
-std::vector<std::string> usable_places(const std::vector<RunFile>& runs,
-                                       std::vector<std::string>& notes) {
-  std::vector<std::string> places;
+/// The columns that all runs have and that hold enough. Rows in which one is missing are left out:
+/// `predict` and the daemon have no value there.
+template <class Wanted>
+std::vector<std::string> usable(const std::vector<RunFile>& runs, Wanted wanted,
+                                std::vector<std::string>& notes) {
+  std::vector<std::string> names;
   for (const std::string& column : runs.front().columns) {
-    if (!is_temperature(column)) continue;
-    if (!in_all(runs, column)) {
-      notes.push_back(std::string(column).append(" is left out: not every run has it"));
-      continue;
-    }
-    const bool sparse = std::any_of(runs.begin(), runs.end(), [&](const RunFile& run) {
+    if (!wanted(column)) continue;
+    const auto sparse = [&](const RunFile& run) {
       return share_present(run, run.column(column)) < share_present_min;
-    });
-    if (sparse) {
-      notes.push_back(std::string(column).append(" is left out: most of its values are missing"));
-      continue;
-    }
-    places.push_back(column);
+    };
+    if (!in_all(runs, column))
+      notes.push_back(column + " is left out: not every run has it");
+    else if (std::any_of(runs.begin(), runs.end(), sparse))
+      notes.push_back(column + " is left out: most of its values are missing");
+    else
+      names.push_back(column);
   }
-  return places;
+  return names;
 }
 
 /// Beyond the rounding of a position that was converted or summed up.
@@ -134,30 +133,6 @@ bool varies(const std::vector<RunFile>& runs, const std::string& column) {
       most = std::fmax(most, each);
     }
   return most - least > rounding_share * std::max(std::abs(least), std::abs(most));
-}
-
-/// Operating signals and positions that all runs have, mostly, and that vary in some. Rows in which
-/// one is missing go as those without a temperature do: `predict` and the daemon have no value
-/// there.
-std::vector<std::string> usable_signals(const std::vector<RunFile>& runs,
-                                        std::vector<std::string>& notes) {
-  std::vector<std::string> signals;
-  for (const std::string& column : runs.front().columns) {
-    if (!is_operating(column) || column == "time_s") continue;
-    if (!in_all(runs, column)) {
-      notes.push_back(std::string(column).append(" is left out: not every run has it"));
-      continue;
-    }
-    const bool sparse = std::any_of(runs.begin(), runs.end(), [&](const RunFile& run) {
-      return share_present(run, run.column(column)) < share_present_min;
-    });
-    if (sparse) {
-      notes.push_back(std::string(column).append(" is left out: most of its values are missing"));
-      continue;
-    }
-    if (varies(runs, column)) signals.push_back(column);
-  }
-  return signals;
 }
 
 TestRun make_run(const RunFile& run, const std::vector<std::string>& places,
@@ -357,9 +332,14 @@ MeasuredTests measured_tests(const std::vector<RunFile>& given, const TestOption
     if (!is_temperature(name)) refuse("", name, "must be a temperature (*_degC, *_K)");
   for (const std::string& name : options.outputs)
     if (!is_output(name)) refuse("", name, "must be a displacement (*_um) or a tilt (*_urad)");
-  tests.places = options.places.empty() ? usable_places(runs, tests.notes) : options.places;
+  tests.places =
+      options.places.empty() ? usable(runs, is_temperature, tests.notes) : options.places;
   tests.outputs = options.outputs;
-  if (options.signals) tests.signals = usable_signals(runs, tests.notes);
+  if (options.signals) {
+    tests.signals = usable(
+        runs, [](const auto& name) { return is_operating(name) && name != "time_s"; }, tests.notes);
+    std::erase_if(tests.signals, [&](const auto& name) { return !varies(runs, name); });
+  }
   for (const RunFile& run : runs)
     tests.runs.push_back(
         make_run(run, tests.places, tests.outputs, tests.signals, options.between_probings));

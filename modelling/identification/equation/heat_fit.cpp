@@ -118,13 +118,6 @@ std::vector<double> scores(const std::vector<Eigen::MatrixXd>& folds, const Eige
   return result;
 }
 
-bool helps_on_most(const std::vector<double>& before, const std::vector<double>& after) {
-  std::size_t better = 0;
-  for (std::size_t f = 0; f < before.size(); ++f)
-    if (after[f] < before[f]) ++better;
-  return 2 * better > before.size();
-}
-
 }  // namespace
 
 bool starts_differ(const MeasuredTests& tests, std::size_t place) {

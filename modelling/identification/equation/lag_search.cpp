@@ -116,13 +116,6 @@ double sum_of(const std::vector<double>& values) {
   return sum;
 }
 
-bool helps_on_most(const std::vector<double>& before, const std::vector<double>& after) {
-  std::size_t better = 0;
-  for (std::size_t f = 0; f < before.size(); ++f)
-    if (after[f] < before[f]) ++better;
-  return 2 * better > before.size();
-}
-
 /// Whether the newest of the lags is a share of its place's coefficient, fitted to all rows.
 bool is_share(const ColumnPool& pool, const std::vector<std::size_t>& columns) {
   const std::vector<Eigen::Index> x(columns.begin(), columns.end());
@@ -141,6 +134,13 @@ bool is_share(const ColumnPool& pool, const std::vector<std::size_t>& columns) {
 }
 
 }  // namespace
+
+bool helps_on_most(const std::vector<double>& before, const std::vector<double>& after) {
+  std::size_t better = 0;
+  for (std::size_t f = 0; f < before.size(); ++f)
+    if (after[f] < before[f]) ++better;
+  return 2 * better > before.size();
+}
 
 Eigen::VectorXd column_of(const TestRun& run, const FitColumn& column) {
   Eigen::VectorXd rise_K = run.places_K.col(static_cast<Eigen::Index>(column.place));

@@ -58,4 +58,8 @@ struct LaggedSubset {
 [[nodiscard]] LaggedSubset add_lags(const ColumnPool& pool, const std::vector<std::size_t>& places,
                                     double gain_min);
 
+/// Whether more than half of the folds leave less after it.
+[[nodiscard]] bool helps_on_most(const std::vector<double>& before,
+                                 const std::vector<double>& after);
+
 }  // namespace thermocomp::identification

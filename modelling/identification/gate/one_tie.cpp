@@ -18,10 +18,9 @@ constexpr double um_per_mm = 1000.0;
 template <class Value>
 Drawing curves_over_a(const TiedColumns& columns, const std::string& title, const std::string& unit,
                       Value value) {
-  const GateMachine machine = machine_of(columns);
   const double own_beta =
-      stiffness_ratio(machine) *
-      std::pow(machine.tie_height_mm / machine.working_height_mm, 3);  // km/kc = beta a^3
+      stiffness_ratio(columns) *
+      std::pow(columns.ties.front().height_mm / columns.working_height_mm, 3);  // km/kc = beta a^3
   std::vector<double> ratios;
   for (double a = 1.0 / highest_tie; a <= 1.0 / lowest_tie; a += 0.01) ratios.push_back(a);
   const std::vector betas{own_beta, 0.01, 0.1, 0.5, 1.0};
@@ -45,6 +44,14 @@ Drawing curves_over_a(const TiedColumns& columns, const std::string& title, cons
 
 }  // namespace
 
+double stiffness_ratio(const TiedColumns& columns) {
+  THERMOCOMP_ENSURE(columns.ties.size() == 1);
+  const Tie& tie = columns.ties.front();
+  const double column =
+      3.0 * columns.column_modulus_MPa * columns.column_inertia_mm4 / std::pow(tie.height_mm, 3);
+  return column / (tie.area_mm2 * tie.modulus_MPa / tie.length_mm);
+}
+
 BestHeight best_tie_height(const TiedColumns& columns, double ratio) {
   BestHeight best{0.0, INFINITY};
   TiedColumns other = columns;
@@ -62,12 +69,11 @@ BestHeight best_tie_height(const TiedColumns& columns, double ratio) {
 }
 
 std::string design_curves_svg(const TiedColumns& columns) {
-  const GateMachine machine = machine_of(columns);
-  const double l = machine.working_height_mm;
-  const double l1 = machine.heated_height_mm;
-  const double free_um_per_K = um_per_mm * machine.column_expansion_per_K * l1 * (2.0 * l - l1) /
-                               (2.0 * machine.column_width_mm);
-  const double tie_um_per_K = um_per_mm * machine.tie_expansion_per_K * machine.tie_length_mm;
+  TiedColumns free = columns;
+  free.ties.clear();
+  const double free_um_per_K = tied_coefficients(free).ki_um_per_K;
+  const Tie& tie = columns.ties.front();
+  const double tie_um_per_K = um_per_mm * tie.expansion_per_K * tie.length_mm;
   return svg_file(
       {curves_over_a(columns, "Ki relative to the column without a tie", "Ki / Ki0",
                      [&](const TiedCoefficients& k) { return k.ki_um_per_K / free_um_per_K; }),

@@ -7,6 +7,10 @@
 
 namespace thermocomp::identification {
 
+/// km / kc: stiffness of a column at the tie beside that of the tie.
+/// @pre there is one tie
+[[nodiscard]] double stiffness_ratio(const TiedColumns& columns);
+
 /// The height of the tie, of those from 0.2 l to 3 l, at which |Ki - Kc ratio| is smallest for
 /// ratio = theta_C / (theta_A - theta_B).
 struct BestHeight {

@@ -11,7 +11,6 @@
 #include <nlohmann/json.hpp>
 
 #include "modelling/identification/gate/gate_file.hpp"
-#include "modelling/identification/gate/gate_machine.hpp"
 #include "modelling/identification/gate/one_tie.hpp"
 #include "modelling/identification/gate/tie_course.hpp"
 #include "modelling/identification/gate/tied_columns.hpp"
@@ -43,13 +42,12 @@ struct Answer {
 
 void say_one_tie(const Options& options, const TiedColumns& columns, Answer& answer) {
   const TiedCoefficients k = tied_coefficients(columns);
-  const GateMachine machine = machine_of(columns);
   if (!options.curves.empty()) cli::write_file(options.curves, design_curves_svg(columns));
   answer.json = {{"Ki_um_per_K", k.ki_um_per_K}, {"Kc_um_per_K", k.kc_um_per_K.front()}};
   answer.text = printed("Ki = %.6g um/K\nKc = %.6g um/K\n", k.ki_um_per_K, k.kc_um_per_K.front());
   answer.text +=
-      printed("l / l4 = %.4g, km / kc = %.4g\n", machine.working_height_mm / machine.tie_height_mm,
-              stiffness_ratio(machine));
+      printed("l / l4 = %.4g, km / kc = %.4g\n",
+              columns.working_height_mm / columns.ties.front().height_mm, stiffness_ratio(columns));
   if (!options.ratio) return;
   const BestHeight best = best_tie_height(columns, *options.ratio);
   answer.json["best_tie_height_mm"] = best.tie_height_mm;

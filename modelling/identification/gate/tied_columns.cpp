@@ -4,8 +4,6 @@
 
 #include <Eigen/Cholesky>
 
-#include "estimator/checks.hpp"
-
 namespace thermocomp::identification {
 namespace {
 
@@ -145,38 +143,6 @@ TiedCoefficients tied_coefficients(const TiedColumns& columns) {
                             tie.expansion_per_K);
   }
   return k;
-}
-
-TiedColumns columns_of(const GateMachine& machine) {
-  return {machine.working_height_mm,
-          machine.heated_height_mm,
-          machine.column_width_mm,
-          machine.column_inertia_mm4,
-          machine.column_modulus_MPa,
-          machine.column_expansion_per_K,
-          {{machine.tie_height_mm, machine.tie_length_mm, machine.tie_area_mm2,
-            machine.tie_modulus_MPa, machine.tie_expansion_per_K, 0.0}},
-          0.0,
-          0.0,
-          0.0};
-}
-
-GateMachine machine_of(const TiedColumns& columns) {
-  THERMOCOMP_ENSURE(columns.ties.size() == 1);
-  const Tie& tie = columns.ties.front();
-  GateMachine machine;
-  machine.working_height_mm = columns.working_height_mm;
-  machine.heated_height_mm = columns.heated_height_mm;
-  machine.tie_height_mm = tie.height_mm;
-  machine.column_width_mm = columns.column_width_mm;
-  machine.tie_length_mm = tie.length_mm;
-  machine.column_inertia_mm4 = columns.column_inertia_mm4;
-  machine.column_modulus_MPa = columns.column_modulus_MPa;
-  machine.column_expansion_per_K = columns.column_expansion_per_K;
-  machine.tie_area_mm2 = tie.area_mm2;
-  machine.tie_modulus_MPa = tie.modulus_MPa;
-  machine.tie_expansion_per_K = tie.expansion_per_K;
-  return machine;
 }
 
 }  // namespace thermocomp::identification

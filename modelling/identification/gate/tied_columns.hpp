@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "modelling/identification/gate/column_beam.hpp"
-#include "modelling/identification/gate/gate_machine.hpp"
 
 namespace thermocomp::identification {
 
@@ -48,8 +47,13 @@ struct TiedCoefficients {
 ///                   = w(z_j) dAB + alpha_cj lc_j theta_Cj
 ///                 sum_m [2 r(z_m,z_j) X_m + 2 t(z_j,z_m) M_m] + lc_j/(Ec_j Ic_j) M_j = t(z_j) dAB
 ///   at the work:  delta = w(l) dAB - sum_m [2 f(l,z_m) X_m + 2 r(l,z_m) M_m]
-/// A tie that is pinned (thickness 0) has no M_j and no c_j; pinned ties, columns rigid in shear
-/// and feet free crosswise give the publication's three cases, tie_coefficients().
+/// A tie that is pinned (thickness 0) has no M_j and no c_j. One pinned tie at l4, columns rigid in
+/// shear and feet free crosswise give the publication's cases, with l4^3 in the last one (printed:
+/// l4^2), q = km/kc + 2, 1/kc = lc/(Ac Ec), 1/km = l4^3/(3 E I):
+///   l4 <= l1       Ki = alpha/(2h) { l1 (2l - l1) - l4 (3l - l4) / q }
+///   l1 <= l4 <= l  Ki = alpha/(2h) { l1 (2l - l1) - l1 (3l - l4)(2 l4 - l1) / (l4 q) }
+///   l4 >= l        Ki = alpha/(2h) { l1 (2l - l1) - l^2 l1 (3 l4 - l)(2 l4 - l1) / (l4^3 q) }
+///   l4 <= l        Kc = (3l - l4) lc alpha_c / (l4 q);  else l^2 (3 l4 - l) lc alpha_c / (l4^3 q)
 ///
 /// A bonded tie meets the face of the column, which differs from its axis: it sinks in by c_j
 /// (bonded_end_compliance_mm_per_N()), and the section changes its width, as is known of bending
@@ -58,10 +62,5 @@ struct TiedCoefficients {
 ///   h^2/8 (nu M/(EI) - alpha/h dAB in the heated zone).
 /// @pre all dimensions are positive
 [[nodiscard]] TiedCoefficients tied_coefficients(const TiedColumns& columns);
-
-[[nodiscard]] TiedColumns columns_of(const GateMachine& machine);
-/// Without what the publication does not have.
-/// @pre there is one tie
-[[nodiscard]] GateMachine machine_of(const TiedColumns& columns);
 
 }  // namespace thermocomp::identification

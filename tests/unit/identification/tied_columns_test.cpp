@@ -6,6 +6,8 @@
 
 #include <catch2/catch.hpp>
 
+#include "modelling/identification/gate/one_tie.hpp"
+
 namespace thermocomp::identification {
 namespace {
 
@@ -24,17 +26,40 @@ Tie tie(double height_mm, double area_mm2) {
   return {height_mm, 400, area_mm2, 206000, 11.5e-6};
 }
 
-TEST_CASE("one tie gives the published cases", "[tiebar]") {
-  const double area_mm2 = GENERATE(10.0, 150.0, 5000.0);
-  for (double height_mm = 100; height_mm < 1500; height_mm += 25) {
-    TiedColumns columns = gate();
-    columns.ties = {tie(height_mm, area_mm2)};
+/// Its tie at l / a, with km / kc = beta a^3.
+TiedColumns gate_with_tie(double a, double beta) {
+  TiedColumns columns = gate();
+  columns.ties = {tie(600 / a, 3.0 * columns.column_inertia_mm4 * 400 / (beta * 600 * 600 * 600))};
+  return columns;
+}
+
+TEST_CASE("one tie gives the published cases, dimensionless", "[tiebar]") {
+  const double beta = GENERATE(0.01, 0.1, 1.0);
+  for (double a = 0.4; a < 4.0; a += 0.05) {
+    const double q = beta * a * a * a + 2;
+    const double ki = a >= 2   ? 1 - 4 * (3 * a - 1) / (3 * a * a * q)
+                      : a >= 1 ? 1 - (3 * a - 1) * (4 - a) / (3 * a * q)
+                               : 1 - a * (3 - a) * (4 - a) / (3 * q);
+    const double kc = a >= 1 ? (3 * a - 1) / q : a * a * (3 - a) / q;
+    const TiedColumns columns = gate_with_tie(a, beta);
     const TiedCoefficients k = tied_coefficients(columns);
-    const TieCoefficients published = tie_coefficients(machine_of(columns));
-    CAPTURE(height_mm, area_mm2);
-    CHECK(k.ki_um_per_K == Approx(published.ki_um_per_K).epsilon(1e-12).margin(1e-11));
+    CAPTURE(a, beta);
+    CHECK(stiffness_ratio(columns) == Approx(beta * a * a * a));
+    CHECK(k.ki_um_per_K / (1000 * 3 * 11.5e-6 * 600 * 600 / (8 * 80)) == Approx(ki).margin(1e-12));
     REQUIRE(k.kc_um_per_K.size() == 1);
-    CHECK(k.kc_um_per_K[0] == Approx(published.kc_um_per_K).epsilon(1e-12));
+    CHECK(k.kc_um_per_K[0] / (1000 * 11.5e-6 * 400) == Approx(kc));
+  }
+}
+
+TEST_CASE("at the best height of the tie no other height displaces less", "[tiebar]") {
+  const double ratio = GENERATE(0.0, 0.1, 0.3);
+  TiedColumns columns = gate_with_tie(1.1, 0.1);
+  const BestHeight best = best_tie_height(columns, ratio);
+  for (double height_mm = 120; height_mm <= 1800; height_mm += 1) {
+    columns.ties[0].height_mm = height_mm;
+    const TiedCoefficients k = tied_coefficients(columns);
+    CHECK(std::abs(k.ki_um_per_K - ratio * k.kc_um_per_K[0]) >=
+          std::abs(best.displacement_um_per_K) - 1e-2);
   }
 }
 
