@@ -1,6 +1,6 @@
 // Two comparisons, each within one run.
 //
-// rate_over_libmodbus: readings a second of ModbusSource polling as fast as it can (32 float32
+// rate_over_libmodbus: readings a second of a Modbus source polling as fast as it can (32 float32
 //   channels, 64 registers of one unit, one request) over those of a bare loop
 //   `modbus_read_input_registers(64)` of libmodbus, decoding the floats, from the same server
 //   process over TCP on this machine. Alternating rounds, median of the rounds' ratios. A reading
@@ -24,7 +24,7 @@
 #include <modbus/modbus.h>
 
 #include "drivers/bus_thread.hpp"
-#include "drivers/sensors/modbus_source.hpp"
+#include "drivers/sensors/make_source.hpp"
 #include "modbus_bench_server.hpp"
 
 namespace {
@@ -96,7 +96,7 @@ ModbusDeviceConfig unit_with(int unit, int count, std::size_t first_sensor) {
 }
 
 /// Good answers of the units up to `living`.
-std::uint64_t answers_of(const ModbusSource& source, std::size_t living) {
+std::uint64_t answers_of(const SensorSource& source, std::size_t living) {
   const BusHealth health = source.health();
   return std::accumulate(
       health.units.begin(), health.units.begin() + static_cast<long>(living), std::uint64_t{0},
@@ -104,7 +104,7 @@ std::uint64_t answers_of(const ModbusSource& source, std::size_t living) {
 }
 
 /// Answers a second over `duration`.
-double answer_rate(const ModbusSource& source, std::size_t living, nanoseconds duration) {
+double answer_rate(const SensorSource& source, std::size_t living, nanoseconds duration) {
   const std::uint64_t before = answers_of(source, living);
   const nanoseconds began = monotonic_now();
   std::this_thread::sleep_for(duration);
@@ -117,16 +117,16 @@ double our_rate(int port, nanoseconds duration) {
   bus.name = "bench";
   bus.line.link = ModbusTcp{"127.0.0.1", port};
   bus.devices = {unit_with(1, channels, 0)};
-  ModbusSource source(bus);
-  source.start();
-  while (answers_of(source, 1) == 0) std::this_thread::sleep_for(1ms);
-  const double rate = channels * answer_rate(source, 1, duration);
+  const std::unique_ptr<SensorSource> source = make_bus_source(bus);
+  source->start();
+  while (answers_of(*source, 1) == 0) std::this_thread::sleep_for(1ms);
+  const double rate = channels * answer_rate(*source, 1, duration);
   std::vector<Reading> all(channels);
-  source.newest(all);
+  source->newest(all);
   const bool good = std::all_of(all.begin(), all.end(), [](const Reading& reading) {
     return reading.fault == Fault::none && reading.temp_degC == 20.0;
   });
-  source.stop();
+  source->stop();
   if (!good) {
     std::fprintf(stderr, "modbus_poll: a reading was not good\n");
     std::exit(1);
@@ -175,16 +175,16 @@ double living_rate_half_dead() {
   const bench::ServerProcess server_alone([&line_alone] { bench::serve_rtu(line_alone, living); });
   const bench::ServerProcess server_shared(
       [&line_shared] { bench::serve_rtu(line_shared, living); });
-  ModbusSource alone(serial_bus(line_alone.device(), 4));
-  ModbusSource shared(serial_bus(line_shared.device(), 8));
-  alone.start();
-  shared.start();
+  const auto alone = make_bus_source(serial_bus(line_alone.device(), 4));
+  const auto shared = make_bus_source(serial_bus(line_shared.device(), 8));
+  alone->start();
+  shared->start();
   const auto ratio_over = [&](nanoseconds duration, const char* what) {
-    const std::uint64_t alone_before = answers_of(alone, living);
-    const std::uint64_t shared_before = answers_of(shared, living);
+    const std::uint64_t alone_before = answers_of(*alone, living);
+    const std::uint64_t shared_before = answers_of(*shared, living);
     std::this_thread::sleep_for(duration);
-    const auto of_alone = static_cast<double>(answers_of(alone, living) - alone_before);
-    const auto of_shared = static_cast<double>(answers_of(shared, living) - shared_before);
+    const auto of_alone = static_cast<double>(answers_of(*alone, living) - alone_before);
+    const auto of_shared = static_cast<double>(answers_of(*shared, living) - shared_before);
     std::fprintf(stderr, "%s: answers/s of the living alone %.2f, beside 4 dead %.2f, ratio %.3f\n",
                  what, of_alone / seconds_of(duration), of_shared / seconds_of(duration),
                  of_shared / of_alone);
@@ -193,8 +193,8 @@ double living_rate_half_dead() {
   ratio_over(10s, "first 10 s");
   ratio_over(30s, "10 s to 40 s");
   const double steady = ratio_over(60s, "40 s to 100 s");
-  shared.stop();
-  alone.stop();
+  shared->stop();
+  alone->stop();
   return steady;
 }
 

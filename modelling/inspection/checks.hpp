@@ -1,12 +1,12 @@
 /// The checks that inspect() is made of. Each gives findings with a `score` in place of the
-/// probability; probability.hpp says what it is worth.
+/// probability; inspect() says what it is worth.
 #pragma once
 
 #include <functional>
 #include <vector>
 
 #include "config/runs/run_file.hpp"
-#include "modelling/inspection/finding.hpp"
+#include "modelling/inspection/inspection.hpp"
 #include "modelling/inspection/recording.hpp"
 
 namespace thermocomp::inspection {
@@ -45,8 +45,6 @@ void check_exchanged(const Recording& recording, Suspicions& found);
 /// Fills `excited` and `experiments`.
 void judge_excitation(const Recording& recording, Inspection& inspection);
 
-/// What a score is worth, by kind; what it was set from is in docs/inspection.md.
-[[nodiscard]] double probability_of(const std::string& kind, double score);
 /// Writes `text`.
 void describe(Finding& finding, const std::vector<RunFile>& runs);
 

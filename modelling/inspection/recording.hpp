@@ -1,6 +1,7 @@
 /// All runs as matrices on a coarser grid, on which readings are compared with each other.
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -34,5 +35,17 @@ struct Recording {
 /// First-order low pass of each column, started at each run's first row.
 [[nodiscard]] Eigen::MatrixXd low_pass(const Recording& recording, const Eigen::MatrixXd& columns,
                                        double tau_s);
+
+// Stretches of a recording without a row or a value.
+
+/// From row to row [s].
+[[nodiscard]] std::vector<double> steps_of(const RunFile& run);
+/// Nine rows in ten are a step apart, give or take a fifth.
+[[nodiscard]] bool is_regular(const std::vector<double>& steps, double step_s);
+/// From how many seconds on a stretch without a value is a gap.
+[[nodiscard]] double gap_s_min(const RunFile& run);
+/// Rows of the first value after each gap of the column, be it that rows or its values are missing.
+[[nodiscard]] std::vector<std::size_t> ends_of_gaps(const RunFile& run,
+                                                    const std::vector<double>& column);
 
 }  // namespace thermocomp::inspection

@@ -5,7 +5,6 @@
 #include "config/runs/robust.hpp"
 #include "config/text/units.hpp"
 #include "modelling/inspection/checks.hpp"
-#include "modelling/inspection/gaps.hpp"
 
 namespace thermocomp::inspection {
 namespace {

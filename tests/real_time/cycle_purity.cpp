@@ -19,7 +19,7 @@
 #include "daemon/cycle/real_time_thread.hpp"
 #include "daemon/history/writing/history_writer.hpp"
 #include "drivers/controllers/kinds/make_controller.hpp"
-#include "drivers/sensors/modbus_source.hpp"
+#include "drivers/sensors/make_source.hpp"
 #include "tests/real_time/thread_watch.hpp"
 
 namespace {
@@ -218,7 +218,7 @@ Plant plant_from(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   ProbeSource probe(plant_from(argc, argv));
-  ModbusSource line(silent_line());
+  const std::unique_ptr<SensorSource> line = make_bus_source(silent_line());
   DryRunController controller({"none", 3});
   const Grid grid{std::chrono::steady_clock::now().time_since_epoch(), 1ms};
   char folder[] = "/tmp/cycle_purity_XXXXXX";
@@ -235,9 +235,9 @@ int main(int argc, char** argv) {
   // In memory, as /run is.
   const std::string record = "/dev/shm/cycle_purity_" + std::to_string(getpid());
   LastSent last_sent(record, "none", make_config().axes);
-  Cycle cycle(grid, {&probe, &line}, controller, sensors, make_cycle_parts(2.0), &last_sent);
+  Cycle cycle(grid, {&probe, line.get()}, controller, sensors, make_cycle_parts(2.0), &last_sent);
   history.start();
-  line.start();
+  line->start();
   controller.start();
   for (const std::string& warning : {lock_memory()})
     if (!warning.empty()) std::printf("note: %s\n", warning.c_str());
@@ -261,7 +261,7 @@ int main(int argc, char** argv) {
   }
   cycle.stop();
   thread.join();
-  line.stop();
+  line->stop();
   history.stop();
   std::filesystem::remove_all(folder);
   std::filesystem::remove(record);

@@ -11,6 +11,7 @@
 #include <catch2/catch.hpp>
 #include <sys/stat.h>
 
+#include "../temp_folder.hpp"
 #include "cli/observe/watch_text.hpp"
 #include "report/command.hpp"
 
@@ -19,16 +20,10 @@ namespace {
 namespace fs = std::filesystem;
 using thermocomp::cli::OutputFile;
 
-struct Folder {
-  Folder() {
-    std::string pattern = (fs::temp_directory_path() / "thermocomp-output.XXXXXX").string();
-    path = ::mkdtemp(pattern.data());
-  }
-  ~Folder() { fs::remove_all(path); }
+struct Folder : thermocomp::testing::TempFolder {
   [[nodiscard]] std::ptrdiff_t files() const {
-    return std::distance(fs::directory_iterator(path), fs::directory_iterator());
+    return std::distance(fs::directory_iterator(path()), fs::directory_iterator());
   }
-  fs::path path;
 };
 
 std::string content(const fs::path& path) {
@@ -38,7 +33,7 @@ std::string content(const fs::path& path) {
 
 TEST_CASE("without commit the old file stays and nothing else is left", "[cli][output]") {
   const Folder folder;
-  const fs::path path = folder.path / "out.csv";
+  const fs::path path = folder / "out.csv";
   std::ofstream(path) << "old";
   {
     OutputFile file(path.string());
@@ -50,7 +45,7 @@ TEST_CASE("without commit the old file stays and nothing else is left", "[cli][o
 
 TEST_CASE("after commit the new content stands there", "[cli][output]") {
   const Folder folder;
-  const fs::path path = folder.path / "out.csv";
+  const fs::path path = folder / "out.csv";
   OutputFile file(path.string());
   file.stream() << "new";
   file.commit();
@@ -60,13 +55,13 @@ TEST_CASE("after commit the new content stands there", "[cli][output]") {
 
 TEST_CASE("a symbolic link stays a link", "[cli][output]") {
   const Folder folder;
-  std::ofstream(folder.path / "real.csv") << "old";
-  fs::create_symlink("real.csv", folder.path / "link.csv");
-  OutputFile file((folder.path / "link.csv").string());
+  std::ofstream(folder / "real.csv") << "old";
+  fs::create_symlink("real.csv", folder / "link.csv");
+  OutputFile file((folder / "link.csv").string());
   file.stream() << "new";
   file.commit();
-  CHECK(fs::is_symlink(folder.path / "link.csv"));
-  CHECK(content(folder.path / "real.csv") == "new");
+  CHECK(fs::is_symlink(folder / "link.csv"));
+  CHECK(content(folder / "real.csv") == "new");
 }
 
 TEST_CASE("a device is written, not replaced", "[cli][output]") {
@@ -79,7 +74,7 @@ TEST_CASE("a device is written, not replaced", "[cli][output]") {
 TEST_CASE("a pipe that nobody reads is refused at once, one that is read is written",
           "[cli][output]") {
   const Folder folder;
-  const std::string pipe = (folder.path / "pipe").string();
+  const std::string pipe = (folder / "pipe").string();
   REQUIRE(::mkfifo(pipe.c_str(), 0600) == 0);
   CHECK_THROWS_WITH(OutputFile(pipe), Catch::Matchers::Contains("nobody reads"));
   const int reader = ::open(pipe.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
@@ -107,7 +102,7 @@ TEST_CASE("a full device and a missing folder are failures that name the file", 
 
 TEST_CASE("a file that is being written shows its last whole row", "[cli][watch]") {
   const Folder folder;
-  const fs::path path = folder.path / "truth.csv";
+  const fs::path path = folder / "truth.csv";
   thermocomp::cli::TruthFile truth(path);
   CHECK(truth.newest() == nullptr);
   std::ofstream writer(path);

@@ -7,34 +7,15 @@
 #include <memory>
 #include <random>
 #include <string>
-#include <unistd.h>
 #include <utility>
 #include <vector>
 
+#include "../temp_folder.hpp"
 #include "daemon/history/replay/replay.hpp"
 #include "daemon/history/writing/history_writer.hpp"
 #include "estimator/pipeline/estimator.hpp"
 
 namespace thermocomp::testing {
-
-class TempFolder {
- public:
-  TempFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "thermocomp-XXXXXX").string();
-    path_ = mkdtemp(name.data());
-  }
-  ~TempFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  TempFolder(const TempFolder&) = delete;
-  TempFolder& operator=(const TempFolder&) = delete;
-  [[nodiscard]] std::filesystem::path operator/(const char* name) const { return path_ / name; }
-  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
 
 inline ReplaySetup machine_setup(double gain_um_per_K) {
   ReplaySetup setup;

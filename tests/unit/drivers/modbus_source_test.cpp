@@ -1,5 +1,3 @@
-#include "drivers/sensors/modbus_source.hpp"
-
 #include <cmath>
 #include <future>
 #include <memory>
@@ -12,6 +10,7 @@
 
 #include "drivers/bus.hpp"
 #include "drivers/bus_thread.hpp"
+#include "drivers/sensors/make_source.hpp"
 #include "modbus_peer.hpp"
 
 using namespace thermocomp;
@@ -54,15 +53,15 @@ ModbusBusConfig rtu_bus(const std::string& device) {
 
 /// A started source and the readings as the cycle sees them.
 struct Running {
-  ModbusSource source;
+  std::unique_ptr<SensorSource> source;
   std::vector<Reading> all;
 
   explicit Running(const ModbusBusConfig& bus, std::size_t sensors = 8)
-      : source(bus), all(sensors) {
-    source.start();
+      : source(make_bus_source(bus)), all(sensors) {
+    source->start();
   }
   const Reading& reading(std::size_t sensor) {
-    source.newest(all);
+    source->newest(all);
     return all[sensor];
   }
   bool becomes(std::size_t sensor, double value) {
@@ -92,7 +91,7 @@ TEST_CASE("readings arrive with value and time, in the places of their sensors",
   CHECK(running.all[0].fault == Fault::never_read);  // another bus' sensor is left alone
   const auto taken_at = running.all[4].taken_at;
   CHECK(peer::eventually([&] { return running.reading(4).taken_at > taken_at; }));
-  const BusHealth health = running.source.health();
+  const BusHealth health = running.source->health();
   CHECK(health.kind == "modbus_tcp");
   CHECK(health.connected);
   CHECK(health.units.at(0).answering);
@@ -186,12 +185,12 @@ TEST_CASE("a dead unit has no answer, the others go on, and it comes back", "[so
   CHECK(running.becomes(1, Fault::no_answer));
   CHECK(running.becomes(0, 1000.0));
   CHECK(running.becomes(2, 3000.0));
-  const BusHealth health = running.source.health();
+  const BusHealth health = running.source->health();
   CHECK_FALSE(health.units.at(1).answering);
   CHECK(health.units.at(1).timeouts > 0);
   CHECK_FALSE(health.units.at(1).last_error.empty());
-  const auto before = running.source.health().units.at(0).answers;
-  CHECK(peer::eventually([&] { return running.source.health().units[0].answers > before + 20; }));
+  const auto before = running.source->health().units.at(0).answers;
+  CHECK(peer::eventually([&] { return running.source->health().units[0].answers > before + 20; }));
   dead = false;
   CHECK(running.becomes(1, 2000.0));
 }
@@ -242,7 +241,7 @@ TEST_CASE("a serial port that vanishes and returns is read again", "[source][rec
   REQUIRE(running.becomes(0, 1000.0));
   line.unplug();
   REQUIRE(running.becomes(0, Fault::no_answer));
-  CHECK(peer::eventually([&] { return !running.source.health().connected; }));
+  CHECK(peer::eventually([&] { return !running.source->health().connected; }));
   line.plug_in();
   CHECK(running.becomes(0, 1000.0));
 }
@@ -273,11 +272,11 @@ TEST_CASE("stop ends every wait within a second", "[source]") {
   bus.devices = {device_of(1, 0, {0})};
   const bool nobody = GENERATE(false, true);
   if (nobody) bus.line.link = ModbusTcp{"no-such-host.invalid", 502};
-  ModbusSource source(bus);
-  source.start();
+  const std::unique_ptr<SensorSource> source = make_bus_source(bus);
+  source->start();
   std::this_thread::sleep_for(100ms);
   const auto began = peer::steady_clock::now();
-  source.stop();
+  source->stop();
   CHECK(peer::steady_clock::now() - began < 1s);
 }
 
@@ -287,9 +286,9 @@ TEST_CASE("a configuration that cannot work is refused with the device's name", 
   const auto refused = [&good](const std::function<void(ModbusBusConfig&)>& spoil) {
     ModbusBusConfig bus = good;
     spoil(bus);
-    CHECK_THROWS_AS(ModbusSource(bus), DriverError);
+    CHECK_THROWS_AS(make_bus_source(bus), DriverError);
   };
-  CHECK_NOTHROW(ModbusSource(good));
+  CHECK_NOTHROW(make_bus_source(good));
   refused([](auto& bus) { bus.devices[0].unit = 256; });
   refused([](auto& bus) { bus.devices[0].unit = -1; });
   refused([](auto& bus) { bus.devices[0].period_s = 0.0; });

@@ -9,6 +9,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "../temp_folder.hpp"
 #include "config/model/model_file.hpp"
 #include "estimator/model/displacement_model.hpp"
 #include "simulator/plant/plant.hpp"
@@ -228,16 +229,6 @@ name = "z_um"
 row = [3.0, -2.0]
 )";
 
-struct TemporaryFolder {
-  TemporaryFolder() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "thermocomp_XXXXXX").string();
-    REQUIRE(::mkdtemp(pattern.data()) != nullptr);
-    path = pattern;
-  }
-  ~TemporaryFolder() { std::filesystem::remove_all(path); }
-  std::filesystem::path path;
-};
-
 /// A machine whose body is in a file beside its own.
 std::string machine_text(const std::string& more) {
   return R"(format = 1
@@ -259,10 +250,10 @@ mean_degC = 20.0
 }
 
 std::string problems_of_machine(const std::string& text, const std::string& body) {
-  const TemporaryFolder folder_of_body;
-  std::ofstream(folder_of_body.path / "body.toml") << body;
+  const thermocomp::testing::TempFolder folder_of_body;
+  std::ofstream(folder_of_body.path() / "body.toml") << body;
   try {
-    static_cast<void>(parse_machine(text, (folder_of_body.path / "machine.toml").string()));
+    static_cast<void>(parse_machine(text, (folder_of_body.path() / "machine.toml").string()));
   } catch (const ConfigurationError& error) {
     return error.what();
   }
@@ -272,10 +263,10 @@ std::string problems_of_machine(const std::string& text, const std::string& body
 }  // namespace
 
 TEST_CASE("a machine with a body of its own warms as its states say") {
-  const TemporaryFolder folder_of_body;
-  std::ofstream(folder_of_body.path / "body.toml") << body_text;
+  const thermocomp::testing::TempFolder folder_of_body;
+  std::ofstream(folder_of_body.path() / "body.toml") << body_text;
   const MachineConfig machine =
-      parse_machine(machine_text(""), (folder_of_body.path / "machine.toml").string());
+      parse_machine(machine_text(""), (folder_of_body.path() / "machine.toml").string());
   Plant plant(*machine.plant, 1);
   CHECK(plant.thermocouple_degC(0) == Approx(20.0));
   CHECK(plant.displacement_um(0) == Approx(0.0).margin(1e-12));
