@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "config/runs/run_file.hpp"
-#include "modelling/inspection/inspection.hpp"
+#include "modelling/inspection/finding.hpp"
 #include "modelling/inspection/recording.hpp"
 
 namespace thermocomp::inspection {

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "modelling/inspection/checks.hpp"
+#include "modelling/inspection/inspection.hpp"
 
 namespace thermocomp::inspection {
 namespace {
