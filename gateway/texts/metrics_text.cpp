@@ -72,29 +72,25 @@ class MetricsWriter {
   std::string text_;
 };
 
-/// A family of one sample.
-void write_counter(MetricsWriter& out, const char* name, const char* help, std::uint64_t value) {
-  out.counter(name, help);
-  out.count(value);
-}
-void write_gauge(MetricsWriter& out, const char* name, const char* help, double value) {
-  out.gauge(name, help);
-  out.sample(value);
-}
-
 void write_gateway(MetricsWriter& out, const GatewayFigures& figures) {
   out.gauge("thermocomp_gateway_pages", "Open pages.");
   out.count(figures.pages);
-  write_counter(out, "thermocomp_gateway_requests_total", "HTTP requests answered.",
-                figures.requests);
-  write_counter(out, "thermocomp_gateway_refused_requests_total",
-                "HTTP requests refused by a rule.", figures.refused);
+  out.counter("thermocomp_gateway_requests_total", "HTTP requests answered.");
+  out.count(figures.requests);
+  out.counter("thermocomp_gateway_refused_requests_total", "HTTP requests refused by a rule.");
+  out.count(figures.refused);
   if (!figures.mqtt_enabled) return;
   out.gauge("thermocomp_gateway_mqtt_connected", "1: the MQTT broker is connected.");
   out.flag(figures.mqtt_connected);
-  write_counter(out, "thermocomp_gateway_mqtt_dropped_total",
-                "MQTT messages that were dropped, the oldest first, while the broker was away.",
-                figures.mqtt_dropped);
+  out.counter("thermocomp_gateway_mqtt_dropped_total",
+              "MQTT messages that were dropped, the oldest first, while the broker was away.");
+  out.count(figures.mqtt_dropped);
+}
+
+/// A family of one sample.
+void write_gauge(MetricsWriter& out, const char* name, const char* help, double value) {
+  out.gauge(name, help);
+  out.sample(value);
 }
 
 void write_state(MetricsWriter& out, const Status& status) {
@@ -120,9 +116,10 @@ void write_state(MetricsWriter& out, const Status& status) {
 }
 
 void write_cycle(MetricsWriter& out, const CycleStatus& cycle) {
-  write_counter(out, "thermocomp_cycles_total", "Cycles since the daemon's start.", cycle.count);
-  write_counter(out, "thermocomp_cycles_missed_total",
-                "Cycles that were skipped because one was late.", cycle.missed);
+  out.counter("thermocomp_cycles_total", "Cycles since the daemon's start.");
+  out.count(cycle.count);
+  out.counter("thermocomp_cycles_missed_total", "Cycles that were skipped because one was late.");
+  out.count(cycle.missed);
   out.gauge("thermocomp_cycle_lateness_seconds", "Lateness of the cycle since the start.");
   out.sample(s_per_us * cycle.lateness_us_p50, {{"share", "0.5"}});
   out.sample(s_per_us * cycle.lateness_us_p99, {{"share", "0.99"}});
@@ -186,21 +183,16 @@ void write_sensors(MetricsWriter& out, const std::vector<SensorStatus>& sensors)
     for (const SensorStatus& sensor : sensors)
       out.sample(figure(sensor), {{"sensor", sensor.name}, {"block", blocks_of(sensor)}});
   };
-  const auto gauge = [&](const char* name, const char* help,
-                         double (*figure)(const SensorStatus&)) {
-    out.gauge(name, help);
-    each(figure);
-  };
-  gauge("thermocomp_sensor_temperature_celsius", "Temperature, smoothed.",
-        [](const SensorStatus& sensor) { return sensor.smoothed_degC; });
-  gauge("thermocomp_sensor_raw_temperature_celsius", "Temperature as read.",
-        [](const SensorStatus& sensor) { return sensor.raw_degC; });
-  gauge("thermocomp_sensor_good", "1: the sensor has no fault.",
-        [](const SensorStatus& sensor) { return sensor.fault == Fault::none ? 1.0 : 0.0; });
-  gauge("thermocomp_sensor_suspected", "1: the sensor drifts away from its neighbours.",
-        [](const SensorStatus& sensor) { return sensor.suspected ? 1.0 : 0.0; });
-  gauge("thermocomp_sensor_age_seconds", "Age of the sensor's last reading.",
-        [](const SensorStatus& sensor) { return sensor.age_s; });
+  out.gauge("thermocomp_sensor_temperature_celsius", "Temperature, smoothed.");
+  each([](const SensorStatus& sensor) { return sensor.smoothed_degC; });
+  out.gauge("thermocomp_sensor_raw_temperature_celsius", "Temperature as read.");
+  each([](const SensorStatus& sensor) { return sensor.raw_degC; });
+  out.gauge("thermocomp_sensor_good", "1: the sensor has no fault.");
+  each([](const SensorStatus& sensor) { return sensor.fault == Fault::none ? 1.0 : 0.0; });
+  out.gauge("thermocomp_sensor_suspected", "1: the sensor drifts away from its neighbours.");
+  each([](const SensorStatus& sensor) { return sensor.suspected ? 1.0 : 0.0; });
+  out.gauge("thermocomp_sensor_age_seconds", "Age of the sensor's last reading.");
+  each([](const SensorStatus& sensor) { return sensor.age_s; });
   out.counter("thermocomp_sensor_rejected_total", "Readings that cannot be true.");
   each([](const SensorStatus& sensor) { return static_cast<double>(sensor.rejected); });
 }
@@ -264,8 +256,8 @@ void write_rest(MetricsWriter& out, const Status& status) {
   write_gauge(out, "thermocomp_history_working", "1: the history is written.", history.working);
   write_gauge(out, "thermocomp_history_size_bytes", "Size of the history.",
               bytes_per_MB_decimal * history.size_MB);
-  write_counter(out, "thermocomp_history_lost_records_total", "Records that could not be written.",
-                history.lost_records);
+  out.counter("thermocomp_history_lost_records_total", "Records that could not be written.");
+  out.count(history.lost_records);
 }
 
 }  // namespace
