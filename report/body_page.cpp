@@ -53,7 +53,8 @@ json state_json(const BodyState& state) {
           {"time_s", state.time_s},
           {"input", state.input},
           {"rise_K", numbers(state.rise_K)},
-          {"moved_um", numbers(state.moved_um)}};
+          {"moved_um", numbers(state.moved_um)},
+          {"outputs_um", numbers(state.outputs_um)}};
 }
 
 /// For an element <script>: nothing in it ends the element.
@@ -75,6 +76,7 @@ std::string body_page(const BodyPicture& picture) {
                {"note", picture.note},
                {"nodes_mm", numbers(picture.nodes_mm)},
                {"triangles", picture.triangles},
+               {"outputs", picture.outputs},
                {"states", json::array()},
                {"points", json::array()}};
   for (const BodyState& state : picture.states) data["states"].push_back(state_json(state));

@@ -12,12 +12,13 @@ namespace thermocomp {
 
 /// Temperature and displacement of every node of the surface at a moment.
 struct BodyState {
-  std::string group;             ///< states of one group are shown in their order: a load case
-  std::string name;              ///< of the group's states where they differ by more than time
-  double time_s{0.0};            ///< NaN: the state has no time
-  std::string input;             ///< of the model, where that is 1 K warm and all else as it was
-  std::vector<double> rise_K;    ///< shape (nodes)
-  std::vector<double> moved_um;  ///< shape (3 nodes)
+  std::string group;               ///< states of one group are shown in their order: a load case
+  std::string name;                ///< of the group's states where they differ by more than time
+  double time_s{0.0};              ///< NaN: the state has no time
+  std::string input;               ///< of the model, where that is 1 K warm and all else as it was
+  std::vector<double> rise_K;      ///< shape (nodes)
+  std::vector<double> moved_um;    ///< shape (3 nodes)
+  std::vector<double> outputs_um;  ///< tool against work, one an output of the picture
 };
 
 struct BodyPoint {
@@ -32,6 +33,7 @@ struct BodyPicture {
   std::vector<double> nodes_mm;  ///< shape (3 nodes)
   /// Numbers of nodes, counterclockwise as seen from outside; shape (3 triangles).
   std::vector<std::uint32_t> triangles;
+  std::vector<std::string> outputs;
   std::vector<BodyState> states;
   std::vector<BodyPoint> points;
 };

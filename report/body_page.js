@@ -225,6 +225,8 @@ function draw(state) {
     at.set(...['x', 'y', 'z'].map((axis, k) => rest[axis] + 1e-3 * factor * state.moved_um[3 * node + k]));
   dimHidden();
   place('when').textContent = state.time_s === null ? state.name : state.name + ' after ' + timeText(state.time_s);
+  place('outputs').textContent = body.outputs.length === 0 ? '' : 'tool against work: ' + body.outputs.map(
+    (name, i) => name.replace(/_[a-z]+$/, '') + ' ' + state.outputs_um[i].toFixed(1) + (name.endsWith('_urad') ? ' \u00b5rad' : ' \u00b5m')).join(', ');
   render();
 }
 
@@ -248,7 +250,8 @@ function choose() {
 // What moves is linear in the temperatures of the model's inputs, so the machine's own state is the sum
 // of the shapes with one input 1 K warm, each times that input's rise since the reference.
 function sumOf(inputs) {
-  const state = {name: 'now', time_s: null, rise_K: new Float32Array(count), moved_um: new Float32Array(3 * count)};
+  const state = {name: 'now', time_s: null, rise_K: new Float32Array(count), moved_um: new Float32Array(3 * count),
+                 outputs_um: body.outputs.map(() => 0)};
   const lost = [];
   for (const shape of oneWarm) {
     const input = inputs.find(each => each.name === shape.input);
@@ -259,6 +262,7 @@ function sumOf(inputs) {
     }
     for (let i = 0; i < count; ++i) state.rise_K[i] += rise_K * shape.rise_K[i];
     for (let i = 0; i < 3 * count; ++i) state.moved_um[i] += rise_K * shape.moved_um[i];
+    body.outputs.forEach((_, i) => { state.outputs_um[i] += rise_K * shape.outputs_um[i]; });
   }
   if (lost.length) state.name = 'now, without ' + lost.join(', ') + ' (not known)';
   return state;

@@ -193,6 +193,9 @@ void tell_next(const InitDraft& draft, const std::string& file) {
             << "  thermocomp check " << file << "\n"
             << "  " << (is_own ? "thermocompd " + file : "systemctl start thermocompd") << "\n"
             << "  " << tool << " sensors     # warm each sensor by hand: its line must move\n";
+  if (draft.controller.kind == "linuxcnc")
+    std::cout
+        << "  thermocomp-linuxcnc hal --help     # the lines for LinuxCNC (docs/linuxcnc.md)\n";
   const bool is_dry = draft.controller.dry_run && draft.controller.kind != "dry_run";
   const std::string_view model =
       draft.model_inputs.empty()
@@ -202,7 +205,7 @@ void tell_next(const InitDraft& draft, const std::string& file) {
     std::cout << model << "then, to let it move an axis:\n"
               << "  " << tool << " disable\n"
               << "  dry_run = false in " << file << ", start it anew\n";
-  if (draft.controller.is_modbus())
+  if (draft.controller.kind != "dry_run")
     std::cout << "  " << tool << " prove " << draft.axes.front()
               << " 5   # with an indicator, every axis\n";
   if (!is_dry) std::cout << model;

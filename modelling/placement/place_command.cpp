@@ -44,7 +44,7 @@ void write_pictures(const Options& options, const structure::StructureSpec& spec
       for (const double value_m : displacement_m) moved.values.push_back(1e6 * value_m);
       values.push_back({load_case + "_" + number_text(field.time_s) + "s_K", 1, field.rise_K});
       values.push_back(std::move(moved));
-      picture.add_state({load_case, load_case, field.time_s, "", {}, {}}, field.rise_K,
+      picture.add_state({load_case, load_case, field.time_s, "", {}, {}, {}}, field.rise_K,
                         displacement_m);
     }
   }

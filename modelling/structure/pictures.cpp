@@ -263,10 +263,10 @@ std::string vtu_file(const Structure& structure, const std::vector<NodeValues>& 
 }
 
 std::vector<std::size_t> moments(std::size_t first, std::size_t last) {
-  constexpr std::size_t most = 24;
-  const std::size_t count = std::min(most, last - first);
-  std::vector<std::size_t> chosen;
-  for (std::size_t i = 1; i <= count; ++i) chosen.push_back(first + (last - first) * i / count);
+  constexpr std::size_t steps_max = 24;
+  const std::size_t steps = std::min(steps_max, last - first);
+  std::vector<std::size_t> chosen{first};
+  for (std::size_t i = 1; i <= steps; ++i) chosen.push_back(first + (last - first) * i / steps);
   return chosen;
 }
 
@@ -289,9 +289,13 @@ SurfacePicture::SurfacePicture(const StructureSpec& spec, const Structure& struc
   for (const Index node : nodes_)
     for (const double value_m : structure.mesh.nodes_m[node])
       picture_.nodes_mm.push_back(1e3 * value_m);
-  for (const OutputSpec& output : spec.outputs)
+  for (const OutputSpec& output : spec.outputs) {
+    rows_.push_back(structure.rows[picture_.outputs.size()]);
+    picture_.outputs.push_back(output.name);
     for (const PlaceSpec& place : output.places)
-      for (const Vec3& at_m : place.at_m) add_point(output.name, false, at_m);
+      for (const Vec3& at_m : place.at_m)
+        add_point((place.sign > 0.0 ? "tool, " : "work, ") + output.name, false, at_m);
+  }
   for (const SensorSpec& sensor : spec.sensors) add_sensor(sensor.name, sensor.place.at_m.front());
 }
 
@@ -302,6 +306,7 @@ void SurfacePicture::add_state(BodyState state, std::span<const double> rise_K,
     for (std::size_t c = 0; c < 3; ++c)
       state.moved_um.push_back(1e6 * displacement_m[3 * std::size_t{node} + c]);
   }
+  for (const Functional& row : rows_) state.outputs_um.push_back(1e6 * row.of(displacement_m));
   picture_.states.push_back(std::move(state));
 }
 
@@ -323,7 +328,7 @@ void SurfacePicture::add_point(const std::string& name, bool is_sensor, const Ve
   const BodyPoint point{name, is_sensor, {1e3 * at_m[0], 1e3 * at_m[1], 1e3 * at_m[2]}};
   for (BodyPoint& known : picture_.points) {
     if (is_sensor || known.is_sensor || known.at_mm != point.at_mm) continue;
-    if (known.name != name) known.name += ", " + name;
+    if (known.name != name) known.name += name.substr(name.find(','));
     return;
   }
   picture_.points.push_back(point);

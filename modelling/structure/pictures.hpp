@@ -33,8 +33,8 @@ struct NodeValues {
 [[nodiscard]] std::string svg_picture(const Structure& structure,
                                       const std::vector<BlockShape>& shapes);
 
-/// Up to 24 of the numbers from first + 1 to last, evenly, last among them: a page with so many
-/// moments of some thousand nodes stays below ten megabytes.
+/// Up to 25 of the numbers from first to last, evenly, both among them: a page with so many moments
+/// of some thousand nodes stays below ten megabytes.
 [[nodiscard]] std::vector<std::size_t> moments(std::size_t first, std::size_t last);
 
 /// A page of the structure's surface, with the sensors of its file and the points of its outputs.
@@ -57,7 +57,8 @@ class SurfacePicture {
   void add_point(const std::string& name, bool is_sensor, const Vec3& at_m);
 
   BodyPicture picture_;
-  std::vector<Index> nodes_;  ///< of the mesh, in the picture's order
+  std::vector<Functional> rows_;  ///< one an output
+  std::vector<Index> nodes_;      ///< of the mesh, in the picture's order
 };
 
 }  // namespace thermocomp::structure

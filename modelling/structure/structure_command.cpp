@@ -84,6 +84,7 @@ std::vector<BlockShape> block_shapes(const Structure& structure, const Statics& 
 /// Moments of a run: the blocks' shapes, each times its rise since the run's first row.
 void add_run(const RunFile& run, const ThermalModel& model, const Structure& structure,
              const std::vector<BlockShape>& shapes, SurfacePicture& picture) {
+  const std::string name = std::filesystem::path(run.name).stem().string();
   const ModelInputs inputs = model_inputs(model, run);
   if (inputs.rows.size() < 2)
     throw ConfigurationError({{run.name, 0, "", "", "must have two rows with every block"}});
@@ -100,10 +101,12 @@ void add_run(const RunFile& run, const ThermalModel& model, const Structure& str
     }
     for (std::size_t node = 0; node < rise_K.size(); ++node)
       rise_K[node] = block_K[structure.block_of_node[node]];
-    const std::string name = std::filesystem::path(run.name).stem().string();
     const double time_s = run.time_s()[row] - run.time_s()[inputs.rows.front()];
-    picture.add_state({name, name, time_s, "", {}, {}}, rise_K, displacement_m);
+    picture.add_state({name, name, time_s, "", {}, {}, {}}, rise_K, displacement_m);
   }
+  picture.set_title(name + ": what warming did to the machine",
+                    "Without compensation, counted from the first row; by the temperatures of the "
+                    "model's blocks.");
 }
 
 std::string page_of(const Options& options, const StructureSpec& spec, const ThermalModel& model,

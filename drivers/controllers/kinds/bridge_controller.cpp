@@ -26,7 +26,8 @@ BridgeController::BridgeController(const BridgeControllerConfig& config, Now now
           config.silent_after_s, "must be finite and more than 0");
   health_.name = config_.name;
   health_.kind = "linuxcnc";
-  health_.last_error = "no bridge has reported yet";
+  health_.last_error =
+      "no bridge has reported yet: LinuxCNC starts thermocomp-linuxcnc by its HAL file";
 }
 
 void BridgeController::newest(ControllerState& state) noexcept {

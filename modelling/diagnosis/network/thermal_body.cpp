@@ -28,7 +28,8 @@ struct ThermalBody::Parts {
       for (std::size_t node = 0; node < rise_K.size(); ++node)
         rise_K[node] +=
             amplitudes[static_cast<Eigen::Index>(state)] * reduction.fields[state][node];
-    picture.add_state({group, group, time_s, "", {}, {}}, rise_K, statics.displacement_m(rise_K));
+    picture.add_state({group, group, time_s, "", {}, {}, {}}, rise_K,
+                      statics.displacement_m(rise_K));
   }
 };
 

@@ -3,6 +3,7 @@
 import importlib.util
 import json
 import pathlib
+import re
 import shutil
 import subprocess
 
@@ -120,11 +121,15 @@ def test_the_page_needs_nothing_else(page, browser):
     # 600 mm of column expand by 6.6 um, and carry the spindle.
     assert 6.0 < float(text(browser, "high").split()[0]) < 7.2, text(browser, "high")
     assert colours_drawn(browser) > 20
-    assert "z_um at 100, 100, 800 mm" in text(browser, "points")
+    assert "tool, z_um at 100, 100, 800 mm" in text(browser, "points")
     choose(browser, "group", "monday")
     assert text(browser, "when") == "monday after 2.00 h"
     # 600 mm by 4 K and 200 mm by 10 K are 48 um.
     assert 44.0 < float(text(browser, "high").split()[0]) < 51.0, text(browser, "high")
+    moved_um = re.match(r"tool against work: z (\S+) µm$", text(browser, "outputs"))
+    assert 44.0 < float(moved_um[1]) < 51.0, text(browser, "outputs")
+    browser.execute_script("place('time').value = 0; drawChosen()")
+    assert text(browser, "when") == "monday after 0.0 min" and "z 0.0 µm" in text(browser, "outputs")
     choose(browser, "quantity", "rise")
     assert text(browser, "high") == "10.0 K"
 
