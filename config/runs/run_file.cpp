@@ -348,6 +348,15 @@ std::string sheet_of(const std::filesystem::path& path) {
 
 }  // namespace
 
+std::string selected_name(const RunFile& run) {
+  if (run.selected_begin == 0 && run.selected_end == run.rows()) return run.name;
+  const std::vector<double>& time_s = run.time_s();
+  const auto bound = [&](std::size_t row) {
+    return row == 0 || row >= run.rows() ? "" : number_text(time_s[row]);
+  };
+  return run.name + "@" + bound(run.selected_begin) + ":" + bound(run.selected_end);
+}
+
 RunFile parse_run(std::string_view text, const std::string& name, const RunSelection& selection,
                   const ColumnMap* map) {
   constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";

@@ -26,6 +26,9 @@ struct RunSelection {
 /// @throws ConfigurationError when a bound is not a number or T0 < T1 does not hold
 [[nodiscard]] RunSelection parse_selection(std::string_view argument);
 
+/// The file, with `@T0:T1` where not all of its rows are selected; parse_selection() reads it back.
+[[nodiscard]] std::string selected_name(const RunFile& run);
+
 /// At least one row; time_s present and strictly increasing. A selection without rows is refused.
 /// @param map  what a person said about files of other forms; nullptr: nothing. A file of our own
 ///             form of which it names no column is read without it.

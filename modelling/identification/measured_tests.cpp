@@ -164,7 +164,7 @@ TestRun make_run(const RunFile& run, const std::vector<std::string>& places,
   if (complete < rows_min)
     refuse(run.name, "", "has fewer than 3 selected rows in which no value is missing");
   TestRun test;
-  test.name = run.name;
+  test.name = selected_name(run);
   test.begin = static_cast<Eigen::Index>(begin);
   const auto count = static_cast<Eigen::Index>(rows.size());
   test.time_s.resize(count);

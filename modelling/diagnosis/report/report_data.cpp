@@ -2,6 +2,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "config/runs/run_file.hpp"
 #include "config/text/units.hpp"
 #include "modelling/diagnosis/data/series.hpp"
 #include "modelling/diagnosis/report/diagnosis_report.hpp"
@@ -115,15 +116,16 @@ std::vector<std::size_t> named_others(const Diagnosis& diagnosis, const Measured
   return named;
 }
 
-/// "/data/friday.csv@0:3600": "friday.csv"
-std::string file_of(const std::string& run) {
-  return std::filesystem::path(run.substr(0, run.find('@'))).filename().string();
-}
-
+/// Whether the model was made from rows of the run. The folder may have changed since.
 bool is_of_the_model(const ThermalModel& model, const std::string& run) {
-  return model.made_from &&
-         std::any_of(model.made_from->runs.begin(), model.made_from->runs.end(),
-                     [&](const std::string& each) { return file_of(each) == file_of(run); });
+  if (!model.made_from) return false;
+  const RunSelection of = parse_selection(run);
+  return std::any_of(model.made_from->runs.begin(), model.made_from->runs.end(),
+                     [&](const std::string& each) {
+                       const RunSelection known = parse_selection(each);
+                       return known.file.filename() == of.file.filename() &&
+                              known.from_s < of.to_s && of.from_s < known.to_s;
+                     });
 }
 
 }  // namespace

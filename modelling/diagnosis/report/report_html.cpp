@@ -366,8 +366,8 @@ std::string fitted_text(const ReportData& report) {
   for (const ReportRun& run : report.runs)
     if (run.test && run.of_the_model) names += (names.empty() ? "" : ", ") + run.name;
   if (names.empty()) return "";
-  return html_paragraph("The model was fitted to " + names +
-                        ": the error there says little of other days. Take a test run that "
+  return html_paragraph("The model was fitted to rows of " + names +
+                        "; the error there says little of other days. Take a test run that "
                         "[made_from].runs of the model does not name.");
 }
 

@@ -189,6 +189,9 @@ TEST_CASE("a selection is a half-open interval of time, and the run stays whole"
   const auto selected = [](const std::string& argument) {
     const RunFile run = parse_run(good, "run.csv", parse_selection(argument));
     CHECK(run.rows() == 3);
+    const RunFile again = parse_run(good, "run.csv", parse_selection(selected_name(run)));
+    CHECK(again.selected_begin == run.selected_begin);
+    CHECK(again.selected_end == run.selected_end);
     return std::pair(run.selected_begin, run.selected_end);
   };
   CHECK(selected("run.csv") == std::pair<std::size_t, std::size_t>(0, 3));

@@ -234,23 +234,26 @@ TEST_CASE("a test run that the model was fitted to is not called unseen", "[diag
   data.runs.front().of_the_model = true;
   const std::string html = report_html(none(), data);
   CHECK_FALSE(has(html, "nothing was fitted to these rows"));
-  CHECK(has(html, "The model was fitted to " + xml_text(rude)));
+  CHECK(has(html, "The model was fitted to rows of " + xml_text(rude)));
   MeasuredData measured;
   measured.model.outputs = {"z_um"};
   measured.model.made_from = MadeFrom{};
   measured.model.made_from->runs = {"days/friday.csv@0:3600"};
-  for (const char* name : {"friday.csv", "monday.csv"}) {
+  for (const char* name : {"friday.csv", "monday.csv", "friday.csv@3600:", "friday.csv@3000:"}) {
     MeasuredRun run;
     run.name = name;
     run.time_s = Column::LinSpaced(rows, 0.0, 60.0 * (rows - 1));
     run.measured_um = {wave(20.0, 0.02)};
     measured.runs.push_back(run);
   }
-  const std::vector<Residuals> left{{{wave(1.0, 0.1), wave(1.0, 0.1)}}};
+  const std::vector<Residuals> left{
+      {{wave(1.0, 0.1), wave(1.0, 0.1), wave(1.0, 0.1), wave(1.0, 0.1)}}};
   ReportData read;
   add_runs(read, none(), measured, left, left, true);
   CHECK(read.runs[0].of_the_model);
   CHECK_FALSE(read.runs[1].of_the_model);
+  CHECK_FALSE(read.runs[2].of_the_model);  // other rows of the same file
+  CHECK(read.runs[3].of_the_model);
 }
 
 TEST_CASE("nothing is to be done where nothing is worth saying", "[diagnosis][report]") {
