@@ -98,7 +98,7 @@ void print(const Diagnosis& diagnosis) {
           output.c_str(), 100 * figures.headroom->noise, 100 * figures.headroom->named,
           100 * figures.headroom->predictable, 100 * figures.headroom->not_recorded);
   for (const auto& [output, figures] : diagnosis.outputs)
-    std::printf("%s: RMS train %.3f, test %.3f, extended %.3f; unexplained %.0f %%\n",
+    std::printf("%s: RMS train %.3f, test %.3f, extended %.3f; without a name %.0f %%\n",
                 output.c_str(), figures.train_rms_um, figures.test_rms_um,
                 figures.extended_test_rms_um, 100 * figures.unexplained_fraction);
 }
