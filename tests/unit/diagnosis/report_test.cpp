@@ -7,6 +7,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "modelling/diagnosis/causes/cause.hpp"
 #include "modelling/diagnosis/report/diagnosis_report.hpp"
 #include "report/svg_plot.hpp"
 
@@ -318,28 +319,8 @@ TEST_CASE("only what has the unit of a speed is called one", "[diagnosis][report
 }
 
 TEST_CASE("every cause that can be named has words of its own", "[diagnosis][report]") {
-  for (const char* cause : {"thermal_lag",
-                            "slow_sensor",
-                            "time_shift",
-                            "missing_heat_source",
-                            "speed_growth",
-                            "missing_temperature",
-                            "wrong_coefficient",
-                            "nonlinear_expansion",
-                            "position_dependence",
-                            "hysteresis",
-                            "periodic_disturbance",
-                            "displacement_step",
-                            "displacement_drift",
-                            "sensor_drift",
-                            "sensor_step",
-                            "sensor_loose",
-                            "sensor_swap",
-                            "wrong_heat_source",
-                            "wrong_film_coefficient",
-                            "wrong_conductance",
-                            "wrong_heat_capacity",
-                            "wrong_ambient"}) {
+  for (const Cause& each : all_causes()) {
+    const std::string& cause = each.name;
     const NamedFinding finding{cause, "spindle_rpm", {}, {}, {}, {}, {}, {}};
     CAPTURE(cause);
     CHECK_FALSE(what_to_do(finding).empty());
