@@ -225,7 +225,7 @@ function draw(state) {
     at.set(...['x', 'y', 'z'].map((axis, k) => rest[axis] + 1e-3 * factor * state.moved_um[3 * node + k]));
   dimHidden();
   place('when').textContent = state.time_s === null ? state.name : state.name + ' after ' + timeText(state.time_s);
-  place('outputs').textContent = body.outputs.length === 0 ? '' : 'tool against work: ' + body.outputs.map(
+  place('outputs').textContent = state.outputs_um.length === 0 ? '' : 'tool against work: ' + body.outputs.map(
     (name, i) => name.replace(/_[a-z]+$/, '') + ' ' + state.outputs_um[i].toFixed(1) + (name.endsWith('_urad') ? ' \u00b5rad' : ' \u00b5m')).join(', ');
   render();
 }
@@ -256,7 +256,8 @@ function sumOf(inputs) {
   for (const shape of oneWarm) {
     const input = inputs.find(each => each.name === shape.input);
     const rise_K = input ? input.temp_degC - input.reference_degC : NaN;
-    if (!input || input.temp_degC === null || input.reference_degC === null || !isFinite(rise_K)) {
+    // An input without a good sensor keeps its last temperature, which is not that of now.
+    if (!input || !(input.good || input.estimated) || input.reference_degC === null || !isFinite(rise_K)) {
       lost.push(shape.input);
       continue;
     }
@@ -264,7 +265,10 @@ function sumOf(inputs) {
     for (let i = 0; i < 3 * count; ++i) state.moved_um[i] += rise_K * shape.moved_um[i];
     body.outputs.forEach((_, i) => { state.outputs_um[i] += rise_K * shape.outputs_um[i]; });
   }
-  if (lost.length) state.name = 'now, without ' + lost.join(', ') + ' (not known)';
+  if (lost.length) {
+    state.name = 'now, without ' + lost.join(', ') + ' (not known)';
+    state.outputs_um = [];  // a part of the sum says nothing of the tool
+  }
   return state;
 }
 

@@ -60,8 +60,7 @@ struct PlotPanel {
 /// Panels one above the other over time (in h, min or s), with ticks, grid and units. Of long
 /// columns the lowest and the highest value of each stretch are drawn, as many as a screen shows
 /// when the picture is made wider.
-/// @param ticks  in order; take the place of numbers. A label stands to the right of its line,
-/// where
+/// @param ticks  in order; take the place of numbers. A label stands to the right of its line where
 ///               there is room before the next one
 [[nodiscard]] std::string panels_plot(std::span<const double> time_s,
                                       const std::vector<PlotPanel>& panels,

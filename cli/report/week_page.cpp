@@ -58,7 +58,7 @@ std::string summary(const MachineWeek& week) {
 std::string time_table(const MachineWeek& week) {
   std::vector<std::vector<std::string>> rows{{"mode", "time", "share of the whole"}};
   const auto add = [&](const std::string& what, double seconds) {
-    constexpr double told_s_min = 30.0;
+    constexpr double told_s_min = 1.0;
     if (seconds < told_s_min) return;
     rows.push_back(
         {what, duration_text(seconds), figure_text(100.0 * seconds / week.span.length_s()) + " %"});

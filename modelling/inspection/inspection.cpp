@@ -29,7 +29,7 @@ constexpr std::array<Worth, 8> worths{{
 }};
 constexpr double of_plain_facts = 0.99;  // coarse, copy, gap, clock: they stand in the file
 
-/// What a score is worth, by kind; what it was set from is in docs/inspection.md.
+/// Probability of a score, by kind; docs/inspection.md says what the constants were set from.
 double probability_of(const std::string& kind, double score) {
   for (const Worth& worth : worths)
     if (worth.kind == kind)

@@ -33,8 +33,8 @@ struct NodeValues {
 [[nodiscard]] std::string svg_picture(const Structure& structure,
                                       const std::vector<BlockShape>& shapes);
 
-/// Up to 25 of the numbers from first to last, evenly, both among them: a page with so many moments
-/// of some thousand nodes stays below ten megabytes.
+/// Up to 25 of the numbers from first to last, evenly, both among them. A page with 25 moments of
+/// some thousand nodes has less than ten megabytes.
 [[nodiscard]] std::vector<std::size_t> moments(std::size_t first, std::size_t last);
 
 /// A page of the structure's surface, with the sensors of its file and the points of its outputs.

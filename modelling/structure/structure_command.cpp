@@ -81,13 +81,17 @@ std::vector<BlockShape> block_shapes(const Structure& structure, const Statics& 
   return shapes;
 }
 
-/// Moments of a run: the blocks' shapes, each times its rise since the run's first row.
+/// Moments of a run's selected rows: the blocks' shapes, each times its rise since the first row.
 void add_run(const RunFile& run, const ThermalModel& model, const Structure& structure,
              const std::vector<BlockShape>& shapes, SurfacePicture& picture) {
   const std::string name = std::filesystem::path(run.name).stem().string();
-  const ModelInputs inputs = model_inputs(model, run);
+  ModelInputs inputs = model_inputs(model, run);
+  std::erase_if(inputs.rows, [&](std::size_t row) {
+    return row < run.selected_begin || row >= run.selected_end;
+  });
   if (inputs.rows.size() < 2)
-    throw ConfigurationError({{run.name, 0, "", "", "must have two rows with every block"}});
+    throw ConfigurationError(
+        {{run.name, 0, "", "", "must have two rows, of those selected, with every block"}});
   for (const std::size_t moment : moments(0, inputs.rows.size() - 1)) {
     const std::size_t row = inputs.rows[moment];
     std::vector<double> rise_K(structure.mesh.nodes_m.size(), 0.0);
@@ -104,9 +108,10 @@ void add_run(const RunFile& run, const ThermalModel& model, const Structure& str
     const double time_s = run.time_s()[row] - run.time_s()[inputs.rows.front()];
     picture.add_state({name, name, time_s, "", {}, {}, {}}, rise_K, displacement_m);
   }
-  picture.set_title(name + ": what warming did to the machine",
-                    "Without compensation, counted from the first row; by the temperatures of the "
-                    "model's blocks.");
+  picture.set_title(
+      name + ": what warming did to the machine",
+      "The run is shown without compensation, since its first row, by the temperatures "
+      "of the model's blocks.");
 }
 
 std::string page_of(const Options& options, const StructureSpec& spec, const ThermalModel& model,
@@ -184,9 +189,10 @@ void add_structure_command(CLI::App& app, std::function<int()>& action) {
   sub->add_option("--picture", options->picture, "the same as a picture (SVG)");
   sub->add_option("--page", options->page,
                   "the same in three dimensions, for a browser and the gateway (HTML)");
-  sub->add_option("--run", options->run,
-                  "RUN.csv with the blocks' temperatures (thermocomp export): its course is on "
-                  "the page too");
+  sub->add_option(
+      "--run", options->run,
+      "RUN.csv[@T0:T1] with the blocks' temperatures (thermocomp export): its course is on "
+      "the page too");
   sub->add_option(
       "--plant", options->plant,
       "the machine's body for thermocomp-sim: a reduced model of heat and displacement");

@@ -41,7 +41,7 @@ class Means {
 
 /// The later of `from_s` and the beginning of the history, where that is before `to_s`.
 double stretch_from(const HistoryReader& reader, double from_s, double to_s) {
-  constexpr double wander_s = 1.0;  // of the clocks between a segment's start and its first commit
+  constexpr double wander_s = 1.0;  // the clocks may part by so much before the first commit
   double begins_s = to_s;
   for (const SegmentInfo& segment : reader.segments())
     begins_s = std::min(begins_s, 1e-9 * static_cast<double>(segment.wall_ns) - wander_s);

@@ -33,8 +33,8 @@ double motion_of(const MeasuredData& data, std::size_t output) {
 }
 
 constexpr double normal_95 = 1.96;
-/// What a machine does besides is no noise of this fit: a shape parameter's deviation is larger by
-/// this factor. Jumps need none.
+/// A machine also does what no column describes, so a shape parameter errs by this factor more than
+/// its deviation. Jumps need no factor.
 constexpr double wider_on_machines = 4.5;
 /// A gain errs by more than its deviation, and by a share of itself, because the effect is only
 /// nearly of its form. Set so that 93 % of 112 planted gains are held (seeds of

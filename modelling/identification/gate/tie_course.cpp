@@ -180,7 +180,7 @@ class Search {
   }
 
  private:
-  /// What cannot be chosen is at its only value, even where the drawing has another.
+  /// A height or area that has one value gets it, even where the drawing has another.
   static TiedColumns bounded(const GateFile& file) {
     TiedColumns columns = file.columns;
     for (std::size_t i = 0; i < columns.ties.size(); ++i) {

@@ -63,9 +63,9 @@ tool = { part = "spindle", at_mm = [100, 100, 800] }
 """
 
 
-# Two hours: the column warms by 4 K, the spindle by 10 K; a reading is missing.
+# In the first two of three hours the column warms by 4 K, the spindle by 10 K; a reading is missing.
 COURSE = "time_s,column_degC,spindle_degC\n" + "".join(
-    f"{60 * row},{20 + 4 * row / 120},{'' if row == 60 else 20 + 10 * row / 120}\n" for row in range(121))
+    f"{60 * row},{20 + 4 * row / 120},{'' if row == 60 else 20 + 10 * row / 120}\n" for row in range(181))
 
 
 @pytest.fixture
@@ -73,7 +73,7 @@ def page(tmp_path):
     (tmp_path / "small.toml").write_text(STRUCTURE)
     (tmp_path / "monday.csv").write_text(COURSE)
     made = subprocess.run([MODELLING, "structure", "small.toml", "-o", "model.toml", "--page", "body.html",
-                           "--run", "monday.csv"], cwd=tmp_path, capture_output=True, text=True)
+                           "--run", "monday.csv@0:7201"], cwd=tmp_path, capture_output=True, text=True)
     assert made.returncode == 0, made.stderr
     return tmp_path / "body.html"
 
@@ -148,7 +148,11 @@ def test_behind_the_gateway_it_shows_the_machine_as_it_is_now(page, lab, machine
     rise_K = column["temp_degC"] - column["reference_degC"]
     eventually(lambda: abs(float(text(browser, "high").split()[0]) - rise_K) < 0.02 * rise_K,
                "its hottest place is as warm as the column")
+    assert text(browser, "outputs").startswith("tool against work: z ")
     assert console(browser) == []
+    machine.module.stop()
+    eventually(lambda: "without" in text(browser, "when"), "the inputs are lost")
+    assert text(browser, "outputs") == ""  # a part of the sum says nothing of the tool
     machine.daemon.end()
     eventually(lambda: "old" in text(browser, "when") or "does not answer" in text(browser, "when"),
                "it says that the machine does not answer")
