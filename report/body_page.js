@@ -257,7 +257,8 @@ function sumOf(inputs) {
     const input = inputs.find(each => each.name === shape.input);
     const rise_K = input ? input.temp_degC - input.reference_degC : NaN;
     // An input without a good sensor keeps its last temperature, which is not that of now.
-    if (!input || !(input.good || input.estimated) || input.reference_degC === null || !isFinite(rise_K)) {
+    if (!input || !(input.good || input.estimated) || input.temp_degC === null || input.reference_degC === null ||
+        !isFinite(rise_K)) {
       lost.push(shape.input);
       continue;
     }
