@@ -49,11 +49,14 @@ struct ScanTask {
 /// Of one kind: its file scan_PROTOCOL.cpp. Every channel of the configuration gets the value that
 /// the daemon would have, or why it has none. Only what the daemon itself would send is sent, and
 /// nothing is ever set that the configuration does not set.
-#define THERMOCOMP_DECLARE_SCAN(protocol, Config)                                  \
-  [[nodiscard]] ScanBus scan_bus(const Config& config, const ScanSensors& sensors, \
-                                 const ScanTask& task);
-THERMOCOMP_BUSES(THERMOCOMP_DECLARE_SCAN)
-#undef THERMOCOMP_DECLARE_SCAN
+[[nodiscard]] ScanBus scan_bus(const ModbusBusConfig& config, const ScanSensors& sensors,
+                               const ScanTask& task);
+[[nodiscard]] ScanBus scan_bus(const CanBusConfig& config, const ScanSensors& sensors,
+                               const ScanTask& task);
+[[nodiscard]] ScanBus scan_bus(const CanopenBusConfig& config, const ScanSensors& sensors,
+                               const ScanTask& task);
+[[nodiscard]] ScanBus scan_bus(const J1939BusConfig& config, const ScanSensors& sensors,
+                               const ScanTask& task);
 
 /// Who else has a serial port open.
 struct SerialHolder {

@@ -166,18 +166,17 @@ void BusFiles::note_place(const ChannelTables& tables, const std::string& place)
 }
 
 const std::vector<BusKind>& bus_kinds() {
-#define THERMOCOMP_LIST_KINDS(protocol, Config) add(Config::kinds, #protocol, open_##protocol);
   static const std::vector<BusKind> kinds = [] {
     std::vector<BusKind> all;
-    const auto add = [&all](const auto& names, const char* protocol, OpenBus* open) {
-      std::transform(names.begin(), names.end(), std::back_inserter(all), [&](const char* name) {
-        return BusKind{name, protocol, open};
-      });
+    const auto add = [&all](const char* protocol, const auto& names, OpenBus* open) {
+      for (const char* name : names) all.push_back({name, protocol, open});
     };
-    THERMOCOMP_BUSES(THERMOCOMP_LIST_KINDS)
+    add("modbus", ModbusBusConfig::kinds, open_modbus);
+    add("can", CanBusConfig::kinds, open_can);
+    add("canopen", CanopenBusConfig::kinds, open_canopen);
+    add("j1939", J1939BusConfig::kinds, open_j1939);
     return all;
   }();
-#undef THERMOCOMP_LIST_KINDS
   return kinds;
 }
 

@@ -61,9 +61,7 @@ class BusSection {
 /// Opens the section of a [[bus]] whose keys name, kind are read.
 using OpenBus = std::unique_ptr<BusSection>(const TomlTable& bus, const std::string& name,
                                             const std::string& kind, BusFiles& files);
-#define THERMOCOMP_DECLARE_SECTION(protocol, Config) OpenBus open_##protocol;
-THERMOCOMP_BUSES(THERMOCOMP_DECLARE_SECTION)
-#undef THERMOCOMP_DECLARE_SECTION
+OpenBus open_modbus, open_can, open_canopen, open_j1939;
 
 struct BusKind {
   const char* name;      ///< in the key `kind`

@@ -58,9 +58,9 @@ Preset read_preset(const TomlDocument& document) {
   const TomlTable root = document.root();
   Preset preset{document, "", root.table_or_empty("device"), {}, {}, {}, {}};
   read_source(root);
-#define THERMOCOMP_PROTOCOL(protocol, Config) {#protocol, #protocol},
-  preset.protocol = root.choice<std::string>("protocol", {THERMOCOMP_BUSES(THERMOCOMP_PROTOCOL)});
-#undef THERMOCOMP_PROTOCOL
+  preset.protocol = root.choice<std::string>(
+      "protocol",
+      {{"modbus", "modbus"}, {"can", "can"}, {"canopen", "canopen"}, {"j1939", "j1939"}});
   refuse_all(preset.device, {"name", "bus", "preset", "thermocouple"},
              "belongs into the configuration");
   std::set<std::string> types;

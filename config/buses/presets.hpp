@@ -21,7 +21,7 @@ namespace thermocomp::sections {
 /// One preset that has been read.
 struct Preset {
   TomlDocument document;
-  std::string protocol;                            ///< of THERMOCOMP_BUSES
+  std::string protocol;                            ///< BusKind::protocol
   TomlTable device;                                ///< keys of a [[device]]
   std::map<std::string, TomlTable> thermocouples;  ///< by type; empty: the module itself knows
   std::map<int, TomlTable> channels;               ///< by the number printed on the module

@@ -70,6 +70,10 @@ constexpr Binary binaries[] = {
     {"\x1F\x8B", "is packed: unpack it with gunzip"},
     {"SQLite format 3", "is a database; a history becomes a run file by thermocomp export"},
     {"TDSm", "is LabVIEW's TDMS: save it as LVM or CSV"},
+    {"\x89HDF", "is HDF5 (MATLAB's .mat too): save its table as CSV"},
+    {"MATLAB 5.0", "is a MAT file: save its table as CSV (writetable)"},
+    {"MDF ", "is ASAM's MDF: export its channels as CSV"},
+    {"PAR1", "is Parquet: save its table as CSV"},
     {"%PDF", "is a PDF: the table itself is needed, as CSV"}};
 
 }  // namespace

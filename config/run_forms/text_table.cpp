@@ -153,16 +153,53 @@ class TableReader {
     }
   }
 
+  /// "---------+-------" and "+-----+", as databases' consoles draw.
+  static bool is_rule(std::string_view line) {
+    return line.starts_with("+--") ||
+           (line.starts_with("---") && line.find_first_not_of("-+") == std::string_view::npos);
+  }
+
+  /// What a program writes below the last row.
+  static bool is_end(std::string_view line) {
+    return line == "EOF" ||
+           (line.starts_with('(') && (line.ends_with(" rows)") || line.ends_with(" row)")));
+  }
+
+  /// A name in quotes may go over several lines, as in a spreadsheet's header.
+  std::string_view with_quoted_ends(std::string_view line, std::string_view& rest, int& number) {
+    constexpr int lines_max = 8;
+    const auto is_open = [](std::string_view text) {
+      return std::count(text.begin(), text.end(), '"') % 2 == 1;
+    };
+    std::string_view longer = line;
+    std::string_view behind = rest;
+    for (int more = 1; more <= lines_max && is_open(longer) && !behind.empty(); ++more) {
+      std::string_view next;
+      static_cast<void>(take(behind, '\n', next));
+      longer = {line.data(), static_cast<std::size_t>(next.data() + next.size() - line.data())};
+      if (is_open(longer)) continue;
+      const auto begin = static_cast<std::size_t>(line.data() - table_.text.data());
+      for (std::size_t i = begin; i < begin + longer.size(); ++i)
+        if (table_.text[i] == '\n' || table_.text[i] == '\r') table_.text[i] = ' ';
+      rest = behind;
+      number += more;
+      return longer;
+    }
+    return line;
+  }
+
   void find_lines() {
     std::string_view rest = table_.text;
     std::string_view line;
     for (int number = 1 + lines_above_; !rest.empty(); ++number) {
       static_cast<void>(take(rest, '\n', line));
+      line = with_quoted_ends(line, rest, number);
       if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
       if (map_ != nullptr && number < map_->header_line) continue;
       const bool is_comment = line.starts_with('#');
       if (is_comment && lines_.empty()) last_comment_ = {number, line};
       if (is_comment || line.find_first_not_of(" \t;,|") == std::string_view::npos) continue;
+      if (is_rule(line)) continue;
       // Excel's first line is taken at its word.
       if (lines_.empty() && line.size() == 5 && line.starts_with("sep=")) {
         told_separator_ = line[4];
@@ -170,7 +207,7 @@ class TableReader {
       }
       lines_.push_back({number, line});
     }
-    if (lines_.size() > 2 && lines_.back().text == "EOF") lines_.pop_back();
+    if (lines_.size() > 2 && is_end(lines_.back().text)) lines_.pop_back();
   }
 
   [[nodiscard]] std::size_t judged() const { return std::min(lines_.size(), rows_judged); }
@@ -384,6 +421,11 @@ class TableReader {
     return count >= 2 && count + 1 >= cut_.fields && is_all_words(line);
   }
 
+  static std::string more_lines(std::size_t count) {
+    if (count == 0) return {};
+    return " and " + std::to_string(count) + (count == 1 ? " more line" : " more lines");
+  }
+
   void take_names(std::size_t line) {
     Fields fields = fields_of(line);
     table_.has_header = true;
@@ -401,7 +443,11 @@ class TableReader {
     if (line > 0)
       table_.said.push_back("above the header in line " + std::to_string(table_.header_line) +
                             " left out: '" + shortened(lines_[0].text) + "'" +
-                            (line > 1 ? " and " + std::to_string(line - 1) + " more lines" : ""));
+                            more_lines(line - 1));
+    const std::size_t between = row_begin_ - line - 1 - (table_.units.empty() ? 0 : 1);
+    if (between > 0)
+      table_.said.push_back("between the header and the first row left out: '" +
+                            shortened(lines_[row_begin_ - 1].text) + "'" + more_lines(between - 1));
   }
 
   /// "# time t1 z": names in the last comment above rows without a header.

@@ -179,10 +179,8 @@ class TimeReader {
   bool take_numbers(std::size_t column) {
     for (std::size_t row = 0; row < table_.rows(); ++row) {
       const auto number = number_of(table_.field(row, column), form_);
-      if (!number)
-        refuse(row, row == 0 ? "must be a number or a time of a form that is read; "
-                               "docs/run_files.md lists them"
-                             : "must be a number, as in the rows before");
+      if (!number && row == 0) return refuse_form();
+      if (!number) refuse(row, "must be a number, as in the rows before");
       run_.time_s.push_back(number.value_or(NAN));
     }
     return problems_.empty() && !run_.time_s.empty();
@@ -259,9 +257,11 @@ class TimeReader {
       if (stamp && time_.columns.size() == 2) stamp = joined(row, *stamp);
       if (stamp && stamp->has_date && !stamp->zone_s) stamp->zone_s = zone;
       if (stamp && !stamps.empty() && !alike(*stamp, stamps.front())) stamp.reset();
-      if (!stamp)
-        refuse(row, row == 0 ? "must be a time of a form that is read; docs/run_files.md lists them"
-                             : "must be a time in the form of the rows before");
+      if (!stamp && row == 0) {
+        refuse_form();
+        return;
+      }
+      if (!stamp) refuse(row, "must be a time in the form of the rows before");
       stamps.push_back(stamp.value_or(TimeStamp{}));
     }
     if (!problems_.empty() || stamps.empty() || !clock_is_clear(stamps)) return;
@@ -390,6 +390,12 @@ class TimeReader {
       run_.said +=
           ", seconds after the first row (" + std::string(table_.field(0, time_.columns[0])) + ")";
     }
+  }
+
+  /// By the first row; the others say no more.
+  bool refuse_form() {
+    refuse(0, "must be a number or a time of a form that is read; docs/run_files.md lists them");
+    return false;
   }
 
   void refuse(std::size_t row, std::string rule) {

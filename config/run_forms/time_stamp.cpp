@@ -94,6 +94,11 @@ void find_orders(const std::array<DatePart, 3>& parts, char separator, TimeStamp
   if (year_is(0) && (is_long || separator != '.')) allow(DateOrder::year_month_day, 2, 1, 0);
 }
 
+/// 20260301123000
+bool is_all_digits_of_time(std::string_view text) {
+  return text.size() == 14 && std::all_of(text.begin(), text.end(), is_digit);
+}
+
 /// 2026-03-01, 01.03.2026, 3/1/26, 01-Mar-2026, Mar 1, 2026, 20260301.
 bool take_date(std::string_view& text, TimeStamp& stamp) {
   std::string_view rest = text;
@@ -102,7 +107,8 @@ bool take_date(std::string_view& text, TimeStamp& stamp) {
   char separator = ' ';
   const auto compact = rest.substr(0, 8);
   if (compact.size() == 8 && std::all_of(compact.begin(), compact.end(), is_digit) &&
-      (rest.size() == 8 || std::string_view("T_ -").find(rest[8]) != std::string_view::npos)) {
+      (rest.size() == 8 || is_all_digits_of_time(rest) ||
+       std::string_view("T_ -").find(rest[8]) != std::string_view::npos)) {
     parts[0] = {*take_digits(rest, 4), 4};
     parts[1] = {*take_digits(rest, 2), 2};
     parts[2] = {*take_digits(rest, 2), 2};
@@ -126,7 +132,7 @@ bool take_date(std::string_view& text, TimeStamp& stamp) {
   }
   const bool named = parts[0].digits == 0 || parts[1].digits == 0;
   if ((separator == ' ' && !named) || separator == ',' || parts[2].digits == 0 ||
-      (!rest.empty() && is_digit(rest.front())))
+      (!rest.empty() && is_digit(rest.front()) && !is_all_digits_of_time(text)))
     return false;
   find_orders(parts, separator, stamp);
   if (std::none_of(stamp.allows.begin(), stamp.allows.end(), [](bool each) { return each; }))
@@ -232,6 +238,7 @@ std::optional<TimeStamp> parse_time_stamp(std::string_view text) {
   TimeStamp stamp;
   // No letter of a plain field is the first of a date.
   if (text.size() < 4 || text.size() > 64) return std::nullopt;
+  const std::string_view whole = text;
   std::string turned;
   if (!is_digit(text.front())) {
     turned = year_in_front(text);
@@ -239,7 +246,7 @@ std::optional<TimeStamp> parse_time_stamp(std::string_view text) {
   }
   if (take_date(text, stamp)) {
     if (trimmed(text).empty()) return stamp;
-    if (!take_char(text, "T _-,")) return std::nullopt;
+    if (!is_all_digits_of_time(whole) && !take_char(text, "T _-,")) return std::nullopt;
     text = trimmed(text);
   }
   if (!take_clock(text, stamp)) return std::nullopt;

@@ -10,10 +10,10 @@ namespace thermocomp {
 
 /// A source of one kind: its file PROTOCOL_source.cpp.
 /// @throws InvalidValue or DriverError for a configuration that cannot work
-#define THERMOCOMP_DECLARE_SOURCE(protocol, Config) \
-  [[nodiscard]] std::unique_ptr<SensorSource> make_bus_source(const Config& bus);
-THERMOCOMP_BUSES(THERMOCOMP_DECLARE_SOURCE)
-#undef THERMOCOMP_DECLARE_SOURCE
+[[nodiscard]] std::unique_ptr<SensorSource> make_bus_source(const ModbusBusConfig& bus);
+[[nodiscard]] std::unique_ptr<SensorSource> make_bus_source(const CanBusConfig& bus);
+[[nodiscard]] std::unique_ptr<SensorSource> make_bus_source(const CanopenBusConfig& bus);
+[[nodiscard]] std::unique_ptr<SensorSource> make_bus_source(const J1939BusConfig& bus);
 
 [[nodiscard]] inline std::unique_ptr<SensorSource> make_source(const BusConfig& bus) {
   return std::visit([](const auto& each) { return make_bus_source(each); }, bus);

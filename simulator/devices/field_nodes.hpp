@@ -28,10 +28,9 @@ class FieldNode {
 };
 
 /// Switches the node on.
-#define THERMOCOMP_DECLARE_NODE(table, Config) \
-  [[nodiscard]] std::unique_ptr<FieldNode> switch_on(const Config& node, nanoseconds now);
-THERMOCOMP_FIELD_NODES(THERMOCOMP_DECLARE_NODE)
-#undef THERMOCOMP_DECLARE_NODE
+[[nodiscard]] std::unique_ptr<FieldNode> switch_on(const SimulatedCanopenNode& node,
+                                                   nanoseconds now);
+[[nodiscard]] std::unique_ptr<FieldNode> switch_on(const SimulatedJ1939Node& node, nanoseconds now);
 
 class FieldNodes {
  public:

@@ -211,16 +211,15 @@ std::optional<ChannelFault> channel_fault(NodeEventKind kind) {
 
 void read_field_nodes(const TomlTable& root, sections::Presets& presets, MachineConfig& machine) {
   NameList names;
-  const auto read_all = [&]<class Node>(const char* tables, std::type_identity<Node> /*kind*/) {
+  const auto read_all = [&]<class Node>(const char* tables, Node empty) {
     for (const TomlTable& table : root.tables(tables)) {
-      Node node;
+      Node node = empty;
       read_node(table, names, presets, machine, node);
       machine.field_nodes.push_back(std::move(node));
     }
   };
-#define THERMOCOMP_READ_NODES(table, Config) read_all(#table, std::type_identity<Config>());
-  THERMOCOMP_FIELD_NODES(THERMOCOMP_READ_NODES)
-#undef THERMOCOMP_READ_NODES
+  read_all("canopen_node", SimulatedCanopenNode{});
+  read_all("j1939_node", SimulatedJ1939Node{});
 }
 
 }  // namespace thermocomp

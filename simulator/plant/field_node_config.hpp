@@ -38,16 +38,6 @@ struct CanStatusCodes {
   FaultCodes codes;
 };
 
-}  // namespace thermocomp
-
-/// Every kind: its table in the machine's file and its configuration. A kind has besides, for its
-/// configuration, read_node() (simulator/files) and switch_on() (simulator/devices).
-#define THERMOCOMP_FIELD_NODES(NODE)       \
-  NODE(canopen_node, SimulatedCanopenNode) \
-  NODE(j1939_node, SimulatedJ1939Node)
-
-namespace thermocomp {
-
 enum class NodeEventKind {
   open_circuit,  ///< of a channel: its codes; else an emergency message, or J1939's error code
   short_circuit,
@@ -108,13 +98,7 @@ struct SimulatedJ1939Node {
   std::vector<NodeEvent> events;
 };
 
-namespace detail {
-template <class None, class... Nodes>
-using node_variant = std::variant<Nodes...>;
-}  // namespace detail
-
-#define THERMOCOMP_NODE_TYPE(table, Config) , Config
-using SimulatedNode = detail::node_variant<void THERMOCOMP_FIELD_NODES(THERMOCOMP_NODE_TYPE)>;
-#undef THERMOCOMP_NODE_TYPE
+/// Every kind. It has besides read_node() (simulator/files) and switch_on() (simulator/devices).
+using SimulatedNode = std::variant<SimulatedCanopenNode, SimulatedJ1939Node>;
 
 }  // namespace thermocomp

@@ -166,9 +166,63 @@ class Records {
   std::vector<std::map<std::size_t, std::string>> rows_;
 };
 
+constexpr int depth_max = 5;
+
+/// Names once, then the values of all rows: by rows (InfluxDB 1, pandas "split"), by columns, or a
+/// series of times and values (Prometheus).
+/// @return false: the object is none of these
+bool add_table(const json& object, Records& records) {
+  const auto list = [&](const char* key) {
+    const auto found = object.find(key);
+    return found != object.end() && found->is_array() ? &*found : nullptr;
+  };
+  const json* rows = list("values") != nullptr ? list("values") : list("data");
+  if (rows != nullptr && list("columns") != nullptr) {
+    for (std::size_t i = 0; i < rows->size(); ++i) {
+      json record;
+      const std::size_t columns = std::min((*rows)[i].size(), list("columns")->size());
+      for (std::size_t k = 0; k < columns; ++k)
+        if (const json& name = (*list("columns"))[k]; name.is_string() && (*rows)[i].is_array())
+          record[name.get<std::string>()] = (*rows)[i][k];
+      if (list("index") != nullptr && i < list("index")->size())
+        record["time"] = (*list("index"))[i];
+      records.add(record);
+    }
+    return true;
+  }
+  if (rows != nullptr && object.contains("metric")) {
+    for (const json& point : *rows) {
+      if (!point.is_array() || point.size() != 2) return false;
+      json record = object["metric"];
+      record["time"] = point[0];
+      record["value"] = point[1];
+      records.add(record);
+    }
+    return true;
+  }
+  const bool has_columns =
+      object.size() > 1 && std::all_of(object.begin(), object.end(), [&](const json& each) {
+        return each.is_array() && each.size() > 1 && each.size() == object.front().size() &&
+               each.front().is_primitive();
+      });
+  for (std::size_t i = 0; has_columns && i < object.front().size(); ++i) {
+    json record;
+    for (const auto& [name, values] : object.items()) record[name] = values[i];
+    records.add(record);
+  }
+  return has_columns;
+}
+
+/// The tables of a document, wherever they stand in it.
+void collect_tables(const json& value, int depth, Records& records) {
+  if (depth > depth_max || !value.is_structured() ||
+      (value.is_object() && add_table(value, records)))
+    return;
+  for (const json& each : value) collect_tables(each, depth + 1, records);
+}
+
 /// Records in lists, or under their times.
 void collect(const json& value, int depth, Records& records) {
-  constexpr int depth_max = 5;
   if (depth > depth_max) return;
   if (value.is_array()) {
     for (const json& each : value) {
@@ -226,16 +280,21 @@ PlainTable plain_json(const Log& log) {
     document = std::move(result);
   }
   if (is_store(document)) return plain_store(log, document);
-  Records records;
-  collect(document, 0, records);
-  if (records.empty())
-    log.refuse(0, "", "(other JSON)",
-               "must be records (a line each, a list, or each under its time) or the answer of "
-               "Moonraker's server/temperature_store, a list \"temperatures\" for each heater and "
-               "sensor");
   PlainTable table;
+  Records records;
+  collect_tables(document, 0, records);
+  const bool has_tables = !records.empty();
+  if (!has_tables) collect(document, 0, records);
+  if (records.empty())
+    log.refuse(
+        0, "", "(other JSON)",
+        "must be records (a line each, a list, or each under its time), lists of values with "
+        "their names, or the answer of Moonraker's server/temperature_store, a list "
+        "\"temperatures\" for each heater and sensor");
   table.text = records.text();
-  table.said.emplace_back("JSON, a row a record; what a record does not have is missing");
+  table.said.emplace_back(has_tables
+                              ? "JSON, names once and lists of values"
+                              : "JSON, a row a record; what a record does not have is missing");
   return table;
 }
 

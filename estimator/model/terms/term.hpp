@@ -65,8 +65,8 @@ struct TermContext {
   std::vector<double> bank_gains{};  ///< shape (outputs, time constants, subjects)
 };
 
-/// A kind of term and how it is made. To add one: a file with its registration, and its line in
-/// THERMOCOMP_TERMS below.
+/// A kind of term and how it is made. To add one: a file with its registration, and its lines at
+/// the end of this file and in term_registrations().
 struct TermRegistration {
   TermKind kind{};
   std::unique_ptr<Term> (*make)(const TermContext& context){nullptr};
@@ -86,25 +86,20 @@ struct ModelColumns {
 [[nodiscard]] std::unique_ptr<Term> make_term(const TermSpec& spec, const ThermalModel& model,
                                               const ModelColumns& columns);
 
-/// Every kind: a file of this folder that defines NAME_registration(), and its line here.
-#define THERMOCOMP_TERMS(KIND) \
-  KIND(thermal_lag)            \
-  KIND(missing_heat_source)    \
-  KIND(missing_temperature)    \
-  KIND(speed_growth)           \
-  KIND(slow_sensor)            \
-  KIND(wrong_coefficient)      \
-  KIND(nonlinear_expansion)    \
-  KIND(position_dependence)    \
-  KIND(output_hysteresis)      \
-  KIND(temperature_hysteresis) \
-  KIND(sensor_swap)            \
-  KIND(lag_bank)               \
-  KIND(signal_hinge)           \
-  KIND(start_dependence)
-
-#define THERMOCOMP_DECLARE_TERM(name) TermRegistration name##_registration();
-THERMOCOMP_TERMS(THERMOCOMP_DECLARE_TERM)
-#undef THERMOCOMP_DECLARE_TERM
+/// Every kind: each has a file of this folder and an entry of term_registrations().
+TermRegistration thermal_lag_registration();
+TermRegistration missing_heat_source_registration();
+TermRegistration missing_temperature_registration();
+TermRegistration speed_growth_registration();
+TermRegistration slow_sensor_registration();
+TermRegistration wrong_coefficient_registration();
+TermRegistration nonlinear_expansion_registration();
+TermRegistration position_dependence_registration();
+TermRegistration output_hysteresis_registration();
+TermRegistration temperature_hysteresis_registration();
+TermRegistration sensor_swap_registration();
+TermRegistration lag_bank_registration();
+TermRegistration signal_hinge_registration();
+TermRegistration start_dependence_registration();
 
 }  // namespace thermocomp

@@ -91,10 +91,14 @@ std::vector<double> bank_gains(const LagBankSpec& bank, const ThermalModel& mode
 }  // namespace
 
 const std::vector<TermRegistration>& term_registrations() {
-#define THERMOCOMP_LIST_TERM(name) name##_registration(),
   static const std::vector<TermRegistration> registrations = {
-      THERMOCOMP_TERMS(THERMOCOMP_LIST_TERM)};
-#undef THERMOCOMP_LIST_TERM
+      thermal_lag_registration(),         missing_heat_source_registration(),
+      missing_temperature_registration(), speed_growth_registration(),
+      slow_sensor_registration(),         wrong_coefficient_registration(),
+      nonlinear_expansion_registration(), position_dependence_registration(),
+      output_hysteresis_registration(),   temperature_hysteresis_registration(),
+      sensor_swap_registration(),         lag_bank_registration(),
+      signal_hinge_registration(),        start_dependence_registration()};
   return registrations;
 }
 
