@@ -254,7 +254,7 @@ void Operations::finish_reload() {
   const Outcome outcome = *reload_->answer->outcome;
   if (outcome == Outcome::waiting) return;
   if (outcome == Outcome::overdue) {
-    if (!std::exchange(reload_->is_overdue_told, true))
+    if (!std::exchange(reload_->is_overdue_reported, true))
       spdlog::error("reload: the cycle has the new configuration in hand and does not finish");
     return;
   }
@@ -343,8 +343,8 @@ void Operations::save_state(bool at_once) {
     parts_.keeper.note(state, Clock::now());
   tell_saved(!at_once);
   const std::string& error = parts_.keeper.error();
-  if (!error.empty() && error != save_error_told_) spdlog::error("{}", error);
-  save_error_told_ = error;
+  if (!error.empty() && error != reported_save_error_) spdlog::error("{}", error);
+  reported_save_error_ = error;
 }
 
 /// What is on disk, where that is new.
@@ -358,12 +358,12 @@ void Operations::tell_saved(bool again) {
                                return axis.waits_for_disk;
                              });
   const SavedState& on_disk = parts_.keeper.on_disk();
-  if (on_disk.serial == told_serial_ && !is_waited_for) return;
-  if (cycle_.replacing() || (saved_told_ && *saved_told_ == Outcome::waiting)) return;
-  told_serial_ = on_disk.serial;
+  if (on_disk.serial == reported_serial_ && !is_waited_for) return;
+  if (cycle_.replacing() || (saved_notice_ && *saved_notice_ == Outcome::waiting)) return;
+  reported_serial_ = on_disk.serial;
   if (parts_.config.dry_run) return;
   for (const Command& saved : saved_commands(parts_.config.estimator, on_disk.state))
-    saved_told_ = cycle_.send(saved, Clock::now());
+    saved_notice_ = cycle_.send(saved, Clock::now());
 }
 
 }  // namespace thermocomp

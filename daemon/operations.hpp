@@ -78,7 +78,7 @@ class Operations {
     std::shared_ptr<Loaded> loaded;      ///< the thread's until it has ended
     std::unique_ptr<SideThread> thread;  ///< none: the files are read
     DaemonConfig next;
-    bool is_overdue_told{false};
+    bool is_overdue_reported{false};
     std::optional<std::filesystem::path> candidate;
     bool is_asked{false};  ///< by a client, who gets the outcome
     std::int64_t user{-1};
@@ -114,9 +114,9 @@ class Operations {
   std::optional<Reload> reload_;
   std::optional<std::filesystem::path> candidate_;  ///< that an operator named, empty: none
   bool reload_again_{false};
-  std::string save_error_told_;
-  std::uint64_t told_serial_{0};  ///< of the state that the estimator knows to be on disk
-  CycleHandle::Tracked saved_told_;
+  std::string reported_save_error_;
+  std::uint64_t reported_serial_{0};  ///< of the state that the estimator knows to be on disk
+  CycleHandle::Tracked saved_notice_;
   std::vector<Asked> asked_;  ///< commands on their way, in order
 };
 

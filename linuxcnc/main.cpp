@@ -112,8 +112,8 @@ class Exchange {
 
   /// Once each time that it changes; empty: all is well.
   void say(const std::string& what) {
-    if (what == said_) return;
-    said_ = what;
+    if (what == last_said_) return;
+    last_said_ = what;
     std::fprintf(stderr, "thermocomp-linuxcnc: %s\n",
                  what.empty() ? "in exchange with the daemon" : what.c_str());
   }
@@ -127,7 +127,7 @@ class Exchange {
   bool asked_{false};
   Clock::time_point asked_at_{};
   Clock::time_point connect_next_{};
-  std::string said_;
+  std::string last_said_;
 };
 
 /// Exchanges until SIGTERM or SIGINT. @throws HalError at the start

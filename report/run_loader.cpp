@@ -23,15 +23,15 @@ std::vector<RunFile> RunLoader::load(const std::vector<std::string>& arguments) 
 
 void RunLoader::tell(const RunFile& run) {
   if (run.understood.empty()) return;
-  const auto is_told = [this](const std::string& line) {
-    return std::find(told_.begin(), told_.end(), line) != told_.end();
+  const auto is_reported = [this](const std::string& line) {
+    return std::find(reported_.begin(), reported_.end(), line) != reported_.end();
   };
   std::fprintf(stderr, "%s: read as follows%s\n", run.name.c_str(),
-               told_.empty() ? "" : ", and what is said above");
+               reported_.empty() ? "" : ", and what is said above");
   for (const std::string& line : run.understood) {
-    if (is_told(line)) continue;
+    if (is_reported(line)) continue;
     std::fprintf(stderr, "  %s\n", line.c_str());
-    told_.push_back(line);
+    reported_.push_back(line);
   }
 }
 

@@ -1,4 +1,4 @@
-/// The run files of one command: whatever form they have, and what was understood is told once.
+/// The run files of one command: whatever form they have, and what was understood is reported once.
 #pragma once
 
 #include <string>
@@ -19,8 +19,8 @@ class RunLoader {
   /// @throws ConfigurationError
   explicit RunLoader(const std::string& columns);
 
-  /// Reads RUN.csv[@T0:T1]. How a file that is not in our own form was taken is told on stderr, a
-  /// line each; of further files that are alike only that they are.
+  /// Reads RUN.csv[@T0:T1]. How a file that is not in our own form was read is reported on stderr,
+  /// a line each; of further files that are alike only that they are.
   /// @throws ConfigurationError
   [[nodiscard]] RunFile load(const std::string& argument);
   [[nodiscard]] std::vector<RunFile> load(const std::vector<std::string>& arguments);
@@ -30,7 +30,7 @@ class RunLoader {
 
   bool has_map_;
   ColumnMap map_;
-  std::vector<std::string> told_;
+  std::vector<std::string> reported_;
 };
 
 }  // namespace thermocomp::cli

@@ -62,7 +62,7 @@ class Causes {
   }
 
   /// Whether entries of sensors, modules or axes say more than the reason does.
-  [[nodiscard]] bool is_told_by_its_cause(Reason reason) const {
+  [[nodiscard]] bool is_named_by_its_cause(Reason reason) const {
     const auto any_axis = [this](const auto& is_so) {
       return std::any_of(status_.axes.begin(), status_.axes.end(), is_so);
     };
@@ -95,7 +95,7 @@ class Causes {
   void add_reasons(Severity severity) {
     for (const Reason reason : members_of(status_.reasons)) {
       const CodeText text = code_text(reason);
-      if (text.severity != severity || is_told_by_its_cause(reason)) continue;
+      if (text.severity != severity || is_named_by_its_cause(reason)) continue;
       const std::string& error = status_.controller.last_error;
       const bool is_of_link = reason == Reason::not_written || reason == Reason::controller_offline;
       const bool switched_off = reason == Reason::operator_disabled && status_.dry_run;

@@ -334,9 +334,9 @@ int run_check(const CheckOptions& options) {
   } catch (const ConfigurationError& error) {
     const std::size_t count = error.problems().size();
     std::fprintf(stderr, "%s\n", error.what());
-    constexpr std::size_t told_max = 100;  // the line after them says how many more there are
+    constexpr std::size_t shown_max = 100;  // the line after them says how many more there are
     std::fprintf(stderr, "%s: %s\n", file.c_str(),
-                 count > told_max ? "more than 100 problems" : counted(count, "problem").c_str());
+                 count > shown_max ? "more than 100 problems" : counted(count, "problem").c_str());
     return exit_bad_use;
   }
   return exit_success;

@@ -35,12 +35,12 @@ std::optional<HistoryTime> time_or_none(const std::string& text) {
 
 /// @return the exit status
 int tell_damage(const std::string& history, const std::vector<HistoryDamage>& damage) {
-  constexpr std::size_t told_max = 20;
-  for (std::size_t i = 0; i < std::min(damage.size(), told_max); ++i) {
+  constexpr std::size_t shown_max = 20;
+  for (std::size_t i = 0; i < std::min(damage.size(), shown_max); ++i) {
     std::fprintf(stderr, "%s: %s\n", history.c_str(), to_string(damage[i]).c_str());
   }
-  if (damage.size() > told_max) {
-    std::fprintf(stderr, "%s: and %zu more\n", history.c_str(), damage.size() - told_max);
+  if (damage.size() > shown_max) {
+    std::fprintf(stderr, "%s: and %zu more\n", history.c_str(), damage.size() - shown_max);
   }
   return damage.empty() ? exit_success : exit_no;
 }

@@ -447,8 +447,8 @@ class DbcReader {
       Draft& draft = drafts_[place];
       std::vector<std::optional<Choice>> choices(draft.message.signals.size());
       for (std::size_t i = 0; i < choices.size(); ++i) {
-        const auto said = pages.find({place, i});
-        choices[i] = choice_of(draft, i, said == pages.end() ? nullptr : said->second);
+        const auto remark = pages.find({place, i});
+        choices[i] = choice_of(draft, i, remark == pages.end() ? nullptr : remark->second);
       }
       for (std::size_t i = 0; i < choices.size(); ++i) collect_selectors(draft, choices, i);
     }
@@ -494,7 +494,7 @@ class DbcReader {
   }
 
   static void apply(const std::string& format, DbcMessage& message) {
-    message.told_fd = format.find("FD") != std::string::npos;
+    message.declared_fd = format.find("FD") != std::string::npos;
     message.is_group = message.extended && format == "J1939PG";
   }
 
@@ -514,7 +514,7 @@ class DbcReader {
     }
     for (Draft& draft : drafts_) {
       const DbcMessage& message = draft.message;
-      const bool fd = message.bytes > classic_bytes_max || message.told_fd == true;
+      const bool fd = message.bytes > classic_bytes_max || message.declared_fd == true;
       for (DbcSignal& signal : draft.message.signals) {
         signal.place.fd = fd;
         if (message.is_group) signal.place.id_mask = group_mask(message.id);
@@ -561,7 +561,7 @@ class DbcReader {
     std::vector<CanSelector::Pages> pages;
   };
 
-  std::optional<Choice> choice_of(const Draft& draft, std::size_t index, const PageRemark* said) {
+  std::optional<Choice> choice_of(const Draft& draft, std::size_t index, const PageRemark* remark) {
     const DbcSignal& signal = draft.message.signals[index];
     const std::optional<std::uint64_t> page = draft.multiplexing[index].page;
     if (!page) return std::nullopt;
@@ -569,14 +569,14 @@ class DbcReader {
     const auto selects = [](const Multiplexing& each) { return each.selects; };
     const auto& all = draft.multiplexing;
     Choice choice{0, {{*page, *page}}};
-    if (said != nullptr) {
-      const auto selector = index_of(draft, said->selector);
+    if (remark != nullptr) {
+      const auto selector = index_of(draft, remark->selector);
       if (!selector || !all[*selector].selects) {
-        flaw(said->line, signal.name, said->selector,
+        flaw(remark->line, signal.name, remark->selector,
              "must be a multiplexor of " + draft.message.name, about);
         return std::nullopt;
       }
-      choice = {*selector, said->pages};
+      choice = {*selector, remark->pages};
     } else if (std::count_if(all.begin(), all.end(), selects) != 1) {
       flaw(signal.line, signal.name, "m" + std::to_string(*page),
            "needs a line SG_MUL_VAL_ unless its message has just one multiplexor", about);

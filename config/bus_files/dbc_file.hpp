@@ -30,8 +30,8 @@ struct DbcMessage {
   std::string long_name;
   std::uint32_t id{0};
   bool extended{false};
-  std::uint64_t bytes{0};       ///< more than 64: sent in several frames by a protocol above CAN
-  std::optional<bool> told_fd;  ///< what VFrameFormat says; none: nothing
+  std::uint64_t bytes{0};  ///< more than 64: sent in several frames by a protocol above CAN
+  std::optional<bool> declared_fd;  ///< what VFrameFormat says; none: nothing
   /// It stands for its J1939 group, whoever sends it: place.id_mask of the signals.
   bool is_group{false};
   std::vector<DbcSignal> signals;

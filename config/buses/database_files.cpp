@@ -108,7 +108,7 @@ const DbcMessage* find_message(const TomlTable& own, const TomlTable& base, DbcF
     return nullptr;
   }
   const bool several = message->bytes > fd_bytes_max;
-  const bool is_short = message->told_fd == false && !own.has("fd") && !base.has("fd");
+  const bool is_short = message->declared_fd == false && !own.has("fd") && !base.has("fd");
   if (several || (message->bytes > classic_bytes_max && is_short)) {
     std::string rule = "has " + std::to_string(message->bytes) + " bytes in the DBC file, " +
                        (several ? "more than a frame" : "but is no CAN FD frame");

@@ -123,8 +123,8 @@ void check_named_files(const std::vector<NamedFile>& files) {
     if (place.named->use == FileUse::read) continue;
     for (const Place& other : places) {
       // A pair of written files is reported once, at the later name.
-      const bool is_told = other.named->use != FileUse::read && other.named >= place.named;
-      if (other.named == place.named || is_told || !is_same(place, other)) continue;
+      const bool is_reported = other.named->use != FileUse::read && other.named >= place.named;
+      if (other.named == place.named || is_reported || !is_same(place, other)) continue;
       place.named->table.problem(place.named->key, place.named->path.string(),
                                  "must not be the same file as " + name_of(*other.named));
       break;
@@ -285,16 +285,16 @@ void add_reference_problems(const ModelSource& source, const DaemonConfig& confi
 
 /// Oddities of a configuration that holds, and flaws of its bus files that it does not stand on.
 std::vector<std::string> remarks_of(const sections::BusFiles& files, const std::string& name) {
-  constexpr std::size_t told_max = 20;
+  constexpr std::size_t shown_max = 20;
   std::vector<Problem> all = files.remarks;
   for (Problem& each : all) each.file = name;
   for (const auto& flaws : {files.dbc.flaws(false), files.eds.flaws(false)}) {
     all.insert(all.end(), flaws.begin(), flaws.end());
   }
   std::vector<std::string> lines;
-  for (std::size_t i = 0; i < all.size() && i < told_max; ++i) lines.push_back(to_string(all[i]));
-  if (all.size() > told_max) {
-    lines.push_back("and " + std::to_string(all.size() - told_max) + " more such remarks");
+  for (std::size_t i = 0; i < all.size() && i < shown_max; ++i) lines.push_back(to_string(all[i]));
+  if (all.size() > shown_max) {
+    lines.push_back("and " + std::to_string(all.size() - shown_max) + " more such remarks");
   }
   return lines;
 }

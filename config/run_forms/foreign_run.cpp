@@ -67,9 +67,9 @@ class ForeignReader {
     run_.name = name;
     RunText read = run_text(text, name);
     from_latin1_ = read.from_latin1;
-    run_.wall_zero = said_wall_zero(read.text);
+    run_.wall_zero = stated_wall_zero(read.text);
     auto plain = plain_table(read.text, name, map);
-    if (plain && !run_.wall_zero) run_.wall_zero = said_wall_zero(plain->text);
+    if (plain && !run_.wall_zero) run_.wall_zero = stated_wall_zero(plain->text);
     has_own_names_ = plain && plain->has_own_names;
     ColumnMap without_names;
     if (has_own_names_ && map != nullptr) {
@@ -79,7 +79,7 @@ class ForeignReader {
     table_ = read_text_table(std::move(plain ? plain->text : read.text),
                              has_own_names_ && map != nullptr ? &without_names : map,
                              plain ? plain->lines_above : 0, problems_);
-    if (plain) run_.understood = std::move(plain->said);
+    if (plain) run_.understood = std::move(plain->notes);
   }
 
   RunFile read() {
@@ -99,7 +99,7 @@ class ForeignReader {
     problems_.throw_any();
     RunTime run_time = read_time(table_, time, map_, units_, form_, problems_);
     problems_.throw_any();
-    run_.understood.push_back(run_time.said);
+    run_.understood.push_back(run_time.note);
     if (run_time.wall_zero) run_.wall_zero = run_time.wall_zero;
     order_rows(time, run_time.time_s);
     problems_.throw_any();
@@ -206,14 +206,14 @@ class ForeignReader {
   }
 
   void say_layout() {
-    std::string said = "separator '" + separator_name(table_.separator) + "', decimal " +
+    std::string note = "separator '" + separator_name(table_.separator) + "', decimal " +
                        (form_.decimal == ',' ? "comma" : "point");
-    if (form_.thousands != '\0') said += std::string(", thousands '") + form_.thousands + "'";
-    if (from_latin1_) said += ", letters Latin-1";
-    if (!table_.units.empty()) said += ", units in the row under the header";
-    if (!table_.has_header) said += ", no header";
-    run_.understood.push_back(said);
-    run_.understood.insert(run_.understood.end(), table_.said.begin(), table_.said.end());
+    if (form_.thousands != '\0') note += std::string(", thousands '") + form_.thousands + "'";
+    if (from_latin1_) note += ", letters Latin-1";
+    if (!table_.units.empty()) note += ", units in the row under the header";
+    if (!table_.has_header) note += ", no header";
+    run_.understood.push_back(note);
+    run_.understood.insert(run_.understood.end(), table_.notes.begin(), table_.notes.end());
   }
 
   [[nodiscard]] bool is_ignored(const std::string& header) const {
@@ -334,9 +334,9 @@ class ForeignReader {
     }
     if (spelled.unit.empty() && !unit_of(header).suffix.empty() && is_column_name(header))
       return Meaning{i, header, {}};
-    const bool is_told = map_ != nullptr && std::find(map_->names.begin(), map_->names.end(),
-                                                      header) != map_->names.end();
-    const bool takes_signal = spelled.unit.empty() && (has_own_names_ || is_told ||
+    const bool is_named = map_ != nullptr && std::find(map_->names.begin(), map_->names.end(),
+                                                       header) != map_->names.end();
+    const bool takes_signal = spelled.unit.empty() && (has_own_names_ || is_named ||
                                                        (map_ != nullptr && map_->takes_signals));
     if (takes_signal && is_column_name(plain_name(header)))
       return Meaning{i, plain_name(header), {}};
@@ -389,24 +389,24 @@ class ForeignReader {
   }
 
   void say(std::size_t i, const Meaning& meaning) {
-    std::string said = "'" + table_.header[i] + "' is " + meaning.name;
+    std::string note = "'" + table_.header[i] + "' is " + meaning.name;
     const bool has_unit = !unit_of(meaning.name).suffix.empty();
-    if (!has_unit) said += ", a signal without unit";
+    if (!has_unit) note += ", a signal without unit";
     if (!has_unit && !is_mapped(table_.header[i]) && !has_own_names_ && map_ != nullptr &&
         map_->takes_signals && map_->names.empty())
-      said += " (if it has one, write " + toml_text(table_.header[i]) + " = " +
+      note += " (if it has one, write " + toml_text(table_.header[i]) + " = " +
               toml_text(example_name(spelled_name(table_.header[i]).base)) +
               ", or what it is, under [columns] in the file of --columns)";
     if (meaning.conversion.factor != 1.0)
-      said += ", times " + number_text(meaning.conversion.factor);
+      note += ", times " + number_text(meaning.conversion.factor);
     if (meaning.conversion.offset != 0.0)
-      said += ", plus " + number_text(meaning.conversion.offset);
+      note += ", plus " + number_text(meaning.conversion.offset);
     const bool from_mm = kind_of(meaning.name) == QuantityKind::position;
     if (from_mm && meaning.name != table_.header[i])
-      said += ", a position (a displacement: write " + toml_text(table_.header[i]) + " = " +
+      note += ", a position (a displacement: write " + toml_text(table_.header[i]) + " = " +
               toml_text(meaning.name.substr(0, meaning.name.size() - 2) + "um") +
               " under [columns] in the file of --columns)";
-    run_.understood.push_back(said);
+    run_.understood.push_back(note);
   }
 
   void read_values(const Meaning& meaning) {
@@ -465,9 +465,9 @@ class ForeignReader {
     for (char& c : small) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
     const bool is_word =
         std::find(missing_words.begin(), missing_words.end(), small) != missing_words.end();
-    const bool is_told = map_ != nullptr && std::find(map_->missing.begin(), map_->missing.end(),
-                                                      field) != map_->missing.end();
-    if (!is_word && !is_told) return false;
+    const bool is_listed = map_ != nullptr && std::find(map_->missing.begin(), map_->missing.end(),
+                                                        field) != map_->missing.end();
+    if (!is_word && !is_listed) return false;
     if (missing_++ == 0) missing_as_ = field;
     return true;
   }
@@ -510,12 +510,12 @@ RunFile read_foreign_run(std::string_view text, const std::string& name, const C
   return ForeignReader(text, name, map).read();
 }
 
-std::optional<WallZero> said_wall_zero(std::string_view text) {
+std::optional<WallZero> stated_wall_zero(std::string_view text) {
   const std::size_t at = text.find(wall_zero_mark);
   if (at == std::string_view::npos || (at > 0 && text[at - 1] != '\n')) return std::nullopt;
-  std::string_view said = text.substr(at + wall_zero_mark.size());
-  said = said.substr(0, said.find_first_of("\r\n"));
-  const auto stamp = parse_time_stamp(said);
+  std::string_view stated = text.substr(at + wall_zero_mark.size());
+  stated = stated.substr(0, stated.find_first_of("\r\n"));
+  const auto stamp = parse_time_stamp(stated);
   const auto seconds = stamp ? seconds_of(*stamp, DateOrder::unknown, false) : std::nullopt;
   if (!seconds) return std::nullopt;
   return WallZero{*seconds, stamp->zone_s.has_value()};

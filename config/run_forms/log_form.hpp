@@ -14,9 +14,9 @@ namespace thermocomp {
 /// The same values under one header with units in brackets.
 struct PlainTable {
   std::string text;
-  std::vector<std::string> said;  ///< what was understood, a line each
-  int lines_above{0};             ///< of the file, in front of the first line of `text`
-  bool has_own_names{false};      ///< the columns are called as in our own form
+  std::vector<std::string> notes;  ///< what was understood, a line each
+  int lines_above{0};              ///< of the file, in front of the first line of `text`
+  bool has_own_names{false};       ///< the columns are called as in our own form
 };
 
 /// @param text  UTF-8

@@ -209,10 +209,10 @@ std::string pivot(TextTable& table, std::vector<double>& time_s, const LongForm&
     cell = value;
     if (wide.lines[at] == 0) wide.lines[at] = table.lines[row];
   }
-  std::string said = "a row per value: '" + table.header[form.names[0]] + "'";
+  std::string note = "a row per value: '" + table.header[form.names[0]] + "'";
   for (std::size_t i = 1; i < form.names.size(); ++i)
-    said += " and '" + table.header[form.names[i]] + "'";
-  said += " names the series, '" + table.header[form.value] + "' is the value; " +
+    note += " and '" + table.header[form.names[i]] + "'";
+  note += " names the series, '" + table.header[form.value] + "' is the value; " +
           std::to_string(columns.size()) + " columns";
   table.header = std::move(wide.header);
   table.units = std::move(wide.units);
@@ -221,7 +221,7 @@ std::string pivot(TextTable& table, std::vector<double>& time_s, const LongForm&
   for (std::size_t row = 0; row < times.size(); ++row)
     for (const auto& column : columns) table.fields.push_back(column[row]);
   time_s = std::move(times);
-  return said;
+  return note;
 }
 
 }  // namespace thermocomp

@@ -38,7 +38,7 @@ struct RunFile {
 /// "# 0.000 s: wall time 2026-03-02T07:00:00.000Z".
 inline constexpr std::string_view wall_zero_mark = "# 0.000 s: wall time ";
 /// @return nullopt when no comment of the text says it
-[[nodiscard]] std::optional<WallZero> said_wall_zero(std::string_view text);
+[[nodiscard]] std::optional<WallZero> stated_wall_zero(std::string_view text);
 [[nodiscard]] std::string wall_zero_comment(const WallZero& zero);
 
 }  // namespace thermocomp

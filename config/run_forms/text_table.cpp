@@ -202,7 +202,7 @@ class TableReader {
       if (is_rule(line)) continue;
       // Excel's first line is taken at its word.
       if (lines_.empty() && line.size() == 5 && line.starts_with("sep=")) {
-        told_separator_ = line[4];
+        given_separator_ = line[4];
         continue;
       }
       lines_.push_back({number, line});
@@ -245,9 +245,9 @@ class TableReader {
   }
 
   bool choose_separator() {
-    if (map_ != nullptr && map_->separator) told_separator_ = map_->separator;
-    if (told_separator_) {
-      cut_ = cut_by(*told_separator_);
+    if (map_ != nullptr && map_->separator) given_separator_ = map_->separator;
+    if (given_separator_) {
+      cut_ = cut_by(*given_separator_);
     } else {
       for (const char separator : separators) {
         const Cut cut = cut_by(separator);
@@ -404,7 +404,7 @@ class TableReader {
     }
     if (names) {
       take_names(*names);
-    } else if (!take_commented_names() && !take_told_names()) {
+    } else if (!take_commented_names() && !take_given_names()) {
       return false;
     } else if (row_begin_ > 0 && !is_all_words(row_begin_ - 1)) {
       problems_.add(lines_[row_begin_ - 1].number, "",
@@ -441,13 +441,14 @@ class TableReader {
     for (const std::string_view field : fields) table_.header.push_back(unquoted(field));
     header_text_ = lines_[line].text;
     if (line > 0)
-      table_.said.push_back("above the header in line " + std::to_string(table_.header_line) +
-                            " left out: '" + shortened(lines_[0].text) + "'" +
-                            more_lines(line - 1));
+      table_.notes.push_back("above the header in line " + std::to_string(table_.header_line) +
+                             " left out: '" + shortened(lines_[0].text) + "'" +
+                             more_lines(line - 1));
     const std::size_t between = row_begin_ - line - 1 - (table_.units.empty() ? 0 : 1);
     if (between > 0)
-      table_.said.push_back("between the header and the first row left out: '" +
-                            shortened(lines_[row_begin_ - 1].text) + "'" + more_lines(between - 1));
+      table_.notes.push_back("between the header and the first row left out: '" +
+                             shortened(lines_[row_begin_ - 1].text) + "'" +
+                             more_lines(between - 1));
   }
 
   /// "# time t1 z": names in the last comment above rows without a header.
@@ -471,7 +472,7 @@ class TableReader {
     return true;
   }
 
-  bool take_told_names() {
+  bool take_given_names() {
     row_begin_ = row_begin_ < lines_.size() ? row_begin_ : 0;
     table_.header.assign(cut_.fields, "");
     const bool has_names = map_ != nullptr && !map_->names.empty();
@@ -511,8 +512,8 @@ class TableReader {
       fill_up(fields);
       const bool is_cut_off = i + 1 == lines_.size() && table_.text.back() != '\n';
       if (is_cut_off && fields.size() < table_.columns() && table_.rows() > 0) {
-        table_.said.push_back("the last line, " + std::to_string(line.number) +
-                              ", is cut off: left out");
+        table_.notes.push_back("the last line, " + std::to_string(line.number) +
+                               ", is cut off: left out");
         continue;
       }
       if (fields.size() != table_.columns()) {
@@ -532,7 +533,7 @@ class TableReader {
   TextTable table_;
   std::vector<Line> lines_;
   Line last_comment_{0, {}};
-  std::optional<char> told_separator_;
+  std::optional<char> given_separator_;
   Cut cut_;
   std::size_t narrowest_{0};  ///< fields that a row needs; 0: all
   std::size_t row_begin_{0};

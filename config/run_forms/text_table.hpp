@@ -19,7 +19,7 @@ struct TextTable {
   std::vector<std::string_view> fields;  ///< shape (rows, columns), without quotes and blanks
   std::vector<int> lines;                ///< of each row, counted from 1
   char separator{','};
-  std::vector<std::string> said;  ///< what was left out around the table
+  std::vector<std::string> notes;  ///< what was left out around the table
 
   [[nodiscard]] std::size_t columns() const noexcept { return header.size(); }
   [[nodiscard]] std::size_t rows() const noexcept { return lines.size(); }

@@ -26,7 +26,7 @@ constexpr auto date_names =
 
 /// Numbers whose size shows from when they count; the ranges are of the years 2001 to 2050 or so.
 struct Epoch {
-  const char* said;
+  const char* name;
   double low;
   double high;
   double per_second;
@@ -173,7 +173,7 @@ class TimeReader {
   void read_period() {
     for (std::size_t row = 0; row < table_.rows(); ++row)
       run_.time_s.push_back(static_cast<double>(row) * *map_->period_s);
-    run_.said = "time_s: a row each " + number_text(*map_->period_s) + " s, from the first";
+    run_.note = "time_s: a row each " + number_text(*map_->period_s) + " s, from the first";
   }
 
   bool take_numbers(std::size_t column) {
@@ -206,7 +206,7 @@ class TimeReader {
       run_.time_s.push_back(at - first);
     }
     run_.wall_zero = WallZero{first, false};
-    run_.said = "time_s: year, day of the year and hhmm from '" + table_.header[time_.columns[0]] +
+    run_.note = "time_s: year, day of the year and hhmm from '" + table_.header[time_.columns[0]] +
                 "' on, seconds after the first row (" + date_text(first) + ")";
   }
 
@@ -225,10 +225,10 @@ class TimeReader {
     if (epoch != nullptr) {
       count_from_first(header, *epoch);
     } else if (is_time) {
-      run_.said = "time_s: '" + header + "', numbers [" + unit + "]";
+      run_.note = "time_s: '" + header + "', numbers [" + unit + "]";
       if (known->factor == 1.0) return;
       for (double& value : run_.time_s) value *= known->factor;
-      run_.said += ", times " + number_text(known->factor);
+      run_.note += ", times " + number_text(known->factor);
     } else {
       problems_.add(table_.header_line, header, unit.empty() ? "(no unit)" : unit,
                     "has no unit of time: write time_unit = \"s\" (or \"ms\", \"min\", \"h\", "
@@ -243,7 +243,7 @@ class TimeReader {
       value = std::round((value - first) / epoch.per_second * 1e6) / 1e6;
     const double zero_s = first / epoch.per_second + epoch.zero_s;
     run_.wall_zero = WallZero{zero_s, epoch.is_utc};
-    run_.said = "time_s: '" + header + "', numbers [" + epoch.said +
+    run_.note = "time_s: '" + header + "', numbers [" + epoch.name +
                 "], seconds after the first row (" +
                 (epoch.is_utc ? date_text(zero_s) + " UTC)" : number_text(first) + ")");
   }
@@ -371,23 +371,23 @@ class TimeReader {
   }
 
   void say_stamps(const TimeStamp& first, std::optional<DateOrder> order, double first_s) {
-    run_.said = "time_s: '" + table_.header[time_.columns[0]] + "'";
-    if (time_.columns.size() == 2) run_.said += " and '" + table_.header[time_.columns[1]] + "'";
+    run_.note = "time_s: '" + table_.header[time_.columns[0]] + "'";
+    if (time_.columns.size() == 2) run_.note += " and '" + table_.header[time_.columns[1]] + "'";
     if (first.has_date && !order) {
-      run_.said +=
+      run_.note +=
           ", seconds after the first row; the date may begin with the day or the month, which only "
           "--join asks for (date_order = \"day.month.year\" or \"month.day.year\" in the file of "
           "--columns)";
     } else if (first.has_date) {
-      run_.said += *order == DateOrder::year_month_day   ? ", year-month-day"
+      run_.note += *order == DateOrder::year_month_day   ? ", year-month-day"
                    : *order == DateOrder::month_day_year ? ", month/day/year"
                                                          : ", day.month.year";
-      run_.said += ", seconds after the first row (" + date_text(first_s);
-      run_.said += first.zone_s ? " UTC)" : ")";
+      run_.note += ", seconds after the first row (" + date_text(first_s);
+      run_.note += first.zone_s ? " UTC)" : ")";
     } else {
-      run_.said += first.clock_parts == 2 && asked_unit() == "mm:ss" ? ", minutes:seconds"
+      run_.note += first.clock_parts == 2 && asked_unit() == "mm:ss" ? ", minutes:seconds"
                                                                      : ", time of the clock";
-      run_.said +=
+      run_.note +=
           ", seconds after the first row (" + std::string(table_.field(0, time_.columns[0])) + ")";
     }
   }

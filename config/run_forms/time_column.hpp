@@ -29,7 +29,7 @@ struct TimeColumns {
 
 struct RunTime {
   std::vector<double> time_s;  ///< of each row, in the order of the rows
-  std::string said;            ///< what was understood
+  std::string note;            ///< what was understood
   std::optional<WallZero> wall_zero;
 };
 

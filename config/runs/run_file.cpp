@@ -365,7 +365,7 @@ RunFile parse_run(std::string_view text, const std::string& name, const RunSelec
   const bool own =
       (is_own_form(header) && (map == nullptr || !names_a_column(*map, header))) || header.empty();
   RunFile run = own ? RunParser(text, name).parse() : read_foreign_run(text, name, map);
-  if (own) run.wall_zero = said_wall_zero(text.substr(0, text.find(header)));
+  if (own) run.wall_zero = stated_wall_zero(text.substr(0, text.find(header)));
   select(run, selection);
   return run;
 }

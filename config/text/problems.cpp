@@ -11,7 +11,7 @@ namespace thermocomp {
 namespace {
 
 /// More than that nobody reads, and an answer over the socket must stay one line of a sane length.
-constexpr std::size_t told_max = 100;
+constexpr std::size_t shown_max = 100;
 constexpr std::size_t part_bytes_max = 1000;
 
 /// A key or a rule (which may list names) of a file whose names are as long as it is.
@@ -42,9 +42,9 @@ std::vector<Problem> in_order(std::vector<Problem> problems) {
         seen.emplace(problem.file, problem.line, problem.key, problem.value, problem.rule).second;
     if (is_new) once.push_back(std::move(problem));
   }
-  if (once.size() > told_max) {
-    const std::size_t more = once.size() - told_max;
-    once.resize(told_max);
+  if (once.size() > shown_max) {
+    const std::size_t more = once.size() - shown_max;
+    once.resize(shown_max);
     once.push_back({once.back().file, 0, "", "", "and " + std::to_string(more) + " more problems"});
   }
   return once;

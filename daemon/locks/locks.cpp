@@ -59,9 +59,9 @@ bool is_at(int fd, const std::filesystem::path& path) noexcept {
 std::string content(int fd) {
   std::array<char, 1024> text{};
   const ssize_t count = pread(fd, text.data(), text.size(), 0);
-  std::string said(text.data(), count > 0 ? static_cast<std::size_t>(count) : 0);
-  while (!said.empty() && said.back() == '\n') said.pop_back();
-  return said.empty() ? "another process" : said;
+  std::string holder(text.data(), count > 0 ? static_cast<std::size_t>(count) : 0);
+  while (!holder.empty() && holder.back() == '\n') holder.pop_back();
+  return holder.empty() ? "another process" : holder;
 }
 
 }  // namespace

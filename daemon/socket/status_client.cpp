@@ -167,9 +167,9 @@ json StatusClient::call(const std::string& method, const json& params,
       const auto code = error->find("code");
       const auto text = error->find("message");
       const bool is_known = code != error->end() && code->is_number_integer();
-      const bool is_told = text != error->end() && text->is_string();
+      const bool has_text = text != error->end() && text->is_string();
       throw RemoteError(is_known ? code->get<int>() : 0,
-                        is_told ? text->get<std::string>() : std::string("error"));
+                        has_text ? text->get<std::string>() : std::string("error"));
     }
     const auto result = message.find("result");
     return result == message.end() ? json() : std::move(*result);

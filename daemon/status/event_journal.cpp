@@ -41,7 +41,7 @@ bool EventJournal::fault(Event fault) {
   if (outage.reported.empty()) outage.since = at.monotonic;
   outage.newest = fault;
   const bool is_back = std::exchange(outage.away_since, std::nullopt).has_value();
-  const bool was_ended = std::exchange(outage.is_end_told, false);
+  const bool was_ended = std::exchange(outage.is_end_reported, false);
   const bool is_known =
       std::any_of(outage.reported.begin(), outage.reported.end(),
                   [&fault](const Event& each) { return is_same_fault(each, fault); });
@@ -71,7 +71,7 @@ Event EventJournal::end_of(Outage& outage) {
   Event event = outage.newest;
   event.kind = EventKind::recovery;
   event.duration_s = seconds(*outage.away_since - outage.since);
-  outage.is_end_told = true;
+  outage.is_end_reported = true;
   add(now_(), event);
   return event;
 }
@@ -84,19 +84,19 @@ std::vector<Event> EventJournal::settle() {
     Outage& outage = at->second;
     if (!outage.away_since) continue;
     const std::chrono::nanoseconds away = now - *outage.away_since;
-    if (!outage.is_end_told && away >= outage.hold) ended.push_back(end_of(outage));
+    if (!outage.is_end_reported && away >= outage.hold) ended.push_back(end_of(outage));
     if (is_over(outage, now)) outages_.erase(at);
   }
   return ended;
 }
 
 bool EventJournal::is_over(const Outage& outage, std::chrono::nanoseconds now) {
-  return outage.is_end_told && now - *outage.away_since >= returns_within;
+  return outage.is_end_reported && now - *outage.away_since >= returns_within;
 }
 
 const EventJournal::Outage* EventJournal::find(const Subject& subject) const {
   const auto found = outages_.find(subject);
-  return found == outages_.end() || found->second.is_end_told ? nullptr : &found->second;
+  return found == outages_.end() || found->second.is_end_reported ? nullptr : &found->second;
 }
 
 bool EventJournal::lasts(const Subject& subject) const {

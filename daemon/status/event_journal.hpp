@@ -70,7 +70,7 @@ class EventJournal {
     std::vector<Event> reported;       ///< faults that became events
     std::optional<std::chrono::nanoseconds> away_since;  ///< none: it has a fault now
     std::chrono::nanoseconds hold{};
-    bool is_end_told{false};
+    bool is_end_reported{false};
     bool comes_and_goes{false};
   };
   /// Its end is an event, and what comes now is another outage.

@@ -52,8 +52,8 @@ class LogQueue {
       lines_.pop_front();
       bytes_ -= size_of(line);
       writing_ = true;
-      const std::uint64_t lost = dropped_ - dropped_told_;
-      dropped_told_ = dropped_;
+      const std::uint64_t lost = dropped_ - dropped_reported_;
+      dropped_reported_ = dropped_;
       lock.unlock();
       if (lost > 0) tell_lost(line, lost);
       sink_->log(line);
@@ -76,7 +76,7 @@ class LogQueue {
 
   [[nodiscard]] LogStatistics statistics() {
     const std::lock_guard lock(mutex_);
-    return {dropped_, dropped_ > dropped_told_};
+    return {dropped_, dropped_ > dropped_reported_};
   }
 
  private:
@@ -95,7 +95,7 @@ class LogQueue {
   std::deque<spdlog::details::log_msg_buffer> lines_;
   std::size_t bytes_{0};
   std::uint64_t dropped_{0};
-  std::uint64_t dropped_told_{0};
+  std::uint64_t dropped_reported_{0};
   bool writing_{false};
   bool stopping_{false};
 };

@@ -30,7 +30,7 @@ nanoseconds wall_clock_now() noexcept {
   return to_nanoseconds(time);
 }
 
-std::string said(int code) {
+std::string error_text(int code) {
   return std::strerror(code);
 }
 
@@ -103,7 +103,7 @@ std::string_view to_string(CanState state) noexcept {
 
 std::string can_unavailable() {
   const int probe = ::socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC, CAN_RAW);
-  if (probe < 0) return said(errno);
+  if (probe < 0) return error_text(errno);
   ::close(probe);
   return {};
 }
@@ -152,7 +152,7 @@ CanSocket::~CanSocket() {
 
 void CanSocket::fail(const char* what, int code) {
   close();
-  error_ = interface_ + ": " + what + ": " + said(code);
+  error_ = interface_ + ": " + what + ": " + error_text(code);
 }
 
 void CanSocket::close() noexcept {
@@ -371,7 +371,7 @@ bool CanSocket::send(const CanFrame& frame) {
   // A full queue (bus-off, nobody acknowledges) is a failed write, not a lost link.
   if (errno == EAGAIN || errno == ENOBUFS) {
     send_failed_ = true;
-    error_ = interface_ + ": sending: " + said(errno);
+    error_ = interface_ + ": sending: " + error_text(errno);
   } else {
     fail("sending", errno);
   }

@@ -540,8 +540,8 @@ Exchange ModbusConnection::read(int unit, ModbusTable table, std::uint16_t addre
   const std::size_t data_bytes = answer_bytes - 2;
   // Some gateways fill their frames up.
   if (answer.size() < answer_bytes || answer[1] != data_bytes) {
-    const std::size_t said = answer.size() < 2 ? 0 : answer[1];
-    const std::size_t came = said == data_bytes ? answer.size() - 2 : said;
+    const std::size_t declared = answer.size() < 2 ? 0 : answer[1];
+    const std::size_t came = declared == data_bytes ? answer.size() - 2 : declared;
     implementation_->reject(unit, exchange,
                             "expected " + std::to_string(data_bytes) + " bytes of data, got " +
                                 std::to_string(came) +

@@ -86,7 +86,7 @@ void CanInterfaceSource::follow_link() {
 void CanInterfaceSource::publish() {
   write_readings(slot_.back());
   slot_.publish();
-  std::vector<UnitHealth> now_told = units(monotonic_now());
+  std::vector<UnitHealth> units_now = units(monotonic_now());
   const std::scoped_lock lock(health_mutex_);
   health_.connected = usable();
   health_.last_error = socket_.error();
@@ -96,7 +96,7 @@ void CanInterfaceSource::publish() {
   health_.bus_offs = socket_.errors().bus_off;
   health_.restarts = socket_.errors().restarted;
   health_.dropped = socket_.errors().dropped;
-  health_.units = std::move(now_told);
+  health_.units = std::move(units_now);
 }
 
 namespace {

@@ -154,7 +154,7 @@ BusHealth ModbusPoller::health() const {
 
 nanoseconds ModbusPoller::next_action_at() const noexcept {
   if (connection_.connected()) return due(devices_[most_due()]);
-  if (lost_ && !loss_told_ && connection_.now() < next_connect_at_) return connection_.now();
+  if (lost_ && !loss_reported_ && connection_.now() < next_connect_at_) return connection_.now();
   return next_connect_at_;
 }
 
@@ -163,7 +163,7 @@ void ModbusPoller::act() {
   if (connection_.connected()) {
     Device& device = devices_[most_due()];
     if (connection_.pause_until(due(device))) poll(device);
-  } else if (lost_ && !loss_told_ && connection_.now() < next_connect_at_) {
+  } else if (lost_ && !loss_reported_ && connection_.now() < next_connect_at_) {
     set_lost();  // else closed on purpose: the failed exchanges have said what is wrong
   } else if (connection_.pause_until(next_connect_at_)) {
     connect();
@@ -192,7 +192,7 @@ void ModbusPoller::note_connected() {
     }
   }
   lost_ = false;
-  loss_told_ = false;
+  loss_reported_ = false;
   const std::lock_guard lock(health_mutex_);
   health_.connected = true;
   health_.connects = connects_;
@@ -202,7 +202,7 @@ void ModbusPoller::note_connected() {
 /// No line: no reading of the bus may be believed any longer.
 void ModbusPoller::set_lost() {
   lost_ = true;
-  loss_told_ = true;
+  loss_reported_ = true;
   for (Device& device : devices_) {
     for (Request& request : device.requests) request.fault = Fault::no_answer;
     finish_round(device, false);

@@ -113,7 +113,7 @@ class ModbusPoller final : public LineUser {
   WaitFreeSlot<std::vector<Reading>> slot_;
   nanoseconds next_connect_at_{0};
   bool lost_{true};  ///< no line, or not yet
-  bool loss_told_{false};
+  bool loss_reported_{false};
   std::uint64_t connects_{0};  ///< of the connection, when it was looked at last
   mutable std::mutex health_mutex_;
   BusHealth health_;

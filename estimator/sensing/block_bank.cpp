@@ -225,7 +225,7 @@ bool BlockBank::update_without_the_missing(const Block& block, double& temp_degC
   return count > 0;
 }
 
-void BlockBank::say(std::size_t column, double temp_degC) noexcept {
+void BlockBank::continue_from(std::size_t column, double temp_degC) noexcept {
   Block& block = blocks_[column];
   for (std::size_t i = 0; i < block.sensors.size(); ++i)
     if (const double value_K = values_K_[block.sensors[i]]; std::isfinite(value_K))

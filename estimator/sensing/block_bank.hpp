@@ -41,7 +41,7 @@ class BlockBank {
   bool join(std::span<const std::uint8_t> left_out) noexcept;
   /// From now on the block's temperature is `temp_degC`, since a sensor of it is left out: the
   /// deviations of the others count from there.
-  void say(std::size_t column, double temp_degC) noexcept;
+  void continue_from(std::size_t column, double temp_degC) noexcept;
 
   /// Shape (columns): the blocks' temperatures; the last known one where not good, NaN before the
   /// first.

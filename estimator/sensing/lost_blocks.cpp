@@ -31,7 +31,7 @@ LostBlocks::LostBlocks(const ThermalModel& model, nanoseconds settle)
   state_.restored.assign(inputs_, 0);
   state_.lost_since.assign(inputs_, nanoseconds{});
   state_.lost_at.assign(inputs_, 0);
-  said_K2_.assign(inputs_, 0.0);
+  given_K2_.assign(inputs_, 0.0);
   for (auto* matrix :
        {&state_.gain, &state_.spread_K2, &state_.drift_K2, &state_.error_K2, &factor_})
     matrix->assign(inputs_ * inputs_, 0.0);
@@ -56,7 +56,7 @@ void LostBlocks::step(nanoseconds now, std::span<const double> temps_degC,
     changed = changed || (good[i] == 0) != (state_.lost[i] != 0);
   if (changed) change_pattern(now, temps_degC, good);
   // Kept longer it would be a state that is not saved: a block may go on by another sensor.
-  std::fill(said_K2_.begin(), said_K2_.end(), 0.0);
+  std::fill(given_K2_.begin(), given_K2_.end(), 0.0);
   for (std::size_t i = 0; i < columns_.size(); ++i)
     if (good[i] != 0 || i >= inputs_) state_.temps_degC[i] = temps_degC[i];
   for (std::size_t i = 0; i < inputs_; ++i)
@@ -154,7 +154,7 @@ void LostBlocks::change_pattern(nanoseconds now, std::span<const double> temps_d
     for (std::size_t k = 0; k < inputs_; ++k)
       state_.drift_K2[at(i, k)] = state_.drift_K2[at(k, i)] = 0.0;
     // The value it had last was not exact, and what it would show now would not be either.
-    state_.drift_K2[at(i, i)] = 2.0 * growth_.noise_K * growth_.noise_K + said_K2_[i];
+    state_.drift_K2[at(i, i)] = 2.0 * growth_.noise_K * growth_.noise_K + given_K2_[i];
   }
   // A lost one: what was last measured, or estimated.
   for (std::size_t i = 0; i < inputs_; ++i)
@@ -164,10 +164,10 @@ void LostBlocks::change_pattern(nanoseconds now, std::span<const double> temps_d
   condition();
 }
 
-void LostBlocks::say(std::size_t input, double temp_degC, double sd_K) noexcept {
+void LostBlocks::continue_from(std::size_t input, double temp_degC, double sd_K) noexcept {
   if (!state_.begun || input >= inputs_ || state_.lost[input] != 0) return;
   state_.temps_degC[input] = temp_degC;
-  said_K2_[input] = sd_K * sd_K;
+  given_K2_[input] = sd_K * sd_K;
 }
 
 void LostBlocks::list_lost() noexcept {

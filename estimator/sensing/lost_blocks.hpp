@@ -54,7 +54,7 @@ class LostBlocks {
 
   /// Just before the step in which a measured input is given up: the value to take it for, because
   /// its last measured one is not believed. Does nothing for an input that is lost already.
-  void say(std::size_t input, double temp_degC, double sd_K) noexcept;
+  void continue_from(std::size_t input, double temp_degC, double sd_K) noexcept;
 
   /// Before the first step: temperature at the end of the previous run, an unknown time ago.
   void restore(std::size_t column, double temp_degC) noexcept;
@@ -108,7 +108,7 @@ class LostBlocks {
 
   State state_;
 
-  std::vector<double> said_K2_;   ///< of say(), for the same step
+  std::vector<double> given_K2_;  ///< of continue_from(), for the same step
   std::vector<double> factor_;    ///< scratch: Cholesky factor of Q_LL, then its inverse
   std::vector<int> column_plan_;  ///< index in the previous one, -1: none
   std::vector<int> input_plan_;

@@ -139,8 +139,8 @@ std::span<const std::uint8_t> Sensing::suspect(nanoseconds now) noexcept {
     blocks_.screened(now, screened_K_);
     suspicion_->step(now, screened_K_);
     for (const Suspicion::Corrected& input : suspicion_->newly_weighed_down()) {
-      blocks_.say(input.input, input.temp_degC);
-      lost_.say(input.input, input.temp_degC, input.sd_K);
+      blocks_.continue_from(input.input, input.temp_degC);
+      lost_.continue_from(input.input, input.temp_degC, input.sd_K);
     }
   }
   return suspicion_->count() > 0 ? suspicion_->weighed_down() : std::span<const std::uint8_t>{};

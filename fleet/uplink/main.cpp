@@ -39,19 +39,19 @@ int run_once(Uplink& uplink) {
 /// Until a signal ends it. A server that is away is asked again after 2 s, 4 s, ... 5 min.
 void run_on(Uplink& uplink, const UplinkSettings& settings, const Pace& pace) {
   std::chrono::duration<double> wait = first_wait;
-  std::string told;
+  std::string reported;
   for (;;) {
     try {
       uplink.send_new();
-      if (!told.empty()) spdlog::info("sending again");
-      told.clear();
+      if (!reported.empty()) spdlog::info("sending again");
+      reported.clear();
       wait = first_wait;
       pace.sleep(std::chrono::duration<double>(settings.period_s));
     } catch (const std::exception& error) {
       uplink.hang_up();
-      if (const std::string why = first_line(error.what()); why != told) {
+      if (const std::string why = first_line(error.what()); why != reported) {
         spdlog::warn("not sent: {}", why);
-        told = why;
+        reported = why;
       }
       pace.sleep(wait);
       wait = std::min<std::chrono::duration<double>>(2.0 * wait, longest_wait);

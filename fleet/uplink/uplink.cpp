@@ -62,12 +62,12 @@ bool Uplink::send_new() {
 void Uplink::exchange() {
   try {
     exchange_releases(*store_, settings_.releases);
-    told_.clear();
+    reported_error_.clear();
   } catch (const pqxx::broken_connection&) {
     throw;
   } catch (const std::exception& error) {
-    if (told_ != error.what()) spdlog::warn("releases: {}", error.what());
-    told_ = error.what();
+    if (reported_error_ != error.what()) spdlog::warn("releases: {}", error.what());
+    reported_error_ = error.what();
   }
 }
 

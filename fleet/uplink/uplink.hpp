@@ -64,7 +64,7 @@ class Uplink {
   Pace& pace_;
   std::optional<pqxx::connection> store_;
   std::vector<Source> sources_;
-  std::string told_;  ///< of releases, wrong since
+  std::string reported_error_;  ///< of releases, wrong since
 };
 
 }  // namespace thermocomp::fleet

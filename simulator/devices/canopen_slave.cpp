@@ -291,13 +291,13 @@ void CanopenSlave::tell_faults() {
   const std::uint8_t error_register = any ? 1 : 0;
   objects_[{0x1001, 0}] = number(error_register, 1);
   for (std::size_t i = 0; i < places_.size(); ++i) {
-    const std::uint8_t told = emergencies_[i];
-    if (told == before[i] && !(again && told != 0)) continue;
+    const std::uint8_t shown = emergencies_[i];
+    if (shown == before[i] && !(again && shown != 0)) continue;
     std::vector<std::uint8_t> frame(8);
-    put_little_endian(frame, 0, 2, told != 0 ? sensor_error : 0);
+    put_little_endian(frame, 0, 2, shown != 0 ? sensor_error : 0);
     frame[2] = error_register;
     frame[3] = static_cast<std::uint8_t>(places_[i].emergency_channel);
-    frame[4] = told;
+    frame[4] = shown;
     put(0x080, frame);
   }
 }

@@ -59,7 +59,7 @@ class CanopenSlave final : public FieldNode {
   std::vector<std::uint8_t> segments_;                        ///< left of a segmented read
   std::vector<CanopenChannel> places_;                        ///< of the channels
   std::map<std::uint32_t, std::vector<std::uint8_t>> tpdos_;  ///< by COB-ID
-  std::vector<std::uint8_t> emergencies_;  ///< told of each channel: 0, or byte 5 of the message
+  std::vector<std::uint8_t> emergencies_;  ///< shown of each channel: 0, or byte 5 of the message
   nanoseconds pdo_at_{};
   nanoseconds heartbeat_at_{};
   nanoseconds emergency_at_{};

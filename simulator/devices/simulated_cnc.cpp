@@ -50,9 +50,9 @@ SimulatedCnc::SimulatedCnc(const SimulatedController& config)
 
 void SimulatedCnc::take(double now_s, const CncOrder& order) {
   THERMOCOMP_ENSURE(order.offset_um.size() == wanted_um_.size());
-  const bool beat = told_ && order.heartbeat != heartbeat_;
+  const bool beat = has_order_ && order.heartbeat != heartbeat_;
   heartbeat_ = order.heartbeat;
-  told_ = true;
+  has_order_ = true;
   if (beat) {
     beaten_ = true;
     beat_at_s_ = now_s;

@@ -92,7 +92,7 @@ class SimulatedCnc {
   std::vector<std::uint64_t> set_numbers_;
   std::vector<std::optional<SimulatedPiezo>> piezos_;
   bool rejects_{false};
-  bool told_{false};
+  bool has_order_{false};
   bool beaten_{false};
   bool alive_{false};
   double heartbeat_{0.0};

@@ -63,10 +63,10 @@ bool lists(const FaultCodes& codes, const NodeEvent& event) {
 void check_event(const TomlTable& table, const SimulatedCanopenNode& node, const NodeEvent& event) {
   if (!channel_fault(event.kind) || event.channel >= node.channels.size()) return;
   const CanopenNodeChannel& channel = node.channels[event.channel];
-  const bool is_told =
+  const bool is_shown =
       node.emergency == EmergencyForm::jumo && !event.code &&
       (event.kind == NodeEventKind::open_circuit || event.kind == NodeEventKind::short_circuit);
-  if (is_told || lists(channel.codes, event) || lists(channel.status.codes, event)) return;
+  if (is_shown || lists(channel.codes, event) || lists(channel.status.codes, event)) return;
   table.problem(event.code ? "code" : "kind", "is nothing that the channel can show");
 }
 

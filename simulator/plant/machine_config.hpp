@@ -21,7 +21,7 @@ struct SimulatedBus {
   std::string name;
   SimulatedBusKind kind{SimulatedBusKind::modbus_tcp};
   std::string host{"127.0.0.1"};  ///< address to listen at
-  int port{0};                    ///< 0: any free one, told when ready
+  int port{0};                    ///< 0: any free one, named when ready
   std::string device;             ///< RTU: a symbolic link to the pty is put here
   int baud{9600};
   bool line_delay{false};     ///< RTU: bytes take the time that the baud rate implies
@@ -140,7 +140,7 @@ enum class MachineEventKind {
   exception,      ///< the answer is Modbus exception `code`
   reboot,         ///< connections closed; nothing for the duration; a controller forgets its offset
   reject,         ///< the controller answers, but leaves the offset as it is
-  misapply,       ///< the controller applies change_um more than it was told
+  misapply,       ///< the controller applies change_um more than was sent
   rehome          ///< the controller's applied offset falls to zero until it is written anew
 };
 

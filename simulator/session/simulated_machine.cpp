@@ -452,9 +452,9 @@ struct SimulatedMachine::Parts {
   /// A device that tells a fault beside the value leaves a temperature in the value's place; one
   /// that has no code at all for an open circuit shows its highest value, or NaN.
   static double shown(const SimulatedChannel& channel, const ChannelEffect& effect, double value) {
-    const bool told_beside = (channel.status && code_for(channel.status->codes, effect)) ||
-                             code_for(channel.can_status.codes, effect);
-    return effect.fault == ChannelFault::open_circuit && !told_beside ? not_a_number : value;
+    const bool shown_beside = (channel.status && code_for(channel.status->codes, effect)) ||
+                              code_for(channel.can_status.codes, effect);
+    return effect.fault == ChannelFault::open_circuit && !shown_beside ? not_a_number : value;
   }
 
   static void show_channel(Device& device, const SimulatedChannel& channel, bool can,
@@ -476,8 +476,8 @@ struct SimulatedMachine::Parts {
     }
     if (!channel.status) return;
     const SimulatedStatus& status = *channel.status;
-    const auto told = code_for(status.codes, seen);
-    const auto bits = static_cast<unsigned>(told ? *told : status.good) & status.mask;
+    const auto code = code_for(status.codes, seen);
+    const auto bits = static_cast<unsigned>(code ? *code : status.good) & status.mask;
     const unsigned others =
         device.unit.word(status.table, status.address) & ~static_cast<unsigned>(status.mask);
     device.unit.set(status.table, status.address, static_cast<std::uint16_t>(bits | others));

@@ -158,17 +158,18 @@ void Invariants::check_command(const CycleSeen& seen) {
     demand(std::isfinite(offset_um), "only_finite_numbers", seen.now, "offset");
     const LimiterConfig& limiter = seen.shape->estimator.axes[i].limiter;
     const double step_um = limiter.rate_um_per_s_max * dt_s + tiny_um;
-    const double told_um = seen.told->applied_um[i];
-    const bool from_applied = std::abs(told_um) <= largest_bound_um_[i] + register_rounding_um &&
-                              std::abs(offset_um - told_um) <= step_um + register_rounding_um;
+    const double reported_um = seen.reported->applied_um[i];
+    const bool from_applied =
+        std::abs(reported_um) <= largest_bound_um_[i] + register_rounding_um &&
+        std::abs(offset_um - reported_um) <= step_um + register_rounding_um;
     double bound_um = std::max(limiter.offset_um_max, std::abs(offset_um_[i]));
-    if (from_applied) bound_um = std::max(bound_um, std::abs(told_um));
+    if (from_applied) bound_um = std::max(bound_um, std::abs(reported_um));
     demand(std::abs(offset_um) <= bound_um + tiny_um, "offset_within_bound", seen.now,
            [&] { return fmt::format("axis {}: {:.4f} um beside {:.4f}", i, offset_um, bound_um); });
     demand(std::abs(offset_um - offset_um_[i]) <= step_um || from_applied || is_released(seen, i),
            "slew_kept_by_command", seen.now, [&] {
              return fmt::format("axis {}: from {:.4f} to {:.4f} um in {:.3f} s, applied {:.4f}", i,
-                                offset_um_[i], offset_um, dt_s, told_um);
+                                offset_um_[i], offset_um, dt_s, reported_um);
            });
   }
 }
@@ -194,7 +195,7 @@ void Invariants::check_hold(const CycleSeen& seen) {
          "compensating although a block has no reading");
   if (report.mode == Mode::compensating) last_compensating_ = seen.now;
   const bool disabled = report.mode == Mode::disabled;
-  const bool cutting = seen.told->online && seen.told->signals[0] >= 0.5;
+  const bool cutting = seen.reported->online && seen.reported->signals[0] >= 0.5;
   const bool proving = std::any_of(report.axes.begin(), report.axes.end(),
                                    [](const AxisReport& axis) { return axis.proving; });
   if (first_ || disabled || proving) return;
@@ -202,13 +203,13 @@ void Invariants::check_hold(const CycleSeen& seen) {
   for (std::size_t i = 0; i < axes_count; ++i) {
     const double change_um = seen.command->offset_um[i] - offset_um_[i];
     const double rate_um = seen.shape->estimator.axes[i].limiter.rate_um_per_s_max;
-    const bool from_applied = std::abs(seen.command->offset_um[i] - seen.told->applied_um[i]) <=
+    const bool from_applied = std::abs(seen.command->offset_um[i] - seen.reported->applied_um[i]) <=
                               rate_um + register_rounding_um;
     if (is_released(seen, i)) continue;
     if (change_um == 0.0 || (from_applied && report.axes[i].disagrees)) continue;
     const double bound_um = seen.shape->estimator.axes[i].limiter.offset_um_max;
     const bool beyond_new_bound =
-        std::max(std::abs(offset_um_[i]), std::abs(seen.told->applied_um[i])) > bound_um &&
+        std::max(std::abs(offset_um_[i]), std::abs(seen.reported->applied_um[i])) > bound_um &&
         std::abs(seen.command->offset_um[i]) >= bound_um - tiny_um;
     if (beyond_new_bound) continue;
     const bool resynced = from_applied && !twice;
@@ -218,7 +219,7 @@ void Invariants::check_hold(const CycleSeen& seen) {
     const bool may_ramp = policy.on_loss == LossPolicy::ramp_to_zero && held_s >= policy.hold_s;
     const bool inwards = std::abs(seen.command->offset_um[i]) < std::abs(offset_um_[i]);
     // At a new epoch the offset starts from the read-back.
-    const bool at_applied = std::abs(seen.command->offset_um[i] - seen.told->applied_um[i]) <=
+    const bool at_applied = std::abs(seen.command->offset_um[i] - seen.reported->applied_um[i]) <=
                             register_rounding_um + rate_um * (may_ramp && !cutting ? 1.0 : 0.0);
     demand(at_applied || (may_ramp && inwards && !cutting), "hold_policy_kept", seen.now, [&] {
       return fmt::format("axis {}: {:+.4f} um after {:.1f} s without data{}", i, change_um, held_s,
@@ -308,7 +309,7 @@ void Invariants::check_learning(const CycleSeen& seen, std::size_t axis) {
       return fmt::format("axis {}: the estimate moves by {:.4f} um, {:.4f} allowed", axis,
                          change_um, allowed_um);
     });
-  const bool cutting = seen.told->online && seen.told->signals[0] >= 0.5;
+  const bool cutting = seen.reported->online && seen.reported->signals[0] >= 0.5;
   demand(!cutting || !used_changed, "nothing_learned_mid_cut", seen.now,
          [&] { return fmt::format("axis {}: its gains change while cutting", axis); });
 }

@@ -1,5 +1,5 @@
 /// What must hold in every step, whatever happens. Judged from what the simulated machine gave out
-/// and was told, not from what the code under test believes.
+/// and was reported, not from what the code under test believes.
 #pragma once
 
 #include <array>
@@ -31,7 +31,7 @@ struct Broken {
 struct CycleSeen {
   nanoseconds now{};
   std::span<const Reading> readings;
-  const ControllerState* told{nullptr};  ///< of the controller, as the estimator got it
+  const ControllerState* reported{nullptr};  ///< of the controller, as the estimator got it
   const OffsetCommand* command{nullptr};
   const Report* report{nullptr};
   const MachineShape* shape{nullptr};  ///< the configuration in force
@@ -146,7 +146,7 @@ class Invariants {
   struct Budget {
     double um{0.0};
     nanoseconds at{};
-    std::array<double, 16> told_um{};
+    std::array<double, 16> reported_um{};
     std::size_t count{0};
     nanoseconds disturbed_at{-std::chrono::hours(1)};
   };

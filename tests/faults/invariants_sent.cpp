@@ -43,9 +43,9 @@ void Invariants::check_move(const CycleSeen& seen, const Move& move,
   if (move.disturbed || lies) budget.disturbed_at = move.at;
   if (move.at - budget.disturbed_at < settling) {
     // What lies among the offsets sent of late cannot be told from obedience.
-    const auto end = budget.told_um.begin() +
+    const auto end = budget.reported_um.begin() +
                      static_cast<std::ptrdiff_t>(std::min<std::size_t>(budget.count, 16));
-    const auto [low, high] = std::minmax_element(budget.told_um.begin(), end);
+    const auto [low, high] = std::minmax_element(budget.reported_um.begin(), end);
     allowed_um += 3.0 + 2.0 * resolution_um_ + (budget.count == 0 ? 0.0 : *high - *low);
   }
   const bool knowable =
@@ -57,7 +57,7 @@ void Invariants::check_move(const CycleSeen& seen, const Move& move,
     });
   budget.um = std::max(0.0, budget.um - std::max(0.0, change_um - 2.0 * resolution_um_));
   if (move.disturbed) budget.um = rate_um * stall_s;  // a new start
-  budget.told_um[budget.count++ % 16] = move.to_um;
+  budget.reported_um[budget.count++ % 16] = move.to_um;
   demand(std::abs(move.to_um) <= largest_bound_um_[move.axis] + register_rounding_um,
          "offset_within_bound", seen.now, [&] {
            return fmt::format("axis {}: the controller is told {:.4f} um", move.axis, move.to_um);
@@ -71,7 +71,7 @@ void Invariants::check_first(const CycleSeen& seen, const Move& move) {
   const double rounding_um = 2.0 * resolution_um_ + tiny_um;
   const double slack_um =
       rounding_um + rate_um_per_s_[move.axis] * (2.0 * period_s_ + link_period_s_);
-  const bool is_read = std::isfinite(seen.told->applied_um[move.axis]);
+  const bool is_read = std::isfinite(seen.reported->applied_um[move.axis]);
   const bool held = is_read && std::abs(move.to_um - move.from_um) <= slack_um;
   const double before_um = wanted_before_um_[move.axis];
   const bool wanted = std::abs(move.to_um - before_um) <= leap_um_[move.axis] + slack_um;
@@ -136,7 +136,7 @@ std::pair<double, double> Invariants::Sent::range_um(double with_um) const {
 /// Read-backs that nothing sent explains, one after the other: the axis is not driven.
 void Invariants::check_unexplained(const CycleSeen& seen, std::size_t axis) {
   Sent& sent = sent_[axis];
-  const double told_um = seen.told->applied_um[axis];
+  const double reported_um = seen.reported->applied_um[axis];
   const bool latched = seen.report->axes[axis].latched;
   demand(!latched || !seen.command->valid[axis], "unexplained_is_latched", seen.now,
          [&] { return fmt::format("axis {}: driven although latched", axis); });
@@ -144,7 +144,8 @@ void Invariants::check_unexplained(const CycleSeen& seen, std::size_t axis) {
          [&] { return fmt::format("axis {}: nobody released it", axis); });
   if (!latched) sent.released = false;
   sent.latched = latched;
-  if (!reads_back_ || !seen.told->online || sent.lately.empty() || !std::isfinite(told_um)) return;
+  if (!reads_back_ || !seen.reported->online || sent.lately.empty() || !std::isfinite(reported_um))
+    return;
   // What the cycle wants explains a read-back as well as what reached the controller: after a
   // release or on a new link it starts from what is read back, and the write may be refused.
   const double wanted_um = seen.command->offset_um[axis];
@@ -160,20 +161,22 @@ void Invariants::check_unexplained(const CycleSeen& seen, std::size_t axis) {
   }
   const double slack_um = seen.shape->estimator.compensation.mismatch_um + 2.0 +
                           rate_um_per_s_[axis] * (link_period_s_ + 2.0 * period_s_);
-  const bool unexplained = told_um < low_um - slack_um || told_um > high_um + slack_um;
+  const bool unexplained = reported_um < low_um - slack_um || reported_um > high_um + slack_um;
   // What has been latched, or was before a release, counts from here.
-  const bool told = latched || has_reason(seen.report->reasons, Reason::applied_out_of_bound);
-  if (!unexplained || told) sent.unexplained = 0;
-  if (unexplained && !told && seen.told->taken_at != sent.read_back_at) ++sent.unexplained;
-  sent.read_back_at = seen.told->taken_at;
+  const bool is_reported =
+      latched || has_reason(seen.report->reasons, Reason::applied_out_of_bound);
+  if (!unexplained || is_reported) sent.unexplained = 0;
+  if (unexplained && !is_reported && seen.reported->taken_at != sent.read_back_at)
+    ++sent.unexplained;
+  sent.read_back_at = seen.reported->taken_at;
   if (sent.unexplained < 5) return;
-  demand(told, "unexplained_is_latched", seen.now, [&] {
-    return fmt::format("axis {}: {:.4f} um is read back time and again, and nobody is told", axis,
-                       told_um);
+  demand(is_reported, "unexplained_is_latched", seen.now, [&] {
+    return fmt::format("axis {}: {:.4f} um is read back time and again, and no reason says so",
+                       axis, reported_um);
   });
   demand(!seen.command->valid[axis], "unexplained_is_latched", seen.now, [&] {
     return fmt::format("axis {}: driven at {:.4f} um although {:.4f} um is read back", axis,
-                       seen.command->offset_um[axis], told_um);
+                       seen.command->offset_um[axis], reported_um);
   });
 }
 

@@ -436,11 +436,11 @@ class Life {
   void remember(const CycleSeen& seen) {
     std::string line =
         fmt::format("{:>10.2f} s  {:<15} epoch {}{}", life_s(), to_string(report_.mode),
-                    seen.told->link_epoch, seen.told->online ? "" : " offline");
+                    seen.reported->link_epoch, seen.reported->online ? "" : " offline");
     for (std::size_t i = 0; i < axes_count; ++i)
       line +=
           fmt::format("  {:.4f}{}", seen.command->offset_um[i], seen.command->valid[i] ? "" : "!") +
-          fmt::format(" (told {:.4f}, is {:.4f})", seen.told->applied_um[i],
+          fmt::format(" (told {:.4f}, is {:.4f})", seen.reported->applied_um[i],
                       world_.controller.applied_um(i));
     for (std::size_t i = 0; i < sensors_count; ++i)
       if (seen.readings[i].fault != Fault::none || report_.sensors[i].fault != Fault::none)

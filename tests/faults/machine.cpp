@@ -300,7 +300,8 @@ bool SimulatedController::read(std::size_t address, std::span<std::uint16_t> wor
     if (at >= 100 && at < 100 + image.size()) words[i] = image[at - 100];
     if (at >= 200 && at < 200 + written_.size()) words[i] = written_[at - 200];
   }
-  // A restart is told by registers, or by having been away for long since the daemon was there.
+  // A restart is recognised by registers, or by having been away for long since the daemon was
+  // there.
   const bool tells =
       reads_back(seed_) || of_written || (!shows_registers(seed_) && restart_is_noticed_);
   is_in_contact_ = true;
@@ -333,21 +334,21 @@ bool SimulatedController::write(std::size_t address, std::span<const std::uint16
   for (std::size_t axis = 0; axis < axes_count; ++axis) {
     if (!is_ordered(axis)) continue;
     const std::size_t at = offset_at(axis);
-    double told_um = 0.1 * static_cast<double>(static_cast<std::int16_t>(written_[at]));
+    double reported_um = 0.1 * static_cast<double>(static_cast<std::int16_t>(written_[at]));
     if (floats_)
-      told_um = static_cast<double>(
+      reported_um = static_cast<double>(
           std::bit_cast<float>(static_cast<std::uint32_t>(written_[at]) << 16 | written_[at + 1]));
-    moves_.push_back({axis, time, applied_um_[axis], told_um, disturbed_[axis], seen_[axis],
+    moves_.push_back({axis, time, applied_um_[axis], reported_um, disturbed_[axis], seen_[axis],
                       breaks_, looked_at_, seen_at_[axis]});
     if (reads_back(seed_) && lie(FaultKind::controller_ignoring, axis, time) != nullptr) {
       disturb(axis, applied_um_[axis]);
       continue;
     }
-    applied_um_[axis] = told_um;
+    applied_um_[axis] = reported_um;
     disturbed_[axis] = false;
     seen_[axis] = true;
     if (schedule_.find(FaultKind::controller_applies_other, time) != nullptr)
-      disturb(axis, 0.6 * told_um + 4.0);
+      disturb(axis, 0.6 * reported_um + 4.0);
   }
   return true;
 }

@@ -132,7 +132,8 @@ TEST_CASE("what the CAN controller applies and measures is read back", "[vm][con
   CHECK(eventually([&] { return cycle.state().applied_um[0] == Approx(1.0); }));
 }
 
-TEST_CASE("no offset is sent before the CAN controller has told everything", "[vm][controller]") {
+TEST_CASE("no offset is sent before the CAN controller has reported everything",
+          "[vm][controller]") {
   Candump dump("vcan0,100:7FF");
   Machine machine("vcan0");
   machine.tells_speed = false;

@@ -215,7 +215,8 @@ TEST_CASE("frames lost because nobody read them are counted", "[vm][source]") {
   CHECK(received + socket.errors().dropped == sent);
 }
 
-TEST_CASE("the error state of an interface is told, with the time it was entered", "[vm][source]") {
+TEST_CASE("the error state of an interface is reported, with the time it was entered",
+          "[vm][source]") {
   Running bus(two_nodes("vcan0"));
   CHECK(bus.source.health().state == "active");
   REQUIRE(shell("cansend vcan0 181#0A001400"));

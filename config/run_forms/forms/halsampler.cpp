@@ -154,17 +154,17 @@ PlainTable plain_halsampler(const Log& log) {
     log.refuse(0, "", std::to_string(overruns) + " overruns",
                "lost samples, and without their numbers nothing tells how many: record with "
                "halsampler -t");
-  table.said.push_back(std::string("numbers between blanks, ") +
-                       (numbered ? "samples numbered (-t)" : "samples not numbered"));
+  table.notes.push_back(std::string("numbers between blanks, ") +
+                        (numbered ? "samples numbered (-t)" : "samples not numbered"));
   if (!timed)
-    table.said.push_back("time_s: a sample each " + number_text(*log.map.period_s) +
-                         " s, from the first row");
+    table.notes.push_back("time_s: a sample each " + number_text(*log.map.period_s) +
+                          " s, from the first row");
   for (std::size_t i = 0; i < names.size(); ++i)
-    table.said.push_back("number " + std::to_string(i + (numbered ? 2 : 1)) + " is " + names[i] +
-                         (unit_of(names[i]).suffix.empty() ? ", a signal without unit" : ""));
+    table.notes.push_back("number " + std::to_string(i + (numbered ? 2 : 1)) + " is " + names[i] +
+                          (unit_of(names[i]).suffix.empty() ? ", a signal without unit" : ""));
   if (overruns > 0)
-    table.said.push_back("lost: " + std::to_string(overruns) +
-                         " times the buffer ran over; a gap each");
+    table.notes.push_back("lost: " + std::to_string(overruns) +
+                          " times the buffer ran over; a gap each");
   return table;
 }
 
@@ -216,8 +216,8 @@ PlainTable plain_halscope(const Log& log) {
       table.text.append(",").append(row < column.size() ? column[row] : "");
   }
   table.text += '\n';
-  table.said.push_back("halscope of LinuxCNC, a sample each " + number_text(*period_ns * 1e-9) +
-                       " s");
+  table.notes.push_back("halscope of LinuxCNC, a sample each " + number_text(*period_ns * 1e-9) +
+                        " s");
   return table;
 }
 

@@ -48,7 +48,7 @@ struct Series {
   const char* key;
   const char* end;
   double factor;
-  const char* said;
+  const char* note;
 };
 constexpr Series series[] = {{"temperatures", "_degC", 1.0, ""},
                              {"targets", "_target", 1.0, ", a signal: what the heater was set to"},
@@ -77,7 +77,7 @@ void add_series(const Log& log, const std::string& full, const std::string& plai
       log.refuse(
           0, key, std::to_string(column.values.size()) + " values",
           "must be as many as the others have, " + std::to_string(columns.front().values.size()));
-    table.said.push_back("'" + full + "' " + one.key + " is " + column.name + one.said);
+    table.notes.push_back("'" + full + "' " + one.key + " is " + column.name + one.note);
     columns.push_back(std::move(column));
   }
 }
@@ -92,9 +92,9 @@ PlainTable plain_store(const Log& log, const json& store) {
   PlainTable table;
   table.has_own_names = true;
   const double period_s = log.map.period_s.value_or(1.0);
-  table.said.push_back("temperature store of Moonraker, a row each " + number_text(period_s) +
-                       " s" + (log.map.period_s ? "" : " (its own period)") +
-                       "; it has no time of day");
+  table.notes.push_back("temperature store of Moonraker, a row each " + number_text(period_s) +
+                        " s" + (log.map.period_s ? "" : " (its own period)") +
+                        "; it has no time of day");
   std::vector<NamedValues> columns;
   const auto names = short_names(store);
   for (const auto& [full, object] : store.items())
@@ -254,7 +254,7 @@ PlainTable plain_lines(const Log& log) {
   PlainTable table;
   table.text = records.text();
   table.lines_above = -1;
-  table.said.emplace_back("JSON, a record a line; what a record does not have is missing");
+  table.notes.emplace_back("JSON, a record a line; what a record does not have is missing");
   return table;
 }
 
@@ -292,9 +292,9 @@ PlainTable plain_json(const Log& log) {
         "their names, or the answer of Moonraker's server/temperature_store, a list "
         "\"temperatures\" for each heater and sensor");
   table.text = records.text();
-  table.said.emplace_back(has_tables
-                              ? "JSON, names once and lists of values"
-                              : "JSON, a row a record; what a record does not have is missing");
+  table.notes.emplace_back(has_tables
+                               ? "JSON, names once and lists of values"
+                               : "JSON, a row a record; what a record does not have is missing");
   return table;
 }
 

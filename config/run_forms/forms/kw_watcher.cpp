@@ -23,7 +23,7 @@ PlainTable plain_kw_watcher(const Log& log) {
     table.text.append(",").append(with_unit(head[1][i], head[6][i]));
   table.text.append("\n").append(rest);
   table.lines_above = 6;
-  table.said.emplace_back("KW Watcher: names in line 2, units in line 7");
+  table.notes.emplace_back("KW Watcher: names in line 2, units in line 7");
   return table;
 }
 

@@ -114,9 +114,9 @@ PlainTable plain_labelled(const Log& log) {
     for (const std::string& value : row) table.text.append(",").append(in_quotes(value));
   }
   table.text += '\n';
-  table.said.emplace_back("lines of a time and named values");
+  table.notes.emplace_back("lines of a time and named values");
   if (left_out > 0)
-    table.said.push_back(std::to_string(left_out) + " lines without these left out");
+    table.notes.push_back(std::to_string(left_out) + " lines without these left out");
   return table;
 }
 

@@ -56,7 +56,7 @@ PlainTable plain_lvm(const Log& log) {
   }
   table.lines_above = names_line - 1 - (zero_s ? 1 : 0);
   table.text.append("\n").append(rows);
-  table.said.emplace_back("LVM of LabVIEW: names in line " + std::to_string(names_line));
+  table.notes.emplace_back("LVM of LabVIEW: names in line " + std::to_string(names_line));
   return table;
 }
 

@@ -83,7 +83,7 @@ PlainTable plain_twincat(const Log& log) {
     }
   }
   table.text += '\n';
-  table.said.emplace_back("scope of TwinCAT: the channels' names in the line \"Name\"");
+  table.notes.emplace_back("scope of TwinCAT: the channels' names in the line \"Name\"");
   return table;
 }
 

@@ -55,20 +55,20 @@ class WallComments {
   std::string at(double time_s, std::int64_t wall_ns) {
     constexpr double every_s = 3600.0;
     constexpr double off_s_max = 0.5;
-    const double expected_s = 1e-9 * static_cast<double>(wall_ns - told_wall_ns_);
-    const double passed_s = time_s - told_s_;
+    const double expected_s = 1e-9 * static_cast<double>(wall_ns - written_wall_ns_);
+    const double passed_s = time_s - written_s_;
     const bool follows = std::abs(expected_s - passed_s) <= off_s_max;
-    if (is_told_ && follows && passed_s < every_s) return {};
-    is_told_ = true;
-    told_s_ = time_s;
-    told_wall_ns_ = wall_ns;
+    if (is_written_ && follows && passed_s < every_s) return {};
+    is_written_ = true;
+    written_s_ = time_s;
+    written_wall_ns_ = wall_ns;
     return comment_at(time_s, "wall time " + utc_text(wall_ns));
   }
 
  private:
-  bool is_told_{false};
-  double told_s_{0.0};
-  std::int64_t told_wall_ns_{0};
+  bool is_written_{false};
+  double written_s_{0.0};
+  std::int64_t written_wall_ns_{0};
 };
 
 /// Writes rows as the segments give them, and between them comment lines.
@@ -174,7 +174,8 @@ class RunExport {
   }
 
   void tell_damage() {
-    for (; told_ < summary_.damage.size(); ++told_) text_ += damage_line(summary_.damage[told_]);
+    for (; reported_ < summary_.damage.size(); ++reported_)
+      text_ += damage_line(summary_.damage[reported_]);
   }
 
   const HistoryReader& reader_;
@@ -186,7 +187,7 @@ class RunExport {
   RunColumns columns_;
   std::map<std::int64_t, ExportPlaces> places_;
   ExportSummary summary_;
-  std::size_t told_{0};  ///< of its damage
+  std::size_t reported_{0};  ///< of its damage
   std::string text_;
   std::vector<double> row_;
   std::optional<double> first_s_;

@@ -181,8 +181,8 @@ bool is_good(SegmentCheck& check, Look look) {
     look();
     return true;
   } catch (const std::exception& error) {
-    constexpr std::size_t told_max = 10;
-    if (check.damage.size() < told_max) check.damage.push_back({check.segment.id, error.what()});
+    constexpr std::size_t shown_max = 10;
+    if (check.damage.size() < shown_max) check.damage.push_back({check.segment.id, error.what()});
     return false;
   }
 }

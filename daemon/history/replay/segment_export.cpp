@@ -49,9 +49,9 @@ ExportPlaces export_places(const ReplaySetup& setup, ExportContent content,
   for (const std::string& column : setup.model.temperature_columns())
     places.inputs.push_back(as_read ? none : columns.column(column));
   for (std::size_t i = 0; i < config.sensors.size(); ++i) {
-    const bool is_told = as_read || !is_in_a_block(config, i);
-    places.sensors.push_back(is_told ? columns.column(sensor_column(config.sensors[i].name))
-                                     : none);
+    const bool is_exported = as_read || !is_in_a_block(config, i);
+    places.sensors.push_back(is_exported ? columns.column(sensor_column(config.sensors[i].name))
+                                         : none);
   }
   for (const std::string& signal : config.signals) places.signals.push_back(columns.column(signal));
   for (std::size_t i = 0; i < config.axes.size(); ++i) {
@@ -97,7 +97,7 @@ SegmentExport::SegmentExport(const HistoryReader& reader, const SegmentInfo& seg
       places_(places),
       damage_(damage),
       cursor_(reader.records(segment)),
-      faults_told_(config_.sensors.size(), Fault::never_read) {
+      faults_reported_(config_.sensors.size(), Fault::never_read) {
   inputs_ = inputs_at(reader.start(segment), config_);
   measured_um_.fill(not_a_number);
   displacement_um_.fill(not_a_number);
@@ -194,9 +194,9 @@ void SegmentExport::skip() {
 }
 
 void SegmentExport::note(const std::string& why) {
-  constexpr int told_max = 10;
-  if (++told_ <= told_max) damage_.push_back({segment_.id, why});
-  if (told_ == told_max + 1) damage_.push_back({segment_.id, "and more of the kind"});
+  constexpr int shown_max = 10;
+  if (++reported_ <= shown_max) damage_.push_back({segment_.id, why});
+  if (reported_ == shown_max + 1) damage_.push_back({segment_.id, "and more of the kind"});
 }
 
 /// The next record that can be read.
@@ -334,13 +334,13 @@ Fault SegmentExport::fault_of(std::size_t sensor) const {
 }
 
 void SegmentExport::tell_faults() {
-  for (std::size_t i = 0; i < faults_told_.size(); ++i) {
+  for (std::size_t i = 0; i < faults_reported_.size(); ++i) {
     const Fault fault = fault_of(i);
-    if (fault == faults_told_[i]) continue;
+    if (fault == faults_reported_[i]) continue;
     // A value that settles is the end of what was written before, once it counts.
     if (steps_ && report_.sensors[i].settles()) continue;
-    const bool is_first_value = faults_told_[i] == Fault::never_read && fault == Fault::none;
-    faults_told_[i] = fault;
+    const bool is_first_value = faults_reported_[i] == Fault::never_read && fault == Fault::none;
+    faults_reported_[i] = fault;
     if (is_first_value) continue;  // that nothing was read before it is no news
     happened_.push_back("sensor " + config_.sensors[i].name + ": " +
                         (fault == Fault::none ? "good again" : std::string(to_string(fault))));

@@ -94,7 +94,7 @@ class SegmentExport {
   const bool dry_run_;
   const ExportPlaces& places_;
   std::vector<HistoryDamage>& damage_;
-  int told_{0};
+  int reported_{0};
   RecordCursor cursor_;
   InputsInForce inputs_;
   std::array<double, axes_max> offset_um_{};
@@ -104,7 +104,7 @@ class SegmentExport {
   bool has_record_{false};
   std::unique_ptr<SegmentSteps> steps_;  ///< null once it cannot be stepped any more
   Report report_;
-  std::vector<Fault> faults_told_;
+  std::vector<Fault> faults_reported_;
   std::vector<std::string> happened_;
   std::vector<ExportedProbing> probings_;
   std::string not_followed_;  ///< why the estimator is not stepped any more, until it is reported

@@ -263,8 +263,8 @@ class Thinning {
   }
 
   void note(std::int64_t segment, const std::string& why) {
-    constexpr std::size_t told_max = 20;
-    if (result_.damage.size() < told_max) result_.damage.push_back({segment, why});
+    constexpr std::size_t shown_max = 20;
+    if (result_.damage.size() < shown_max) result_.damage.push_back({segment, why});
   }
 
   HistoryReader reader_;

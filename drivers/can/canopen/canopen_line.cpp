@@ -138,7 +138,7 @@ void CanopenLine::send_cyclic(nanoseconds now) {
 void CanopenLine::look_for_conflicts(nanoseconds now) {
   std::map<std::uint32_t, std::vector<std::size_t>> owners;
   for (std::size_t i = 0; i < nodes_.size(); ++i) {
-    for (const std::uint32_t cob_id : nodes_[i].cob_ids_told()) owners[cob_id].push_back(i);
+    for (const std::uint32_t cob_id : nodes_[i].cob_ids_reported()) owners[cob_id].push_back(i);
   }
   std::vector<std::string> reasons(nodes_.size());
   for (const auto& [cob_id, claimed_by] : owners) {

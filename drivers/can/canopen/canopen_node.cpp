@@ -118,7 +118,7 @@ void CanopenNode::begin_setup(nanoseconds now) {
   forget_poll();
   poll_error_.clear();
   refused_.clear();
-  told_.clear();
+  cob_ids_reported_.clear();
   lost_ = false;
   heard_at_ = now;
   lose_all(Fault::no_answer, now);
@@ -238,7 +238,7 @@ void CanopenNode::take_mapping_answer(const Job& job, std::span<const std::uint8
 
 void CanopenNode::finish_mapping() {
   place_channels(mapping_, channels_);
-  told_.push_back(mapping_.cob_id);
+  cob_ids_reported_.push_back(mapping_.cob_id);
 }
 
 void CanopenNode::setup_failed(const std::string& reason, Fault fault, nanoseconds now) {

@@ -88,7 +88,9 @@ class CanopenNode {
   [[nodiscard]] const std::vector<RawReading>& raw() const noexcept { return raw_; }
   [[nodiscard]] const std::vector<CanopenChannel>& channels() const noexcept { return channels_; }
   /// COB-IDs of the TPDOs that the node has said are its own since it came up.
-  [[nodiscard]] std::span<const std::uint32_t> cob_ids_told() const noexcept { return told_; }
+  [[nodiscard]] std::span<const std::uint32_t> cob_ids_reported() const noexcept {
+    return cob_ids_reported_;
+  }
   /// Another node says that this TPDO is its own; empty: none does.
   void claim_conflict(const std::string& reason, nanoseconds now);
 
@@ -155,7 +157,7 @@ class CanopenNode {
   std::optional<std::vector<std::uint8_t>> polled_value_;
   CanopenMapping mapping_;  ///< being asked for
   int entries_{0};
-  std::vector<std::uint32_t> told_;
+  std::vector<std::uint32_t> cob_ids_reported_;
   nanoseconds retry_at_{};
   nanoseconds retry_pause_;
   nanoseconds heard_at_{};  ///< last heartbeat, or when it began to be awaited

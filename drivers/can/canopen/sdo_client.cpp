@@ -21,10 +21,10 @@ constexpr std::uint8_t specifier_mask = 0xE0;
 constexpr std::uint8_t ask_write = 0x20;
 constexpr std::uint8_t ask_read = 0x40;
 constexpr std::uint8_t ask_read_segment = 0x60;
-constexpr std::uint8_t told_segment = 0x00;
-constexpr std::uint8_t told_read = 0x40;
-constexpr std::uint8_t told_written = 0x60;
-constexpr std::uint8_t told_abort = 0x80;
+constexpr std::uint8_t response_segment = 0x00;
+constexpr std::uint8_t response_read = 0x40;
+constexpr std::uint8_t response_written = 0x60;
+constexpr std::uint8_t response_abort = 0x80;
 constexpr std::uint8_t toggle_bit = 0x10;
 constexpr std::uint8_t expedited_bit = 0x02;
 constexpr std::uint8_t size_bit = 0x01;
@@ -170,16 +170,16 @@ void SdoClient::end(SdoOutcome outcome, std::uint32_t abort_code) {
 }
 
 void SdoClient::abort(SdoOutcome outcome, std::uint32_t abort_code) {
-  send(told_abort, object_, abort_code);
+  send(response_abort, object_, abort_code);
   end(outcome, abort_code);
 }
 
 /// Bytes without which the answer cannot be read. Old nodes send no more; CiA 301 wants all eight.
 std::size_t SdoClient::bytes_used(std::span<const std::uint8_t> data) noexcept {
   const std::uint8_t specifier = data[0] & specifier_mask;
-  if (specifier == told_segment) return frame_bytes - ((data[0] >> 1) & 7u);
-  if (specifier != told_read || (data[0] & expedited_bit) == 0) {
-    return specifier == told_read && (data[0] & size_bit) != 0 ? frame_bytes : header_bytes;
+  if (specifier == response_segment) return frame_bytes - ((data[0] >> 1) & 7u);
+  if (specifier != response_read || (data[0] & expedited_bit) == 0) {
+    return specifier == response_read && (data[0] & size_bit) != 0 ? frame_bytes : header_bytes;
   }
   return (data[0] & size_bit) != 0 ? frame_bytes - ((data[0] >> 2) & 3u) : header_bytes + 1;
 }
@@ -187,7 +187,7 @@ std::size_t SdoClient::bytes_used(std::span<const std::uint8_t> data) noexcept {
 void SdoClient::take(std::span<const std::uint8_t> data, nanoseconds now) {
   if (data.empty()) return;
   const std::uint8_t specifier = data[0] & specifier_mask;
-  const bool names_object = specifier != told_segment;
+  const bool names_object = specifier != response_segment;
   const bool ours = data.size() >= header_bytes && little_endian(data, 1, 2) == object_.index &&
                     data[3] == object_.sub;
   if (!busy()) {
@@ -196,17 +196,17 @@ void SdoClient::take(std::span<const std::uint8_t> data, nanoseconds now) {
   }
   // The answer to an earlier request, late: it says nothing about this one.
   if (names_object && !ours && data.size() >= header_bytes) return;
-  if (specifier == told_abort) {
+  if (specifier == response_abort) {
     end(SdoOutcome::aborted, static_cast<std::uint32_t>(little_endian(data, 4, 4)));
   } else if (data.size() < bytes_used(data)) {
     abort(SdoOutcome::broken, length_does_not_match);
-  } else if (state_ == State::writing && specifier == told_written) {
+  } else if (state_ == State::writing && specifier == response_written) {
     end(SdoOutcome::done, 0);
-  } else if (state_ == State::reading && specifier == told_read) {
+  } else if (state_ == State::reading && specifier == response_read) {
     take_first(data, now);
-  } else if (state_ == State::reading_segments && specifier == told_segment) {
+  } else if (state_ == State::reading_segments && specifier == response_segment) {
     take_segment(data, now);
-  } else if (specifier == told_read || specifier == told_written) {
+  } else if (specifier == response_read || specifier == response_written) {
     ++second_answers_;  // to what has been answered: somebody else answers too
   } else {
     abort(SdoOutcome::broken, unknown_specifier);

@@ -206,7 +206,7 @@ TEST_CASE("an axis at its bound is named with what remains of its displacement",
   CHECK(list[0].subject == Subject{SubjectKind::axis, "z"});
 }
 
-TEST_CASE("an estimated block is told with how sure it is", "[cli][status]") {
+TEST_CASE("an estimated block is reported with how sure it is", "[cli][status]") {
   Status status = good_status();
   status.reasons = only(Reason::block_estimated);
   status.inputs.push_back({.name = "head_degC",
@@ -229,7 +229,8 @@ TEST_CASE("an estimated block is told with how sure it is", "[cli][status]") {
   CHECK_THAT(status_text(status, false), Contains("z +-6.00 um (too uncertain: at most 5.00)"));
 }
 
-TEST_CASE("the error state of a CAN interface is told with its age and a remedy", "[cli][status]") {
+TEST_CASE("the error state of a CAN interface is reported with its age and a remedy",
+          "[cli][status]") {
   Status status = good_status();
   status.buses = {{.name = "body",
                    .kind = "can",

@@ -381,7 +381,8 @@ TEST_CASE("a dry run takes no place for offsets", "[config]") {
   }
 }
 
-TEST_CASE("all problems are told at once, in both files, in the order of their lines", "[config]") {
+TEST_CASE("all problems are reported at once, in both files, in the order of their lines",
+          "[config]") {
   std::string text = example("small_machine.toml");
   text = edited(text, "rate_hz = 100", "rate_hz = 0");
   text = edited(text, "port = 502 ", "prt = 502 ");
@@ -439,7 +440,7 @@ TEST_CASE("a model that needs a signal is refused where there is no controller",
                  "controller.signal", "own kind and dry_run = true"));
 }
 
-TEST_CASE("an edit that breaks several rules is told once a rule", "[config]") {
+TEST_CASE("an edit that breaks several rules is reported once a rule", "[config]") {
   const std::string good = example("small_machine.toml");
   const std::string model = example("small_machine_model.toml");
   const auto told = [&](const std::string& from, const std::string& to) {
@@ -508,7 +509,7 @@ TEST_CASE("what is no TOML is refused with its line", "[config]") {
   }
 }
 
-TEST_CASE("an empty file is told everything it lacks", "[config]") {
+TEST_CASE("an empty file is reported everything it lacks", "[config]") {
   const auto problems = problems_of([] { return parse("", ""); });
   for (const char* key : {"format", "model", "bus", "device", "sensor", "block", "axis",
                           "controller", "inputs", "outputs"}) {

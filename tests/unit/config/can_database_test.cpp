@@ -95,7 +95,7 @@ TEST_CASE("a flaw of the DBC file counts where a sensor stands on it and no key 
   CHECK(folder.told().empty());
 }
 
-TEST_CASE("a name that cannot be found is told with the flaws that may be why", "[dbc]") {
+TEST_CASE("a name that cannot be found is reported with the flaws that may be why", "[dbc]") {
   const Folder folder;
   folder.edit("can_dbc.dbc", "BO_ 385 NODE_TEMPERATURES:", "BO_ 385 NODE_TEMPERATURES");
   const std::string told = folder.told();
@@ -144,7 +144,7 @@ TEST_CASE("a code that the named signal cannot show is refused", "[dbc]") {
   CHECK_THAT(told_after("[0x7FFF]", "[0x10000]"), Catch::Contains("open_circuit_codes"));
 }
 
-TEST_CASE("a broken DBC file is told by its own name and line, once", "[dbc]") {
+TEST_CASE("a broken DBC file is reported by its own name and line, once", "[dbc]") {
   const Folder folder;
   folder.edit("can_dbc.dbc", "0|16@1-", "0|77@1-");
   CHECK(folder.told() ==

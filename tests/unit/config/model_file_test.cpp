@@ -227,7 +227,7 @@ TEST_CASE("each broken term is refused with file, line, key, value and rule", "[
   }
 }
 
-TEST_CASE("all problems of a model are told at once", "[config][model]") {
+TEST_CASE("all problems of a model are reported at once", "[config][model]") {
   std::string text = edited(good, "[[1.0, 2.0], [3.0, 4.0]]", "[[nan, 2.0], [3.0, \"x\"]]");
   text = edited(text, "power = 2", "power = 7");
   text = edited(text, "axis = \"x_mm\"", "axis = \"x\"");

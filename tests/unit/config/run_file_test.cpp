@@ -107,7 +107,8 @@ TEST_CASE("each bad run file is refused with file, line, column and rule", "[con
   }
 }
 
-TEST_CASE("several problems of a run file are told at once, but not without end", "[config][run]") {
+TEST_CASE("several problems of a run file are reported at once, but not without end",
+          "[config][run]") {
   CHECK(problems_of([] { return parse("time_s,a,b\n0,x,y\n0,1\n-1,2,3\n"); }).size() == 4);
   std::string text = "time_s,a\n";
   for (int i = 0; i < 1000; ++i) text += std::to_string(i) + ",x\n";

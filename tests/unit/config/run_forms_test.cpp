@@ -142,7 +142,7 @@ struct Unclear {
 
 }  // namespace
 
-TEST_CASE("files as people have them are read, and what was understood is told line by line",
+TEST_CASE("files as people have them are read, and what was understood is reported line by line",
           "[config][run]") {
   for (const Form& form : forms) {
     INFO(form.what);
@@ -161,7 +161,7 @@ TEST_CASE("files as people have them are read, and what was understood is told l
   }
 }
 
-TEST_CASE("what programs write is read as ever, and nothing is told", "[config][run]") {
+TEST_CASE("what programs write is read as ever, and nothing is reported", "[config][run]") {
   const std::string own = "time_s,t1_degC,z_um,door\n0,20.5,1,0\n";
   CHECK(read(own).understood.empty());
   CHECK(read(own, "[columns]\n\"T1\" = \"t1_degC\"\n").understood.empty());
@@ -211,7 +211,7 @@ TEST_CASE("what may mean two things is asked for, with the line to write", "[con
   }
 }
 
-TEST_CASE("faults in a file of another form are told with their line", "[config][run]") {
+TEST_CASE("faults in a file of another form are reported with their line", "[config][run]") {
   const std::vector<Unclear> table = {
       {"too few fields", "time_s;z [um]\n0;1\n1\n", 3, "must have 2"},
       {"open quote", "time_s;z [um]\n0;\"1\n", 2, "quote"},
@@ -268,7 +268,7 @@ TEST_CASE("a displacement that nobody measured is said to be missing, with what 
   CHECK_THAT(rule_of(",x_um"), !Catch::Contains("thermocomp measured"));
 }
 
-TEST_CASE("a map that leaves a unit out is told the name with it", "[config][run]") {
+TEST_CASE("a map that leaves a unit out is reported the name with it", "[config][run]") {
   const auto problems = problems_of([&] {
     return read("Time [s];Temp. t1 [°C];Temp. t7 [°C]\n0;20,5;21\n",
                 "[columns]\n\"Temp. t7\" = \"t7_degC\"");

@@ -91,7 +91,7 @@ TEST_CASE("an excluded bound is excluded and the other is not", "[config][toml]"
   CHECK_FALSE(Range::any().contains(std::numeric_limits<double>::quiet_NaN()));
 }
 
-TEST_CASE("every bad element of a list is told and the count stays", "[config][toml]") {
+TEST_CASE("every bad element of a list is reported and the count stays", "[config][toml]") {
   const TomlDocument read = document("a = [1, \"x\", 3, nan]\nb = [\"p\", 5]\nm = [[1], [1, 2]]\n");
   CHECK(read.root().numbers("a").size() == 4);
   CHECK(read.root().texts("b").size() == 2);
@@ -188,7 +188,7 @@ TEST_CASE("too many keys and elements are refused before they are parsed", "[con
                     Catch::Contains("at most 1000000 elements"));
 }
 
-TEST_CASE("of many problems a hundred are told and the rest is counted", "[config][toml]") {
+TEST_CASE("of many problems a hundred are reported and the rest is counted", "[config][toml]") {
   std::string text;
   for (int i = 0; i < 400; ++i) {
     text.append("unknown_").append(std::to_string(i)).append(" = 1\n");

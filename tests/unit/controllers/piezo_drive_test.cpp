@@ -98,7 +98,8 @@ TEST_CASE("an amplifier at rest after a restart starts from nothing", "[piezo]")
   CHECK(drive.step(1s, 2.0) == 0.0);
 }
 
-TEST_CASE("an amplifier that does not obey shows where the tool is and is told again", "[piezo]") {
+TEST_CASE("an amplifier that does not obey shows where the tool is and is reported again",
+          "[piezo]") {
   PiezoDrive drive(measured_piezo());
   drive.restart_at(50.0);
   CHECK(drive.step(0s, 2.0) == 50.0);

@@ -77,7 +77,7 @@ TEST_CASE("a fault that comes and goes is one outage of four events", "[daemon][
   CHECK(bench.journal.recovery(bed) == Approx(1.0));
 }
 
-TEST_CASE("each kind of fault is told once in an outage", "[daemon][events]") {
+TEST_CASE("each kind of fault is reported once in an outage", "[daemon][events]") {
   Bench bench;
   for (int i = 0; i < 1000; ++i) {
     bench.journal.fault({.subject = bed, .code = i % 2 == 0 ? "no_answer" : "stale"});
@@ -103,7 +103,7 @@ TEST_CASE("a clock that is set changes no duration", "[daemon][events]") {
   CHECK(events[1].duration_s == Approx(60.0));
 }
 
-TEST_CASE("what ended lately is told, newest first", "[daemon][events]") {
+TEST_CASE("what ended lately is reported, newest first", "[daemon][events]") {
   Bench bench;
   for (const char* name : {"a", "b", "c"}) {
     const Subject subject{SubjectKind::bus, name};

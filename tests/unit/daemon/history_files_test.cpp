@@ -10,7 +10,7 @@
 using namespace thermocomp;
 using namespace thermocomp::testing;
 
-TEST_CASE("-wal or -shm removed, replaced or cut while running: no row is lost, and it is told",
+TEST_CASE("-wal or -shm removed, replaced or cut while running: no row is lost, and it is reported",
           "[history][files]") {
   const TempFolder folder;
   const HistoryConfig config = history_config(folder / "h.db");
@@ -117,7 +117,7 @@ TEST_CASE("rows of which a removed -wal was the only copy wait until they can be
   CHECK(summary.segments == 1);
 }
 
-TEST_CASE("a history that is moved away, or its folder, is told and begun anew",
+TEST_CASE("a history that is moved away, or its folder, is reported and begun anew",
           "[history][files]") {
   const TempFolder folder;
   std::filesystem::create_directory(folder / "place");

@@ -40,7 +40,7 @@ TEST_CASE("what is no moment is refused with what would be one", "[history][expo
   CHECK_THROWS_WITH(parse_history_time("soon", now), Catch::Contains("8 hours ago"));
 }
 
-TEST_CASE("a wall time is told in UTC with milliseconds", "[history][export]") {
+TEST_CASE("a wall time is reported in UTC with milliseconds", "[history][export]") {
   CHECK(utc_text(1'772'350'211'123'456'789) == "2026-03-01T07:30:11.123Z");
   CHECK(utc_text(-1) == "1969-12-31T23:59:59.999Z");
 }

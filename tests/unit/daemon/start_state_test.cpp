@@ -62,7 +62,7 @@ TEST_CASE("the history ends with the state that the machine had", "[history]") {
   CHECK(recorded.state->offset_um == state.offset_um);
 }
 
-TEST_CASE("where the newest segment is damaged an older one is told as such", "[history]") {
+TEST_CASE("where the newest segment is damaged an older one is reported as such", "[history]") {
   const TempFolder folder;
   static_cast<void>(record(folder / "h.db", 1, true));
   damage_newest_segment(folder / "h.db");

@@ -117,7 +117,7 @@ TEST_CASE("a disk that stands is waited for by nobody, and gets the newest state
   CHECK(kept.on_disk().state.offset_um.at("z") == 50.0);
 }
 
-TEST_CASE("what is on disk is told with the state that is there", "[state]") {
+TEST_CASE("what is on disk is reported with the state that is there", "[state]") {
   Kept kept;
   StateKeeper keeper(kept.file, with_offset(1.0), true, false);
   CHECK(keeper.saving(keeper.serial()) == StateKeeper::Saving::on_disk);

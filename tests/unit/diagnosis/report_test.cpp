@@ -150,7 +150,7 @@ TEST_CASE("the plots are there with and without a finding", "[diagnosis][report]
   CHECK(count(named, "<h3>") == 2);
 }
 
-TEST_CASE("numbers are told with two digits, three after a 1, and times in a fitting unit",
+TEST_CASE("numbers are reported with two digits, three after a 1, and times in a fitting unit",
           "[diagnosis][report]") {
   CHECK(figure(0.0039628) == "0.0040");
   CHECK(figure(5.653) == "5.7");
@@ -165,8 +165,9 @@ TEST_CASE("numbers are told with two digits, three after a 1, and times in a fit
   CHECK(duration(9000.0) == "2.5 h");
 }
 
-TEST_CASE("a parameter is told in words with its unit, an interval only where it says something",
-          "[diagnosis][report]") {
+TEST_CASE(
+    "a parameter is reported in words with its unit, an interval only where it says something",
+    "[diagnosis][report]") {
   const Parameter heat{"gain_um_per_unit", {{"z_um", 0.0039628}}, {{"z_um", {0.00396, 0.00397}}}};
   CHECK(parameter_words("missing_heat_source", heat, "spindle_rpm") ==
         "effect 4.0 µm/(1000 rpm) in z");
@@ -216,7 +217,7 @@ TEST_CASE("what to do stands first, the largest gain on top", "[diagnosis][repor
   CHECK(without.find("the extended model goes without it") != std::string::npos);
 }
 
-TEST_CASE("what is left is told beside what moved, and folded but for the first test run",
+TEST_CASE("what is left is reported beside what moved, and folded but for the first test run",
           "[diagnosis][report]") {
   ReportData data = one_run();
   data.runs.push_back(data.runs.front());

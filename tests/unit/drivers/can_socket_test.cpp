@@ -26,7 +26,7 @@ TEST_CASE("a step of the wall clock makes no frame younger than now or older tha
   CHECK(monotonic_stamp(realtime - 3600s, realtime, monotonic) == monotonic - 1s);
 }
 
-TEST_CASE("a CAN interface that is not there is told by name and does no harm", "[can]") {
+TEST_CASE("a CAN interface that is not there is reported by name and does no harm", "[can]") {
   CanSocket socket("nosuchcan0", {{0x123, false}});
   CHECK_FALSE(socket.open());
   CHECK_FALSE(socket.is_open());

@@ -110,7 +110,7 @@ TEST_CASE("SDO: expedited writes say how many bytes count", "[canopen][sdo]") {
   CHECK(sent_by(client).at(0).bytes == Bytes{0x23, 0x00, 0x18, 0x01, 0x85, 0x01, 0, 0});
 }
 
-TEST_CASE("SDO: an abort is told by name", "[canopen][sdo]") {
+TEST_CASE("SDO: an abort is reported by name", "[canopen][sdo]") {
   SdoClient client(5, 100ms);
   client.read({0x2040, 1}, 1s);
   client.take(Bytes{0x80, 0x40, 0x20, 0x01, 0x00, 0x00, 0x02, 0x06}, 1s);
@@ -122,7 +122,7 @@ TEST_CASE("SDO: an abort is told by name", "[canopen][sdo]") {
   CHECK(sdo_abort_name(0x12345678) == "unknown abort code");
 }
 
-TEST_CASE("SDO: silence ends a transfer, and the node is told", "[canopen][sdo]") {
+TEST_CASE("SDO: silence ends a transfer, and the node is reported", "[canopen][sdo]") {
   SdoClient client(5, 100ms);
   client.read({0x2040, 1}, 1s);
   sent_by(client);

@@ -254,7 +254,7 @@ TEST_CASE("settings are written before the start, and read back", "[canopen][nod
   }
 }
 
-TEST_CASE("a refused setting is told by the name of its abort code", "[canopen][node]") {
+TEST_CASE("a refused setting is reported by the name of its abort code", "[canopen][node]") {
   CanopenNodeConfig node = node_5({in_pdo(0, 0x185, 0)});
   node.heartbeat_s = 1.0;
   Bus bus(bus_of({node}));

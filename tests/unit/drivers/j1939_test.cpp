@@ -342,7 +342,7 @@ TEST_CASE("a device is found by its NAME, wherever it goes", "[j1939][claim]") {
   }
 }
 
-TEST_CASE("a new NAME at a known address is told", "[j1939][claim]") {
+TEST_CASE("a new NAME at a known address is reported", "[j1939][claim]") {
   Bus bus(bus_of(oil()));
   bus.put(0x18EEFF80, name_bytes(name_a));
   CHECK(bus.error().empty());

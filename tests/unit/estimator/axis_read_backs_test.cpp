@@ -10,7 +10,7 @@ using namespace thermocomp;
 using namespace thermocomp::test;
 using namespace std::chrono_literals;
 
-TEST_CASE("an axis is not driven before the controller has told what it applies", "[axis]") {
+TEST_CASE("an axis is not driven before the controller has reported what it applies", "[axis]") {
   Bench bench;
   bench.obeys = false;
   bench.input.online = false;

@@ -164,7 +164,7 @@ TEST_CASE("a factor that explains the older read-backs badly is not sure, and ca
   CHECK_FALSE(found.explains(-6.72, -2.72));
 }
 
-TEST_CASE("the usual mistakes of commissioning are told by their names", "[axis]") {
+TEST_CASE("the usual mistakes of commissioning are reported by their names", "[axis]") {
   CHECK(said(lied_to(-30.0, [](double um) { return 2.0 * um; })) ==
         "reads back twice what is sent: check scale");
   CHECK(said(lied_to(30.0, [](double um) { return 0.5 * um; })) ==
@@ -186,7 +186,7 @@ TEST_CASE("the usual mistakes of commissioning are told by their names", "[axis]
   CHECK(said(bench) == "changes without us: another writer?");
 }
 
-TEST_CASE("a sign that flips while running is told by its name", "[axis]") {
+TEST_CASE("a sign that flips while running is reported by its name", "[axis]") {
   for (const bool moves : {false, true}) {
     Bench bench;
     bench.steps(100, 10.0);

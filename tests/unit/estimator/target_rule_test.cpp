@@ -81,7 +81,7 @@ TEST_CASE("hold_while_cutting lets the offset change only on a clear sign", "[ta
   CHECK(targets(Mode::compensating, cutting(1.0)).may_change);
 }
 
-TEST_CASE("a controller that is silent or old tells nothing, what it told last stays known",
+TEST_CASE("a controller that is silent or old reports nothing, what it reported last stays known",
           "[signals]") {
   SignalIntake intake(with_cutting_signal(), model_with_growth());
   ControllerState controller;

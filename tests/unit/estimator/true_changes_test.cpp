@@ -44,8 +44,9 @@ ThermalModel correlated_model(double correlation = 0.98) {
 
 }  // namespace
 
-TEST_CASE("a unit that is changed under way holds the offset and is told, for as long as it lasts",
-          "[estimator]") {
+TEST_CASE(
+    "a unit that is changed under way holds the offset and is reported, for as long as it lasts",
+    "[estimator]") {
   Machine machine(usual_config());
   machine.steps(60, {20.0, 20.0});
   machine.steps(200, {22.0 - 1.0, 20.0});
@@ -92,7 +93,7 @@ TEST_CASE("an accepted jump of a young machine gives it another reference", "[es
   CHECK(machine.offset_um() == 0.0);
 }
 
-TEST_CASE("a sensor replaced by one that reads 3 K more is told, and accepted by the command",
+TEST_CASE("a sensor replaced by one that reads 3 K more is reported, and accepted by the command",
           "[estimator]") {
   const bool unplugged = GENERATE(true, false);
   Machine machine(three_blocks(), correlated_model());

@@ -175,7 +175,7 @@ TEST_CASE("a trend is the slope of the last minutes, once there are some", "[gat
   CHECK(std::isnan(trends.per_hour("b")));
 }
 
-TEST_CASE("the page is told in the words of thermocomp status", "[gateway][page]") {
+TEST_CASE("the page is reported in the words of thermocomp status", "[gateway][page]") {
   Snapshot snapshot = snapshot_of_two_axes();
   json state = page_state(snapshot, "mill");
   CHECK(state["verdict"]["answer"] == "yes");

@@ -29,7 +29,8 @@ TEST_CASE("a geometry with faults names every one of them", "[tiebar]") {
        "colour"});
 }
 
-TEST_CASE("several ties with faults are told with file, line, key, value and rule", "[tiebar]") {
+TEST_CASE("several ties with faults are reported with file, line, key, value and rule",
+          "[tiebar]") {
   refused(columns +
               "[[tie]]\nheight_mm = 0\nlength_mm = 400\narea_mm2 = 150\n"
               "[[tie]]\nheight_mm = 700\nlength_mm = 400\narea_mm2 = 150\n"
@@ -107,7 +108,7 @@ TEST_CASE("shear, held feet and bonded ties are read", "[tiebar]") {
   }
 }
 
-TEST_CASE("elasticity that lacks something is told with key and rule", "[tiebar]") {
+TEST_CASE("elasticity that lacks something is reported with key and rule", "[tiebar]") {
   refused(columns + "foot = \"held\"\n" + tie, {"column.foot", "needs poisson_ratio"});
   refused(columns + "foot = \"bolted\"\n" + tie, {"column.foot", "bolted"});
   refused(columns + "poisson_ratio = 0.6\n" + tie, {"poisson_ratio = 0.6"});

@@ -90,7 +90,7 @@ TEST_CASE("halsampler without numbers: an overrun before the first row loses not
   CHECK(says(run, "not numbered"));
 }
 
-TEST_CASE("halsampler says neither names nor period: the line to write is told", "[import]") {
+TEST_CASE("halsampler says neither names nor period: the line to write is reported", "[import]") {
   CHECK_THROWS_WITH(imported("halsampler_numbered.txt"),
                     Contains("--names t1_degC,t2_degC,t3_degC --period-s S"));
   CHECK_THROWS_WITH(imported("halsampler_numbered.txt", {{"a", "b", "c"}, {}}),

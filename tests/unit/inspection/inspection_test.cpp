@@ -255,7 +255,7 @@ TEST_CASE("a signal that never changed cannot be told of, and an experiment is p
   CHECK(inspection.experiments.front().find("spindle_rpm never changed") == 0);
 }
 
-TEST_CASE("two signals that always went together are told once", "[inspection]") {
+TEST_CASE("two signals that always went together are reported once", "[inspection]") {
   RunFile run = recording();
   run.columns.emplace_back("load_percent");
   run.values.push_back(column(run, "spindle_rpm"));

@@ -174,7 +174,7 @@ TEST_CASE("an .inp file gives nodes, elements, sets and surfaces", "[structure][
         }).find("there are: First, both, second") != std::string::npos);
 }
 
-TEST_CASE("what is wrong in an .inp file is told with its line", "[structure][files]") {
+TEST_CASE("what is wrong in an .inp file is reported with its line", "[structure][files]") {
   struct Case {
     std::string text;
     std::string told;

@@ -249,7 +249,7 @@ TEST_CASE("what is wrong with a structure is named, with its place", "[structure
   }
 }
 
-TEST_CASE("all problems of a kind are told at once", "[structure][bad_input]") {
+TEST_CASE("all problems of a kind are reported at once", "[structure][bad_input]") {
   const auto lines =
       problems_in(material + column + foot + all_warm + top +
                   "[[support]]\non = { group = \"base\" }\n[[support]]\non = { group = \"side\" }\n"
