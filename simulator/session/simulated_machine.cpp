@@ -476,8 +476,8 @@ struct SimulatedMachine::Parts {
     }
     if (!channel.status) return;
     const SimulatedStatus& status = *channel.status;
-    const auto code = code_for(status.codes, seen);
-    const auto bits = static_cast<unsigned>(code ? *code : status.good) & status.mask;
+    const auto status_code = code_for(status.codes, seen);
+    const auto bits = static_cast<unsigned>(status_code ? *status_code : status.good) & status.mask;
     const unsigned others =
         device.unit.word(status.table, status.address) & ~static_cast<unsigned>(status.mask);
     device.unit.set(status.table, status.address, static_cast<std::uint16_t>(bits | others));
