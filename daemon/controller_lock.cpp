@@ -31,7 +31,7 @@ std::string line_name(const ModbusRtu& rtu, int) {
   if (stat(rtu.device.c_str(), &device) == 0 && S_ISCHR(device.st_mode))
     return fmt::format("controller at serial device {}:{}", major(device.st_rdev),
                        minor(device.st_rdev));
-  // Not plugged in yet.
+  // The device is not plugged in yet.
   std::error_code error;
   const auto path = std::filesystem::weakly_canonical(rtu.device, error);
   return "controller at serial device " + (error ? rtu.device : path.string());

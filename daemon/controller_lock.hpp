@@ -1,4 +1,4 @@
-/// Only one daemon of this machine writes to a controller.
+/// Locks that let only one daemon on this machine write to a controller.
 #pragma once
 
 #include <string>
@@ -9,16 +9,16 @@
 
 namespace thermocomp {
 
-/// The ways by which the configuration's controller is reached, as names to lock:
-///   Modbus TCP   host, port and unit, as they are written
-///   Modbus RTU   the serial device, whatever its path
-///   CAN          the interface and the identifier of each frame that we send
-/// None for a bridge: whoever calls the status socket of this daemon calls no other.
-/// @param dry_run  nothing is written: only a serial line, which has one master, is named
+/// Lock names of the paths to the configured controller:
+///   Modbus TCP   host, port and unit, as configured
+///   Modbus RTU   the serial device, independent of its path
+///   CAN          the interface and the identifier of each transmitted frame
+/// Empty for a bridge, which calls this daemon's own socket.
+/// @param dry_run  nothing is written: only a serial line is locked, since it has one master
 [[nodiscard]] std::vector<std::string> controller_names(const ControllerConfig& config,
                                                         bool dry_run = false);
 
-/// The controller as the state file and the last-sent record name it.
+/// Controller name in the state file and the last-sent record.
 [[nodiscard]] std::string controller_identity(const ControllerConfig& config);
 
 /// @throws LockHeld, LockImpossible

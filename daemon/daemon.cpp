@@ -28,7 +28,7 @@
 namespace thermocomp {
 namespace {
 
-/// At 1 Hz it ends within a second.
+/// Longer than one period at the lowest rate, 1 Hz.
 constexpr auto cycle_ends_within = std::chrono::seconds(3);
 
 constexpr auto history_ends_within = std::chrono::seconds(4);
@@ -57,7 +57,7 @@ std::unique_ptr<HistoryWriter> make_history(const HistoryConfig& config, const G
   return std::make_unique<HistoryWriter>(config, grid, THERMOCOMP_VERSION);
 }
 
-/// A start that is refused later would have moved the state file.
+/// Checked before the state file is read: reading may move it aside, also if the start then fails.
 void require_own_history(const DaemonConfig& config) {
   if (!config.history.enabled) return;
   try {
@@ -80,7 +80,7 @@ DaemonConfig load(const std::filesystem::path& file) {
   return config;
 }
 
-/// The controller's own link, also inside a dry run; nullptr: there is none.
+/// The controller's link, unwrapped from a dry run; nullptr: none.
 ControllerLink* real_link(ControllerLink& link) {
   auto* dry_run = dynamic_cast<DryRunController*>(&link);
   return dry_run != nullptr ? dry_run->read() : &link;
@@ -91,7 +91,7 @@ const char* what_stays(const DaemonConfig& config) {
                         : "the controller keeps the last offsets";
 }
 
-/// What this process alone may use while it runs; the history's lock is with its writer.
+/// Resources locked while this process runs; the history writer holds the history's lock.
 struct Locks {
   explicit Locks(const DaemonConfig& config)
       : controller(lock_controller(config.controller, config.dry_run)) {
@@ -103,11 +103,10 @@ struct Locks {
   }
   std::vector<NameLock> controller;
   std::optional<FileLock> state;
-  std::vector<std::string>
-      warnings;  ///< the state file's folder takes no file, nobody else's either
+  std::vector<std::string> warnings;  ///< the lock file cannot be created, by other daemons neither
 };
 
-/// Beside the status socket. A dry run sends nothing, and leaves the record of who did.
+/// The record beside the status socket. A dry run sends nothing and leaves the record untouched.
 std::unique_ptr<LastSent> open_last_sent(const DaemonConfig& config,
                                          std::vector<std::string>& warnings) {
   if (config.dry_run) return nullptr;
@@ -131,7 +130,7 @@ struct Daemon::Parts {
   void start();
   void stop() noexcept;
 
-  SignalFile signals;  ///< before any thread is made, so that all of them block these signals
+  SignalFile signals;  ///< first member, so that every thread inherits the blocked mask
   DaemonConfig config;
   StatusServer server;
   Locks locks;
@@ -175,7 +174,7 @@ Daemon::Parts::Parts(const std::filesystem::path& config_file)
       supervisor({config, sources, *link, history.get(), keeper, server, signals, service,
                   operations, journal, locks.controller}) {
   if (history) journal.tell([this](const Event& event) { history->note(event); });
-  // A kill right now must not make this a first start.
+  // Saved now: a kill before the first periodic save must not look like a first start.
   keeper.save(start_state.state, std::chrono::steady_clock::now());
   static_cast<void>(keeper.wait(StateKeeper::disk_answers_within));
   for (const std::string& warning : locks.warnings) supervisor.add_warning(warning);
@@ -185,7 +184,7 @@ Daemon::Parts::Parts(const std::filesystem::path& config_file)
 
 std::unique_ptr<CycleParts> Daemon::Parts::first_parts() const {
   auto parts = make_cycle_parts(config, history.get());
-  // What cannot be has been taken out by find_start_state().
+  // find_start_state() has removed invalid values.
   THERMOCOMP_ENSURE(parts->estimator.restore(start_state.state).empty());
   if (parts->candidate) parts->candidate->restore(start_state.state);
   return parts;
@@ -231,8 +230,8 @@ void Daemon::Parts::stop() noexcept {
   service.stopping(what_stays(config));
   cycle.stop();
   if (!thread.join_within(cycle_ends_within)) {
-    // Nothing of it can be trusted, and it may stand in the midst of anything: what a kill would
-    // leave is what is left, and the service manager need not wait for a time-out.
+    // The thread may be at any point, so nothing is saved: the disk is left as after a kill, and
+    // the service manager need not wait for its time-out.
     spdlog::critical("the cycle hangs; ending without it");
     static_cast<void>(flush_log(std::chrono::seconds(1)));
     std::_Exit(EXIT_FAILURE);
@@ -242,7 +241,7 @@ void Daemon::Parts::stop() noexcept {
   try {
     operations.settle();
     operations.save_state(true);
-    // What is still under way then may end or not: the file is the old one or the new one.
+    // A write that is still under way leaves either the old or the new file.
     if (!keeper.wait(StateKeeper::disk_answers_within) || !keeper.error().empty())
       spdlog::error("state not saved: {}", keeper.error());
   } catch (const std::exception& error) {

@@ -1,4 +1,4 @@
-/// thermocompd as a whole: puts the parts together, runs the cycle, supervises it, answers.
+/// thermocompd as a whole: constructs the parts, runs and supervises the cycle, serves the socket.
 #pragma once
 
 #include <filesystem>
@@ -8,15 +8,14 @@ namespace thermocomp {
 
 class Daemon {
  public:
-  /// Loads the configuration and makes all parts; nothing runs yet.
+  /// Loads the configuration and constructs all parts; starts no thread of theirs.
   /// @throws ConfigurationError, DriverError, SocketError, HistoryError, InvalidValue
   explicit Daemon(const std::filesystem::path& config_file);
   ~Daemon();
   Daemon(const Daemon&) = delete;
   Daemon& operator=(const Daemon&) = delete;
 
-  /// Starts everything and supervises until SIGTERM or SIGINT; SIGHUP reloads. The caller's thread
-  /// is main of the architecture.
+  /// Runs as main's thread until SIGTERM or SIGINT; SIGHUP reloads.
   /// @throws RealTimeError when real time is required and not available
   void run();
 

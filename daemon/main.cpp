@@ -1,5 +1,4 @@
-// thermocompd: reads thermocouples, predicts how the machine bends, sends offsets to its
-// controller.
+// thermocompd: reads temperatures, predicts the thermal displacement, sends offsets.
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -18,7 +17,7 @@ namespace {
 
 constexpr std::chrono::seconds log_patience{1};
 
-/// After the log; where nobody takes that, standard error would be waited for as well.
+/// Prints after the log is flushed; if the log's reader hangs, standard error may block as well.
 void complain(const std::string& what) {
   if (thermocomp::flush_log(log_patience)) std::fprintf(stderr, "%s\n", what.c_str());
 }
@@ -51,7 +50,7 @@ int main(int argc, char** argv) {
   }
   thermocomp::set_up_log();
   const int status = run(config_file);
-  // What exit() flushes and ends would wait for whoever does not take the log.
+  // exit() would flush the log and block while its reader hangs.
   if (!thermocomp::flush_log(log_patience)) std::_Exit(status);
   return status;
 }

@@ -19,7 +19,7 @@ namespace {
 
 using nlohmann::json;
 
-/// A client is answered within 2 s, whatever the disk does.
+/// Clients are answered within 2 s, also when the disk hangs.
 constexpr auto disk_patience = std::chrono::milliseconds(1500);
 
 constexpr auto patience_s =
@@ -30,7 +30,8 @@ bool is_kept(CommandKind kind) {
          kind == CommandKind::reference;
 }
 
-/// Of `asked`, for an operator. @return whether it is done
+/// @param asked  name of the request, for the error text
+/// @return whether it is done
 bool is_done(Outcome outcome, const char* asked) {
   switch (outcome) {
     case Outcome::waiting:
@@ -66,7 +67,7 @@ void add_recorder(CycleParts& parts, const DaemonConfig& config, HistoryWriter* 
                                             parts.estimator);
 }
 
-/// Beginnings of both checksums in a number that a state file holds exactly.
+/// First digits of both checksums, as a number that a JSON double holds exactly.
 double pair_of(const DaemonConfig& config) {
   constexpr std::size_t digits = 6;
   return static_cast<double>(std::stoull(
@@ -77,7 +78,7 @@ double pair_of(const DaemonConfig& config) {
 std::unique_ptr<CycleParts> parts_of(const DaemonConfig& config) {
   auto parts = std::make_unique<CycleParts>(Estimator(config.estimator, config.model));
   const std::optional<CandidateModel>& candidate = config.candidate;
-  // Once promoted it is the model itself.
+  // A promoted candidate is the model itself.
   if (candidate && candidate->problem.empty() && candidate->checksum != config.model_checksum)
     parts->candidate =
         std::make_unique<Candidate>(candidate->estimator, candidate->model, pair_of(config));
@@ -98,12 +99,11 @@ std::unique_ptr<CycleParts> make_cycle_parts(const DaemonConfig& config, History
   return parts;
 }
 
-/// What the files give, made beside main: a file may be on a disk that does not answer, and an
-/// estimator takes its time.
+/// Configuration and parts, loaded on a side thread: this takes time, and the disk may hang.
 struct Operations::Loaded {
   DaemonConfig config;
   std::unique_ptr<CycleParts> parts;
-  std::exception_ptr error;  ///< instead of the others
+  std::exception_ptr error;  ///< set: config and parts are unusable
 
   void load(const std::filesystem::path& file,
             const std::optional<std::filesystem::path>& candidate) noexcept {
@@ -137,14 +137,14 @@ RpcPending Operations::command(const Command& asked) {
           save = std::optional<Save>()]() mutable -> std::optional<json> {
     poll();
     if (!is_done(*outcome, "command")) return std::nullopt;
-    // carried_out() has handed over what it changed.
+    // carried_out() has handed the changed state to the keeper.
     if (!save) save = {parts_.keeper.serial(), Clock::now() + disk_patience};
     if (!is_settled(*save, kind)) return std::nullopt;
     return json{{"done", true}};
   };
 }
 
-/// Whether the disk has what a command changed, or need not have it. @throws RpcError: it has not
+/// Whether the command's change is on disk, or need not be. @throws RpcError if saving failed
 bool Operations::is_settled(const Save& save, CommandKind kind) const {
   const StateKeeper::Saving saving = parts_.keeper.saving(save.serial);
   if (saving == StateKeeper::Saving::under_way && Clock::now() < save.deadline) return false;
@@ -199,7 +199,7 @@ void Operations::begin_reload(const std::optional<std::filesystem::path>& candid
   parts_.service.reloading();
 }
 
-/// Once the files are read: hands the new parts to the cycle.
+/// Hands the new parts to the cycle once the files are read.
 void Operations::finish_loading() {
   if (!reload_ || reload_->answer->outcome || reload_->thread->is_busy()) return;
   const std::shared_ptr<Loaded> loaded = std::exchange(reload_->loaded, nullptr);
@@ -224,7 +224,7 @@ void Operations::finish_loading() {
       spdlog::error("reload refused, the running configuration stays:\n{}", error.what());
     reload_->answer->error = std::current_exception();
     loaded->config = {};
-    malloc_trim(0);  // what the refused files took; locked memory is never given back by itself
+    malloc_trim(0);  // locked memory of the refused parts is not returned otherwise
     end_reload();
   }
 }
@@ -277,7 +277,7 @@ void Operations::finish_reload() {
 
 void Operations::carried_out(const Command& done) {
   if (done.kind == CommandKind::stop || done.kind == CommandKind::saved)
-    return;  // not an operator's
+    return;  // not from an operator
   Event event = command_event(to_string(done.kind), take_asking(done));
   if (names_axis(done.kind))
     event.subject = {SubjectKind::axis, parts_.config.estimator.axes[done.axis].name};
@@ -291,11 +291,11 @@ void Operations::carried_out(const Command& done) {
   if (parts_.journal != nullptr) parts_.journal->command(std::move(event));
   if (done.kind == CommandKind::reference && is_reference_whole(cycle_.report())) {
     parts_.keeper.reference_taken();
-    // Also where the temperatures are those of the reference before.
+    // Also recorded when the temperatures equal those of the previous reference.
     parts_.reference_before_degC.clear();
     note_reference(cycle_.estimator().persistent_state(cycle_.report()), ReferenceOrigin::command);
   }
-  // Called done only when it would survive a power cut: is_settled().
+  // The client is answered once this is on disk: is_settled().
   save_state(true);
 }
 
@@ -311,7 +311,7 @@ void Operations::note_asked(const Command& asked, const CycleHandle::Tracked& ou
   asked_.push_back({asked, outcome, asking_user()});
 }
 
-/// Who asked for what is done now. @return -1: nobody known
+/// User ID of the client that sent the command. @return -1: unknown
 std::int64_t Operations::take_asking(const Command& done) {
   const auto is_it = [&](const Asked& each) {
     return each.command.kind == done.kind && each.command.axis == done.axis &&
@@ -330,7 +330,7 @@ void Operations::save_state(bool at_once) {
   if (Candidate* candidate = cycle_.candidate()) candidate->add_to(state.correction);
   state.controller = controller_identity(parts_.config.controller);
   if (parts_.config.dry_run) {
-    // It sends nothing: what was sent before stays.
+    // A dry run sends nothing: the saved offsets stay valid.
     const PersistentState& before = parts_.keeper.on_disk().state;
     state.offset_um = before.offset_um;
     state.corridor_um = before.corridor_um;
@@ -347,10 +347,8 @@ void Operations::save_state(bool at_once) {
   reported_save_error_ = error;
 }
 
-/// What is on disk, where that is new.
-/// @param again  also where an axis waits and nothing is on its way to the disk: then no other
-/// state
-///               than this can be there
+/// Reports a newer state on disk to the estimator.
+/// @param again  reports an unchanged one too, if an axis waits and no write is under way
 void Operations::tell_saved(bool again) {
   const std::vector<AxisReport>& axes = cycle_.report().axes;
   const bool is_waited_for = again && !parts_.keeper.is_busy() && parts_.keeper.error().empty() &&

@@ -1,5 +1,4 @@
-/// What operators and SIGHUP ask for: commands and reloads on their way to the cycle and to the
-/// disk.
+/// Operator commands and reloads: handed to the cycle, then saved to disk.
 #pragma once
 
 #include <exception>
@@ -21,23 +20,23 @@
 
 namespace thermocomp {
 
-/// Main's thread only; nothing waits. What was confirmed to an operator survives a restart: a
-/// command is called done only when it is on disk (where that takes longer than a client waits, the
-/// answer says so), and one that the cycle did not take in time never happens. Configuration,
-/// reports and state change together, in poll(), when the cycle has gone over to a new parts.
+/// Main's thread only; never blocks. A command is confirmed once its effect is on disk and survives
+/// a restart; if the disk is slower than the client's time-out, the answer reports that. A command
+/// that the cycle did not take in time is withdrawn. Configuration, reports and state change
+/// together in poll(), once the cycle runs with the new parts.
 class Operations {
  public:
-  /// All of them outlive this.
+  /// All must outlive this.
   struct Parts {
     DaemonConfig& config;  ///< replaced by a reload
     Cycle& cycle;
     StateKeeper& keeper;
     ServiceManager& service;
-    HistoryWriter* history;                       ///< none: no history
+    HistoryWriter* history;                       ///< null: no history
     std::function<std::string()> status_line;     ///< for the service manager
-    EventJournal* journal{nullptr};               ///< none: nothing is noted
-    std::function<std::int64_t()> asking_user{};  ///< of the request in hand; -1: nobody known
-    /// By column, when the daemon started: what differs from it was taken since.
+    EventJournal* journal{nullptr};               ///< null: events are not recorded
+    std::function<std::int64_t()> asking_user{};  ///< user ID of the present request; -1: unknown
+    /// Reference at start, by column [degC]; a different one was taken since.
     std::map<std::string, double> reference_before_degC{};
   };
   explicit Operations(Parts parts);
@@ -45,22 +44,21 @@ class Operations {
   Operations(const Operations&) = delete;
   Operations& operator=(const Operations&) = delete;
 
-  /// @throws RpcError when it cannot even be begun
+  /// @throws RpcError when the command cannot be queued
   [[nodiscard]] RpcPending command(const Command& asked);
-  /// Its result throws ConfigurationError, or RpcError: a restart is needed.
-  /// @throws RpcError: a reload is under way
+  /// The pending result throws ConfigurationError, or RpcError if a restart is needed.
+  /// @throws RpcError if a reload is under way
   [[nodiscard]] RpcPending reload(
       const std::optional<std::filesystem::path>& candidate = std::nullopt);
-  /// The same for SIGHUP. However many arrive while one is under way, one more follows it.
+  /// The same for SIGHUP. Any number that arrive during a reload cause one further reload.
   void hang_up();
 
   void poll();
-  /// Whether poll() has anything to do.
   [[nodiscard]] bool is_busy() const noexcept { return cycle_.is_busy(); }
-  /// After the cycle has ended.
+  /// Call after the cycle has ended.
   void settle();
 
-  /// @param at_once  writes even what could wait
+  /// @param at_once  also writes what is otherwise written periodically
   void save_state(bool at_once);
 
   [[nodiscard]] CycleHandle& cycle() noexcept { return cycle_; }
@@ -68,23 +66,23 @@ class Operations {
  private:
   using Clock = CycleHandle::Clock;
   struct Loaded;
-  /// What has become of a reload, for the client that asked.
+  /// Result of a reload, for the client that asked.
   struct ReloadAnswer {
     CycleHandle::Tracked outcome;  ///< none: the files are being read
     std::exception_ptr error;
   };
   struct Reload {
     std::shared_ptr<ReloadAnswer> answer;
-    std::shared_ptr<Loaded> loaded;      ///< the thread's until it has ended
+    std::shared_ptr<Loaded> loaded;      ///< owned by the thread until it ends
     std::unique_ptr<SideThread> thread;  ///< none: the files are read
     DaemonConfig next;
     bool is_overdue_reported{false};
     std::optional<std::filesystem::path> candidate;
-    bool is_asked{false};  ///< by a client, who gets the outcome
+    bool is_asked{false};  ///< by a client, which gets the outcome
     std::int64_t user{-1};
   };
 
-  /// What a command has changed, on its way to the disk.
+  /// A command's change of the state, not yet on disk.
   struct Save {
     std::uint64_t serial{0};
     Clock::time_point deadline;
@@ -112,15 +110,15 @@ class Operations {
   Parts parts_;
   CycleHandle cycle_;
   std::optional<Reload> reload_;
-  std::optional<std::filesystem::path> candidate_;  ///< that an operator named, empty: none
+  std::optional<std::filesystem::path> candidate_;  ///< named by an operator; empty: none
   bool reload_again_{false};
   std::string reported_save_error_;
-  std::uint64_t reported_serial_{0};  ///< of the state that the estimator knows to be on disk
+  std::uint64_t reported_serial_{0};  ///< newest state reported to the estimator as on disk
   CycleHandle::Tracked saved_notice_;
-  std::vector<Asked> asked_;  ///< commands on their way, in order
+  std::vector<Asked> asked_;  ///< commands under way, in order
 };
 
-/// Parts for the configuration, with a recorder where there is a history.
+/// Parts for the configuration, with a recorder if there is a history.
 /// @throws InvalidValue
 [[nodiscard]] std::unique_ptr<CycleParts> make_cycle_parts(const DaemonConfig& config,
                                                            HistoryWriter* history);

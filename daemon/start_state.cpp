@@ -30,7 +30,7 @@ void search(const HistoryReader& reader, const SetupParser& parser, RecordedStat
   const std::vector<SegmentInfo>& segments = reader.segments();
   found.has_run = !segments.empty() || !reader.damage().empty();
   for (const HistoryDamage& damage : reader.damage()) {
-    // What the reader left out and may be of a later time than all it took; 0: the whole file.
+    // Damage in a segment that the reader skipped and that may be newer; 0: the whole file.
     if (!segments.empty() && damage.segment != 0 && damage.segment <= segments.back().id) continue;
     found.is_newest = false;
     found.problem = to_string(damage);
@@ -55,11 +55,11 @@ RecordedState last_recorded_state(const std::filesystem::path& history, const Se
   if (status.type() == std::filesystem::file_type::not_found) return found;
   if (status.type() == std::filesystem::file_type::regular &&
       std::filesystem::file_size(history, error) == 0 && !error)
-    return found;  // as a daemon leaves it that was stopped before its first commit
+    return found;  // left by a daemon that stopped before its first commit
   try {
     search(HistoryReader(history), parser, found);
   } catch (const std::exception& problem) {
-    // Something is there that once was a history.
+    // The file exists but cannot be read as a history.
     found.has_run = true;
     found.is_newest = false;
     found.problem = problem.what();
@@ -88,7 +88,7 @@ void take_recorded(const RecordedState& recorded, const std::string& why, StartS
                            "); compensation stays off until `thermocomp enable`");
 }
 
-/// A reference that cannot have been taken at the machine is none.
+/// Discards references that the machine's sensors cannot have measured.
 void refuse_impossible(const DaemonConfig& config, StartState& start) {
   const std::vector<std::string> refused = impossible_references(
       config.estimator, config.model.temperature_columns(), start.state.reference_degC);
@@ -103,13 +103,13 @@ void refuse_impossible(const DaemonConfig& config, StartState& start) {
   start.is_on_disk = false;
 }
 
-/// Takes out what cannot have been sent with this configuration.
+/// Removes offsets that this configuration cannot have sent.
 void refuse_beyond_bound(const DaemonConfig& config, const std::string& source, Offsets& offset_um,
                          std::vector<std::string>& warnings) {
   for (const AxisConfig& axis : config.estimator.axes) {
     const auto found = offset_um.find(axis.name);
     const double bound_um = axis.limiter.offset_um_max;
-    // Negated, so that NaN is out too.
+    // Negated: NaN is removed too.
     if (found == offset_um.end() || std::abs(found->second) <= bound_um) continue;
     warnings.push_back(
         fmt::format("{}: offset_um.{} = {:g} is beyond this configuration's "
@@ -167,7 +167,7 @@ StartState find(const DaemonConfig& config) {
 StartState find_start_state(const DaemonConfig& config, Offsets recorded) {
   StartState start = find(config);
   refuse_impossible(config, start);
-  // The record is newer than what is saved of an offset.
+  // The record is newer than the saved corridor.
   for (const auto& [axis, offset_um] : recorded)
     if (std::isnan(offset_um)) start.state.corridor_um.erase(axis);
   std::erase_if(recorded, [](const auto& each) { return std::isnan(each.second); });

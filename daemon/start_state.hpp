@@ -1,5 +1,4 @@
-/// The state with which the daemon starts, by the state file or else by the history, and what the
-/// operator must know about it.
+/// The state at start, from the state file or else the history, with warnings for the operator.
 #pragma once
 
 #include <filesystem>
@@ -15,41 +14,41 @@
 
 namespace thermocomp {
 
-/// The machine's state when the daemon last ran, by the history.
+/// The machine's state when the daemon last ran, from the history.
 struct RecordedState {
-  /// The history has, or had, something in it: this is not the first start of this machine.
+  /// The history has, or had, content: this is not the first start of this machine.
   bool has_run{false};
-  /// As after the last recorded cycle of the newest segment that is sound; none: there is none.
+  /// After the last recorded cycle of the newest sound segment; none: no segment is sound.
   std::optional<PersistentState> state;
-  /// Nothing newer is damaged, so no command can have come later than the last commit.
+  /// No newer data is damaged, so no command came after the last commit.
   bool is_newest{true};
-  std::string problem;  ///< what is wrong with the newest segment, or with the file
+  std::string problem;  ///< error of the newest segment, or of the file
 };
 
-/// Steps the newest sound segment again to its end; a segment of 6 h at 100 Hz takes some seconds.
+/// Replays the newest sound segment to its end; 6 h at 100 Hz take some seconds.
 /// Never throws because of the file.
 [[nodiscard]] RecordedState last_recorded_state(const std::filesystem::path& history,
                                                 const SetupParser& parser = parse_setup);
 
 struct StartState {
   PersistentState state;
-  bool is_on_disk{true};       ///< false: came from elsewhere than the file, and must be written
-  bool reference_lost{false};  ///< nobody knows the machine's reference: stay disabled
-  ReferenceRecord reference;   ///< when that of `state` was taken, as far as the file says
+  bool is_on_disk{true};       ///< false: not from the file; must be written
+  bool reference_lost{false};  ///< the machine's reference is unknown: stay disabled
+  ReferenceRecord reference;   ///< origin of the reference of `state`, if in the file
   std::vector<std::string> warnings;
 };
 
-/// The state file's content. Where that is missing or unusable:
-///   no history, or an empty one   missing: the first start; unusable: disabled, reference lost
-///   newest segment sound          all from there
-///   only older ones sound         all from the newest of them, but disabled: what an operator did
-///                                 since is not known
-///   none sound                    disabled, reference lost
-/// A state file that is unusable is moved aside. May take some seconds, as last_recorded_state().
+/// Reads the state file. If it is missing or unusable:
+///   no history, or an empty one   missing: first start; unusable: disabled, reference lost
+///   newest segment sound          everything from the history
+///   only older segments sound     everything from the newest of them, but disabled: later
+///                                 commands are unknown
+///   no segment sound              disabled, reference lost
+/// Moves an unusable state file aside. May take some seconds, see last_recorded_state().
 ///
-/// Offsets beyond this configuration's bounds are left out, with a warning; so are those that were
-/// sent to another controller or with another sign, where an axis would have to start from them.
-/// @param recorded  of the last-sent record
+/// Drops, with a warning, offsets beyond the configured bounds, and the corridor of an axis whose
+/// offset was sent to another controller or with another sign.
+/// @param recorded  offsets of the last-sent record [um]
 [[nodiscard]] StartState find_start_state(const DaemonConfig& config, Offsets recorded = {});
 
 }  // namespace thermocomp

@@ -53,16 +53,16 @@ using namespace std::chrono_literals;
 
 constexpr auto tick_period = 100ms;
 constexpr auto health_period = 1s;
-/// While a command or a reload is under way: at 1 kHz it takes a millisecond or two.
+/// While a command or a reload is under way; the cycle needs 1 to 2 ms at 1 kHz.
 constexpr auto busy_period = 1ms;
-/// Reports are looked at so often at least, whatever is under way.
+/// Longest time between two looks at the report, also while an operation is under way.
 constexpr auto note_period_max = 1s;
 constexpr auto ready_within = 5s;
 constexpr std::uint64_t cycles_until_ready = 3;
-/// Offsets at zero are sent, and read back, for so long before the links are closed.
+/// Time for which zero offsets are sent and read back before the links are closed.
 constexpr auto zero_settles = 500ms;
 constexpr auto stop_extended_by = 10s;
-/// Outages that have ended are shown for so long, and so many.
+/// Age and number limits of ended outages in the status.
 constexpr auto recent = 600s;
 constexpr std::size_t recent_max = 8;
 
@@ -81,7 +81,7 @@ void Supervisor::wait_until_ready(Cycle& running) {
     if (Clock::now() - begun > patience) throw RealTimeError("the cycle does not run");
     std::this_thread::sleep_for(1ms);
   }
-  // What happened while threads and memory were being set up is not the cycle's record.
+  // Start-up (threads, memory) must not count in the cycle's timing.
   running.clear_timing();
   look_at_health();
   parts_.service.ready(status_line(view()));
@@ -101,7 +101,7 @@ void Supervisor::run() {
 
 bool Supervisor::turn() {
   pollfd files[] = {{parts_.signals.fd(), POLLIN, 0}, {parts_.server.fd(), POLLIN, 0}};
-  // Rounded up: a rest of a millisecond must be slept, not spun through.
+  // Rounded up: a remainder below 1 ms must not become a busy loop.
   const auto left = std::chrono::ceil<std::chrono::milliseconds>(next_tick_ - Clock::now());
   const auto longest = parts_.operations.is_busy() ? busy_period : tick_period;
   const auto timeout = std::clamp<std::chrono::milliseconds>(left, 0ms, longest);
@@ -110,7 +110,7 @@ bool Supervisor::turn() {
     throw std::runtime_error(std::string("poll: ") + std::strerror(errno));
   const bool stopping = take_signals();
   parts_.operations.poll();
-  // What was before a command is reported before it, what comes of it after it.
+  // Changes before a command are reported before it, its effects after it.
   if (!parts_.operations.is_busy() || Clock::now() >= next_note_) note_report();
   parts_.server.handle(0ms);
   if (Clock::now() >= next_tick_) tick();
@@ -187,7 +187,7 @@ void Supervisor::ramp_to_zero() {
   }
   auto moved = Clock::now();
   auto extended = Clock::time_point{};
-  bool again = false;  // who asks twice does not want to wait
+  bool again = false;  // a second signal skips the ramp
   while (!again && Clock::now() < end && Clock::now() - moved < zero_settles) {
     if (Clock::now() - extended > 1s) {
       parts_.service.extend_stop(stop_extended_by);
@@ -205,11 +205,11 @@ void Supervisor::ramp_to_zero() {
 
 bool Supervisor::at_zero() {
   const Report& report = cycle().report();
-  // Of what cannot be sent nothing is waited for.
+  // Without a controller no offset can be sent.
   if (has_reason(report.reasons, Reason::controller_offline)) return true;
   const double tolerance_um = parts_.config.estimator.compensation.mismatch_um;
   return std::all_of(report.axes.begin(), report.axes.end(), [=](const AxisReport& axis) {
-    // Negated: what is not read back (NaN) does not count.
+    // Negated: a missing read-back (NaN) does not count.
     return !axis.driven || (axis.offset_um == 0.0 && !(std::abs(axis.applied_um) > tolerance_um));
   });
 }

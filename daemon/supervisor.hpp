@@ -19,16 +19,16 @@
 
 namespace thermocomp {
 
-/// The signals that the daemon answers to, as a file that can be polled.
+/// The daemon's signals as a file descriptor for poll().
 class SignalFile {
  public:
-  /// What came since the last call; any number of SIGHUPs count as one.
+  /// Signals since the last call; several SIGHUPs count as one.
   struct Asked {
-    int stop{0};  ///< SIGTERM or SIGINT, the last of them; 0: none
+    int stop{0};  ///< the last SIGTERM or SIGINT; 0: none
     bool reload{false};
   };
 
-  /// Blocks SIGTERM, SIGINT and SIGHUP for this thread and all that it makes from now on.
+  /// Blocks SIGTERM, SIGINT and SIGHUP for this thread and all threads it creates afterwards.
   SignalFile();
   ~SignalFile();
   SignalFile(const SignalFile&) = delete;
@@ -41,16 +41,15 @@ class SignalFile {
   int fd_;
 };
 
-/// Nothing here waits longer than a tick, whatever is under way: the watchdog is fed while, and
-/// only while, the cycle advances.
+/// No call blocks longer than a tick. The watchdog is fed only while the cycle advances.
 class Supervisor {
  public:
-  /// All of them outlive this.
+  /// All must outlive this.
   struct Parts {
     const DaemonConfig& config;
     const std::vector<std::unique_ptr<SensorSource>>& sources;
     const ControllerLink& link;
-    HistoryWriter* history;  ///< none: no history
+    HistoryWriter* history;  ///< null: no history
     const StateKeeper& keeper;
     StatusServer& server;
     SignalFile& signals;
@@ -61,15 +60,16 @@ class Supervisor {
   };
   explicit Supervisor(const Parts& parts) : parts_(parts), events_(parts.journal) {}
 
-  /// Shown with every status from now on.
+  /// Adds the warning to every status from now on.
   void add_warning(const std::string& warning);
   void set_real_time(bool real_time) noexcept { real_time_ = real_time; }
 
-  /// Once the cycle has advanced; tells the service manager. @throws RealTimeError if it does not
+  /// Reports readiness to the service manager once the cycle advances.
+  /// @throws RealTimeError if it does not
   void wait_until_ready(Cycle& running);
-  /// Runs until a signal ends it; then, if so configured, takes the offsets to zero.
+  /// Runs until a signal ends it; then, if so configured, ramps the offsets to zero.
   void run();
-  /// News of the history; once more after its end.
+  /// Logs news of the history; to be called once more after its end.
   void note_history();
 
   [[nodiscard]] StatusView view();

@@ -5,7 +5,7 @@ namespace {
 
 constexpr const char* pair_key = "candidate.pair";
 
-/// Calls `use` with the name and the number of all that a score consists of.
+/// Calls `use` with name and value of each number of a score.
 template <class Score, class Use>
 void each_number(const std::string& axis, Score& score, Use use) {
   const std::string prefix = "candidate." + axis + ".";
@@ -39,7 +39,7 @@ void Candidate::adopt(const Estimator& running, const Candidate* before) noexcep
 void Candidate::restore(const PersistentState& state) {
   PersistentState own = state;
   own.correction.clear();
-  // A model file without numbers takes the machine's reference, whoever gave it.
+  // Without reference numbers in its model file, the candidate uses the machine's reference.
   if (reference_numbers(estimator_.model()).empty()) own.model_reference_degC.clear();
   static_cast<void>(estimator_.restore(own));
   const auto pair = state.correction.find(pair_key);

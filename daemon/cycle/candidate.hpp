@@ -1,5 +1,4 @@
-/// A model that runs beside the one in use: evaluated in the same cycle, never sent, scored at each
-/// probing; and which of the two leaves less at the tool.
+/// A second model, evaluated in the same cycle but never sent, and its score at each probing.
 #pragma once
 
 #include <algorithm>
@@ -17,16 +16,16 @@
 
 namespace thermocomp {
 
-/// A test by betting (Waudby-Smith and Ramdas 2024), which may be looked at after every probing.
-/// With e the errors of both models at the probings of an axis, m their mean square so far, and a
-/// bet at most every two hours, because errors at neighbouring probings are alike:
+/// An anytime-valid test by betting (Waudby-Smith and Ramdas 2024). With e the errors of both
+/// models at the probings of an axis and m their mean square so far; at most one bet in two hours,
+/// because neighbouring errors are correlated:
 ///
 ///     b = 0.95 tanh(lambda sum (e_model^2 - e_candidate^2) / m),   summed since the last bet
 ///     W = mean over lambda of prod (1 + b),   V the same with 1 - b
 ///
-/// Where both models are equally good, b is as often positive as negative, and W exceeds 40 at any
-/// time with a probability of at most 1/40 (Ville's inequality). W and V of several axes are
-/// averaged. With a chance at first of 1/2 for equal and 1/4 each for better and worse:
+/// For equally good models E[b] = 0, and W ever exceeds 40 with a probability of at most 1/40
+/// (Ville's inequality). W and V are averaged over axes. With prior probabilities of 1/2 for equal,
+/// 1/4 for better and 1/4 for worse:
 ///
 ///     P(better) = W / (W + 2 + V)
 class ModelContest {
@@ -36,7 +35,7 @@ class ModelContest {
 
   struct AxisScore {
     double probings{0.0};
-    double model_um2{0.0};  ///< sum of the squared errors, as the next
+    double model_um2{0.0};  ///< sum of squared errors
     double candidate_um2{0.0};
     std::array<double, lambdas.size()> log_better{};  ///< ln of prod (1 + b)
     std::array<double, lambdas.size()> log_worse{};   ///< ln of prod (1 - b)
@@ -79,7 +78,7 @@ class ModelContest {
 
  private:
   struct Pending {
-    double less_um2{0.0};  ///< by so much the candidate's squares are less, since the last bet
+    double less_um2{0.0};  ///< sum of (model error^2 - candidate error^2) since the last bet
     nanoseconds bet_at{-apart};
   };
   [[nodiscard]] static double wealth(const Score& score,
@@ -98,38 +97,38 @@ class ModelContest {
   std::array<Pending, axes_max> pending_{};
 };
 
-/// Both models are judged by themselves, without a running correction.
+/// Both models are scored without their running correction.
 class Candidate {
  public:
-  /// @param pair  number of the two models: a score counts for this pair only
+  /// @param pair  ID of the pair of models: a score is valid for this pair only
   /// @throws InvalidValue
   Candidate(const EstimatorConfig& config, const ThermalModel& model, double pair)
       : pair_(pair), estimator_(config, model), score_(contest_.score()) {}
 
-  // The cycle's side: no allocation, no lock.
+  // Called by the cycle: no allocation, no lock.
 
-  /// Before `running` gets the command.
+  /// Call before `running` gets the command.
   void command(const Command& command, const Estimator& running) noexcept;
   void step(nanoseconds now, std::span<const Reading> readings,
             const ControllerState& controller) noexcept {
     now_ = now;
     estimator_.step(now, readings, controller, unsent_);
   }
-  /// From the estimator that ran before, and from the candidate beside it where there was one.
+  /// From the previous estimator and, unless null, the previous candidate.
   void adopt(const Estimator& running, const Candidate* before) noexcept;
 
   [[nodiscard]] const Estimator& estimator() const noexcept { return estimator_; }
 
-  // Main's side.
+  // Called by main.
 
   void plan_adoption(const Estimator& running) { estimator_.plan_adoption(running); }
-  /// Before the first step.
+  /// Call before the first step.
   void restore(const PersistentState& state);
   [[nodiscard]] const ModelContest::Score& score() noexcept {
     score_.fresh();
     return score_.front();
   }
-  /// The score, for restore(): numbers by name beside those of the correction.
+  /// Adds the score for restore(), as named numbers among those of the correction.
   void add_to(std::map<std::string, double>& correction);
 
  private:

@@ -25,7 +25,7 @@ std::uint64_t DurationHistogram::upper_edge_ns(std::size_t bucket) noexcept {
 
 void DurationHistogram::record(std::chrono::nanoseconds duration) noexcept {
   const auto ns = std::max<std::int64_t>(duration.count(), 0);
-  // One writer: a load and a store are enough, and cheaper than an atomic addition.
+  // Single writer: load and store suffice and are cheaper than an atomic addition.
   auto& bucket = buckets_[bucket_of(static_cast<std::uint64_t>(ns))];
   bucket.store(bucket.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
   if (ns > max_ns_.load(std::memory_order_relaxed)) max_ns_.store(ns, std::memory_order_relaxed);
@@ -65,7 +65,7 @@ std::optional<std::uint64_t> CommandQueue::try_push(const Command& command) noex
 }
 
 bool CommandQueue::withdraw(std::uint64_t number) noexcept {
-  if (number < tail_.load(std::memory_order_acquire)) return false;  // its place may be another's
+  if (number < tail_.load(std::memory_order_acquire)) return false;  // the slot may be reused
   State state = State::waiting;
   return places_[number % capacity].state.compare_exchange_strong(state, State::withdrawn);
 }
@@ -91,13 +91,13 @@ nanoseconds now_on_clock() noexcept {
   return std::chrono::seconds(time.tv_sec) + nanoseconds(time.tv_nsec);
 }
 
-/// By another system call, a millisecond or more at a time: a FIFO thread that spun instead would
-/// take the processor from everybody, and its cycles would run ahead of time.
+/// Fallback with 1 ms waits: a spinning FIFO thread would starve all others, and a cycle that does
+/// not wait would run ahead of time.
 void wait_otherwise(nanoseconds wake) noexcept {
   while (now_on_clock() < wake) poll(nullptr, 0, 1);
 }
 
-/// @return false when the system refused to sleep; it is `wake` all the same
+/// @return false when clock_nanosleep() failed; `wake` has passed in both cases
 bool sleep_until(nanoseconds wake) noexcept {
   timespec time{};
   time.tv_sec = std::chrono::duration_cast<std::chrono::seconds>(wake).count();
@@ -150,7 +150,7 @@ void Cycle::run() noexcept {
 }
 
 void Cycle::step(std::uint64_t cycle) noexcept {
-  // Only now: at the end the last step's offsets are still recorded, and they come before these.
+  // Recorded late: at the end, the last step's offsets are recorded before skipped cycles.
   if (cycle > expected_ && parts_->recorder) parts_->recorder->skipped(expected_, cycle - 1);
   cycle_ = cycle;
   expected_ = cycle + 1;
@@ -165,19 +165,19 @@ void Cycle::step(std::uint64_t cycle) noexcept {
   }
   for (SensorSource* source : sources_) source->newest(readings_);
   link_.newest(controller_);
-  // The grid's time, not the clock's: the same steps can be taken again from the history.
+  // Grid time, not the clock, so that a replay of the history repeats the same steps.
   parts.estimator.step(grid_.time_of(cycle), readings_, controller_, offsets_);
-  // Before it can be sent, so that what was sent is never farther than what is recorded.
+  // Before the offer: a kill in between must not leave an unrecorded offset at the controller.
   if (last_sent_ != nullptr) last_sent_->note(offsets_, parts.estimator.forgotten_axes());
   link_.offer(offsets_);
   if (parts.recorder)
     parts.recorder->record(cycle, readings_, controller_, offsets_, parts.estimator);
   if (parts.candidate) parts.candidate->step(grid_.time_of(cycle), readings_, controller_);
   publish(commanded);
-  // Given back only now, when the new one has something to report.
+  // Returned only after the new parts have published a report.
   if (retiring_ != nullptr)
     retired_.store(std::exchange(retiring_, nullptr), std::memory_order_release);
-  // Last, so that who sees a command done can see a change-over of the same step.
+  // Last: a reader that sees the command done also sees a change-over of the same step.
   if (commanded) commands_done_.store(commands_.taken(), std::memory_order_release);
 }
 
@@ -192,8 +192,7 @@ std::uint64_t Cycle::newest_due(nanoseconds now) const noexcept {
 }
 
 std::uint64_t Cycle::next_after(std::uint64_t cycle, nanoseconds now) noexcept {
-  // A cycle that is late by less than a period still runs, whole periods are left out and counted,
-  // and the phase stays.
+  // A cycle late by less than a period still runs; whole periods are skipped. The phase is kept.
   const std::uint64_t due = newest_due(now);
   if (due <= cycle + 1) return cycle + 1;
   timing_.missed.store(timing_.missed.load(std::memory_order_relaxed) + due - cycle - 1,
@@ -206,7 +205,7 @@ void Cycle::take_over(std::uint64_t cycle) noexcept {
   if (next == nullptr) return;
   retiring_ = parts_.release();
   next->estimator.adopt(retiring_->estimator);
-  // Its lags and its inputs' reference have lived through what those of another model have not.
+  // The candidate's lags and input reference have the history that the promoted model needs.
   if (next->promotes && retiring_->candidate)
     next->estimator.adopt_model(retiring_->candidate->estimator());
   if (next->candidate) next->candidate->adopt(retiring_->estimator, retiring_->candidate.get());

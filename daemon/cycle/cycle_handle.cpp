@@ -9,7 +9,7 @@ namespace thermocomp {
 
 CycleHandle::Tracked CycleHandle::send(const Command& command, Clock::time_point now) {
   THERMOCOMP_ENSURE(!replacing() || !has_index(command.kind));
-  // Those that are overdue count too, so that a number in the queue is never used twice.
+  // Overdue commands count too, so that a queue number is never reused.
   if (commands_.size() >= CommandQueue::capacity) return nullptr;
   const auto number = cycle_.send(command);
   if (!number) return nullptr;
@@ -56,7 +56,7 @@ void CycleHandle::settle() {
 }
 
 void CycleHandle::finish_commands() {
-  // In this order: a command of the step in which the parts changed is reported by the new one.
+  // In this order: the new parts report a command of the step in which they took over.
   const std::uint64_t done = cycle_.commands_done();
   finish_replacement();
   std::vector<SentCommand> finished;

@@ -1,4 +1,4 @@
-/// Main's side of the cycle: what was sent to it, what came of it, and what was not taken in time.
+/// Main's side of the cycle: sends commands and new parts and tracks their outcome.
 #pragma once
 
 #include <chrono>
@@ -11,50 +11,46 @@
 
 namespace thermocomp {
 
-/// The state of a command, or of new parts, on the way to the cycle.
+/// The state of a command, or of new parts, sent to the cycle.
 enum class Outcome {
   waiting,
-  done,       ///< the newest report says what it did
-  withdrawn,  ///< not taken in time: it never happened and never will
-  overdue     ///< the cycle has it in hand and does not finish; `done` may still come
+  done,       ///< the newest report includes its effect
+  withdrawn,  ///< not taken in time: it will never be carried out
+  overdue     ///< taken but not finished in time; may still become `done`
 };
 
-/// Nothing here waits: poll() moves everything on. Main's thread only; time is an argument.
+/// Nothing here blocks; poll() advances all operations. Main's thread only; time is an argument.
 ///
-/// A change-over is whole or not at all: until poll() has finished it, parts() and report() are
-/// those of the old parts, and what the cycle does not take within its patience is withdrawn in one
-/// atomic step. So nothing is ever done that main believes refused, nor the other way round.
+/// A change-over is atomic: until poll() has finished it, parts() and report() are those of the old
+/// parts. A command or parts that the cycle does not take within `patience` are withdrawn in one
+/// atomic step: main and cycle always agree on what was carried out.
 class CycleHandle {
  public:
   using Clock = std::chrono::steady_clock;
   using Tracked = std::shared_ptr<const Outcome>;
-  /// Called by poll() for each command that is done, before its outcome becomes `done`.
+  /// Called by poll() for each finished command, before its outcome becomes `done`.
   using CommandDone = std::function<void(const Command&)>;
 
-  /// At 1 Hz a command takes up to 1 s.
+  /// Longer than the 1 s that a command takes at a rate of 1 Hz.
   static constexpr Clock::duration patience = std::chrono::seconds(5);
 
   CycleHandle(Cycle& cycle, CommandDone command_done)
       : cycle_(cycle), command_done_(std::move(command_done)) {}
 
-  /// @return none: too many are under way
-  /// @pre replacing() is false for a command that names an axis: the new parts may number them
-  ///      otherwise
+  /// @return null: too many commands are under way
+  /// @pre !replacing() for a command that names an axis: the new parts may number axes differently
   [[nodiscard]] Tracked send(const Command& command, Clock::time_point now);
   /// @pre !replacing()
   Tracked replace(std::unique_ptr<CycleParts> next, Clock::time_point now);
-  /// Whether new parts are on their way: no others can be handed over until that is done or
-  /// withdrawn.
+  /// Whether new parts are under way; they must be done or withdrawn before others can follow.
   [[nodiscard]] bool replacing() const noexcept { return replacement_.outcome != nullptr; }
-  /// Whether poll() has anything to do.
   [[nodiscard]] bool is_busy() const noexcept { return replacing() || !commands_.empty(); }
 
-  /// What is done becomes `done`, what is late is withdrawn or becomes `overdue`.
+  /// Marks finished operations `done`; withdraws late ones or marks them `overdue`.
   void poll(Clock::time_point now);
-  /// After the cycle has ended: what it did is done, the rest is withdrawn.
+  /// Call after the cycle has ended. Marks finished operations and withdraws the rest.
   void settle();
 
-  /// The report of the newest parts whose change-over is done.
   [[nodiscard]] const Report& report() { return cycle_.report(); }
   [[nodiscard]] const Estimator& estimator() { return cycle_.parts().estimator; }
   [[nodiscard]] Candidate* candidate() { return cycle_.parts().candidate.get(); }
@@ -69,9 +65,9 @@ class CycleHandle {
     std::shared_ptr<Outcome> outcome;
   };
   struct Replacement {
-    std::unique_ptr<CycleParts> staged;  ///< waits until no command that names an axis is under way
+    std::unique_ptr<CycleParts> staged;  ///< held back while an axis command is under way
     Clock::time_point deadline;
-    std::shared_ptr<Outcome> outcome;  ///< none: no parts is on its way
+    std::shared_ptr<Outcome> outcome;  ///< null: no parts are under way
   };
 
   void finish_replacement();
@@ -82,7 +78,7 @@ class CycleHandle {
 
   Cycle& cycle_;
   CommandDone command_done_;
-  std::vector<SentCommand> commands_;  ///< in the order in which they were sent
+  std::vector<SentCommand> commands_;  ///< in the order sent
   Replacement replacement_;
 };
 
@@ -91,7 +87,7 @@ class CycleHandle {
   return kind == CommandKind::measured || kind == CommandKind::prove ||
          kind == CommandKind::release || kind == CommandKind::saved;
 }
-/// Whether it is an index of the running configuration, and means another thing in the next one.
+/// Whether Command::axis is an index that depends on the configuration.
 [[nodiscard]] constexpr bool has_index(CommandKind kind) noexcept {
   return names_axis(kind) || kind == CommandKind::accept;
 }

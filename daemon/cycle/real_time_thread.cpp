@@ -17,24 +17,24 @@ constexpr std::size_t stack_bytes = 2048 * 1024;  // the sanitizers' frames are 
 constexpr std::size_t stack_bytes = std::size_t{256} * 1024;
 #endif
 
-/// Touches the stack once, so that the first deep call does not have to wait for a page.
+/// Touches the stack once, to avoid page faults in the cycle.
 void __attribute__((noinline)) touch_stack() noexcept {
   constexpr std::size_t depth_bytes = std::size_t{96} * 1024;
   char stack[depth_bytes];
   std::memset(stack, 0, sizeof stack);
-  // The compiler must believe that somebody looks at it.
+  // Keeps the compiler from removing the buffer.
   asm volatile("" : : "r"(stack) : "memory");
 }
 
 }  // namespace
 
 std::string lock_memory() {
-  // One arena, never trimmed, never mapped piecemeal: memory once had stays had.
+  // One arena, no trimming, no mmap(): allocated memory is never returned.
   mallopt(M_ARENA_MAX, 1);
   mallopt(M_TRIM_THRESHOLD, -1);
   mallopt(M_MMAP_MAX, 0);
-  // Locked as it is touched: what is never used (most of the libraries) does not count against the
-  // machine's memory. The cycle touches all of its own before the daemon reports ready.
+  // MCL_ONFAULT locks pages once touched: unused library pages do not use up the machine's memory.
+  // The cycle touches all of its memory before the daemon reports ready.
   if (mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) == 0) return {};
   return std::string("memory is not locked: ") + std::strerror(errno) +
          " (needs CAP_IPC_LOCK or a larger LimitMEMLOCK)";
@@ -73,7 +73,7 @@ int RealTimeThread::create(const RealTimeThreadConfig& config, bool fifo) {
     CPU_SET(static_cast<unsigned>(config.cpu), &cpus);
     error = pthread_attr_setaffinity_np(&attributes, sizeof cpus, &cpus);
   }
-  // Signals are main's business; a thread inherits its maker's mask.
+  // A thread inherits the signal mask of its creator; main handles all signals.
   sigset_t all;
   sigset_t before;
   sigfillset(&all);

@@ -1,4 +1,4 @@
-/// A thread with a real-time schedule, and memory that is not paged out.
+/// A thread with real-time scheduling, and locked memory.
 #pragma once
 
 #include <chrono>
@@ -15,8 +15,7 @@ class RealTimeError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Keeps all memory of the process resident once it has been touched, now and later, and keeps the
-/// heap from being given back.
+/// Locks all memory of the process once touched, now and later, and disables returning heap memory.
 /// @return empty, or why it was not possible
 [[nodiscard]] std::string lock_memory();
 
@@ -25,7 +24,7 @@ struct RealTimeThreadConfig {
   int cpu{-1};       ///< -1: any
 };
 
-/// Runs `body` on a thread of its own with every signal blocked.
+/// Runs `body` on its own thread with all signals blocked.
 class RealTimeThread {
  public:
   RealTimeThread() = default;
@@ -33,11 +32,11 @@ class RealTimeThread {
   RealTimeThread& operator=(const RealTimeThread&) = delete;
   ~RealTimeThread() { join(); }
 
-  /// @return empty, or why the thread runs with an ordinary schedule instead
-  /// @throws RealTimeError when no thread could be made at all
+  /// @return empty, or why the thread runs with ordinary scheduling instead
+  /// @throws RealTimeError when no thread can be created
   [[nodiscard]] std::string start(const RealTimeThreadConfig& config, std::function<void()> body);
   void join() noexcept;
-  /// @return false: it has not ended within `patience`, and is still to be joined
+  /// @return false: still running after `patience`, and to be joined
   [[nodiscard]] bool join_within(std::chrono::seconds patience) noexcept;
 
  private:

@@ -48,7 +48,7 @@ std::filesystem::path lock_path(const std::filesystem::path& file) {
   return canonical.concat(".lock");
 }
 
-/// Who released the lock may have removed the file between our opening and our locking it.
+/// False if the previous holder removed the file between our open() and flock().
 bool is_at(int fd, const std::filesystem::path& path) noexcept {
   struct stat ours {};
   struct stat there {};
@@ -68,8 +68,8 @@ std::string content(int fd) {
 
 FileLock::FileLock(const std::filesystem::path& file) : path_(lock_path(file)) {
   for (;;) {
-    // NOFOLLOW: where others may write to the folder, a link must not lead us to a file of ours.
-    // 0600: whoever may read a file may lock it too, and so keep its owner out.
+    // NOFOLLOW: in a folder that others can write to, a link must not point us to a file of ours.
+    // 0600: a user who can read the file could lock it and keep its owner out.
     fd_ = open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0600);
     if (fd_ < 0) throw LockImpossible(path_.string() + ": " + std::strerror(errno));
     if (flock(fd_, LOCK_EX | LOCK_NB) != 0) {
@@ -84,8 +84,8 @@ FileLock::FileLock(const std::filesystem::path& file) : path_(lock_path(file)) {
     if (is_at(fd_, path_)) break;
     close(fd_);
   }
-  static_cast<void>(fchmod(fd_, 0600) == 0);  // one that was left by an earlier version
-  // For people only: where it cannot be written (disk full), the lock holds all the same.
+  static_cast<void>(fchmod(fd_, 0600) == 0);  // an earlier version may have left another mode
+  // Informative only: the lock is valid even if this cannot be written (disk full).
   const std::string holder = describe_process(getpid()) + "\n";
   if (ftruncate(fd_, 0) != 0 ||
       pwrite(fd_, holder.data(), holder.size(), 0) != static_cast<ssize_t>(holder.size())) {
@@ -94,7 +94,7 @@ FileLock::FileLock(const std::filesystem::path& file) : path_(lock_path(file)) {
 }
 
 FileLock::~FileLock() {
-  unlink(path_.c_str());  // while it is still held
+  unlink(path_.c_str());  // while still locked
   close(fd_);
 }
 
@@ -110,14 +110,14 @@ struct Address {
   socklen_t length{0};
 };
 
-/// FNV-1a (64 bits), for names that are too long for an address: the same on every build.
+/// FNV-1a (64 bits) of a name too long for an address; the same on every build.
 std::string short_text(const std::string& text) {
   std::uint64_t hash = 14695981039346656037u;
   for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211u;
   return std::string("#").append(std::to_string(hash));
 }
 
-/// What the addresses of all holders of a name begin with.
+/// Common prefix of the addresses of all holders of a name.
 std::string prefix_of(const std::string& name) {
   std::string text = "thermocomp/" + name;
   if (text.size() + 1 + random_digits > room) {
@@ -153,7 +153,7 @@ int open_socket() {
   return socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
 }
 
-/// Who listens at the address; nothing where nobody does.
+/// Credentials of the listener at the address; none: no listener.
 std::optional<ucred> listener_at(const std::string& text) {
   const Address address = abstract_address(text);
   const int fd = open_socket();
@@ -167,9 +167,9 @@ std::optional<ucred> listener_at(const std::string& text) {
   return known ? std::optional(who) : std::nullopt;
 }
 
-/// The random parts of the addresses with this prefix at which somebody listens. A line of the
-/// table ends with the address, in which "@" stands for the leading zero; the flag is that of a
-/// listener, since connections that wait for it have its address too.
+/// Random parts of the addresses with this prefix that have a listener. A line of the table ends
+/// with the address, where "@" stands for the leading zero. The flag marks a listener: connections
+/// in its backlog have the same address.
 /// @throws LockImpossible
 std::vector<std::string> listened_with(const std::string& prefix) {
   std::ifstream table("/proc/self/net/unix");
@@ -185,13 +185,12 @@ std::vector<std::string> listened_with(const std::string& prefix) {
   return found;
 }
 
-/// Of two that begin at the same moment the one with the lower number stays: the other one refuses
-/// at once, and whoever has the lower number waits for that. Whoever is still there after the
-/// wait has held the name before.
+/// When two processes start at the same moment, the one with the higher number refuses at once
+/// and the other one waits for that. A holder still present after the wait had the name before.
 /// @throws LockHeld, LockImpossible
 void refuse_if_held(const std::string& name, const std::string& prefix, const std::string& own) {
   constexpr int looks_max = 20;
-  std::map<std::string, std::optional<ucred>> asked;  // once: each question waits in its backlog
+  std::map<std::string, std::optional<ucred>> asked;  // once: a query fills the holder's backlog
   for (int look = 1;; ++look) {
     std::optional<ucred> holder;
     bool must_refuse = look == looks_max;

@@ -1,4 +1,4 @@
-/// What only one process of this machine may use at a time: a file, or a name.
+/// Locks for a file or a name that only one process of this machine may use at a time.
 #pragma once
 
 #include <filesystem>
@@ -9,29 +9,26 @@
 
 namespace thermocomp {
 
-/// Another process holds the lock; the text says what is locked and who has it.
+/// Another process holds the lock; the text names the lock and its holder.
 class LockHeld : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// The lock could not be made at all (folder missing, disk full, ...), so nobody is known to hold
-/// it.
+/// The lock could not be created (folder missing, disk full, ...); a holder is not known.
 class LockImpossible : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// "process 4711 (thermocompd /etc/thermocomp/thermocompd.toml)", as far as it is known; the
-/// command line names the configuration.
+/// "process 4711 (thermocompd /etc/thermocomp/thermocompd.toml)", as far as known.
 [[nodiscard]] std::string describe_process(pid_t process);
 
-/// Holds `<file>.lock` beside the file, under the name that the file has once every link is
-/// followed, so that one file with two paths has one lock. It names its holder. The kernel releases
-/// it however the process ends; at an orderly end the lock file goes too.
+/// Holds `<file>.lock` beside the file, after resolving links, so that a file with two paths has
+/// one lock. The lock file names its holder. The kernel releases the lock when the process ends; an
+/// orderly end also removes the lock file.
 ///
-/// The file itself cannot carry the lock: a state file is replaced at every save, a damaged history
-/// is moved aside.
+/// The file itself cannot be locked: saving replaces a state file, damage moves a history aside.
 class FileLock {
  public:
   /// @throws LockHeld, LockImpossible
@@ -45,14 +42,13 @@ class FileLock {
   int fd_{-1};
 };
 
-/// For what is not a file: a controller's address. The lock is a Unix socket in the abstract
-/// namespace: it needs no folder and no rights, the kernel frees it however the process ends, and
-/// the kernel knows who holds it. It counts within a network namespace, as the address does.
+/// Lock for a name, such as a controller's address: a Unix socket in the abstract namespace. It
+/// needs no folder and no rights, the kernel frees it when the process ends and knows the holder.
+/// Valid within a network namespace, as the address is.
 ///
-/// Every user may bind any abstract name. Each holder therefore binds `thermocomp/<name>/<random>`,
-/// which nobody can take in advance, and only then looks for other holders of the name. A holder
-/// counts if it runs as this process's user or as root (SO_PEERCRED); one of another user is
-/// ignored.
+/// Every user may bind any abstract name, so each holder binds `thermocomp/<name>/<random>`, which
+/// cannot be guessed, and then looks for other holders of the name. A holder counts if it runs as
+/// this process's user or as root (SO_PEERCRED).
 class NameLock {
  public:
   /// @throws LockHeld, LockImpossible
@@ -61,8 +57,8 @@ class NameLock {
   NameLock(NameLock&& other) noexcept;
   NameLock& operator=(NameLock&&) = delete;
 
-  /// Takes what others have left who asked for the holder: once a second, say. Where thousands
-  /// wait, the kernel tells the next one nothing about the holder, which then does not count.
+  /// Accepts and closes pending queries for the holder; call about once a second. With a full
+  /// backlog (thousands of queries) a further query fails and the holder goes unnoticed.
   void drain() noexcept;
 
  private:

@@ -10,7 +10,7 @@ namespace {
 
 using nlohmann::json;
 
-/// No position, speed or offset of a machine is larger; what is beyond is garbage.
+/// Plausibility limit: no position, speed or offset of a machine is larger.
 constexpr double magnitude_max = 1e9;
 
 [[noreturn]] void invalid(const std::string& why) {
@@ -20,7 +20,7 @@ constexpr double magnitude_max = 1e9;
 double number_or_null(const json& value, const std::string& name) {
   if (value.is_null()) return not_a_number;
   const double number = value.is_number() ? value.get<double>() : not_a_number;
-  // Negated so that NaN is refused too.
+  // Negated: NaN is refused too.
   if (!(std::abs(number) <= magnitude_max))
     invalid(name + " must be null or a number within +-1e9");
   return number;

@@ -1,4 +1,4 @@
-/// The methods of the status socket: reads, commands, and who may use them.
+/// The methods of the status socket: reads, commands and their permissions.
 #pragma once
 
 #include <functional>
@@ -15,42 +15,41 @@
 
 namespace thermocomp {
 
-/// A new reference may be taken only while nothing says that the machine is bent.
-/// @return why none should be taken now: an axis is being proved, an offset is applied, the machine
-/// warms or cools. Empty: nothing speaks against it, and what is not known does not either.
+/// Checks whether a new reference may be taken: the machine must be at rest thermally and without
+/// an offset. Unknown quantities do not count against it.
+/// @return why not (an axis is being proved or offset, the machine warms or cools), or empty
 [[nodiscard]] std::string why_no_reference(const StatusView& view);
 
-/// For how long all temperatures have been watched [s]; less than half an hour says little about
-/// slow warming.
+/// Time for which all temperatures have been watched [s]; slow warming needs half an hour.
 [[nodiscard]] double watched_s(const StatusView& view);
 
-/// What the methods need of the daemon behind it.
+/// The daemon's functions behind the methods.
 struct DaemonActions {
   std::function<StatusView()> view;
-  /// Gives the command to the cycle; the result is there once it is carried out and would survive a
-  /// restart. @throws RpcError
+  /// Queues the command; the result is complete once it is carried out and would survive a restart.
+  /// @throws RpcError
   std::function<RpcPending(const Command&)> command;
-  /// The result is there once the cycle runs with the new configuration, and with this candidate
-  /// from then on where one is given (an empty path: none).
-  /// @throws ConfigurationError or RpcError with what is wrong; the running one then stays
+  /// The result is complete once the cycle runs with the new configuration and, if given, this
+  /// candidate (an empty path: none).
+  /// @throws ConfigurationError or RpcError; the running configuration then stays in use
   std::function<RpcPending(const std::optional<std::filesystem::path>& candidate)> reload;
-  /// A bridge's report and its answer; empty where the controller is not a bridge. @throws RpcError
+  /// A bridge's report and its answer; empty if the controller is not a bridge. @throws RpcError
   std::function<nlohmann::json(const nlohmann::json&)> controller_state{};
-  /// What happened in this run, for `events`.
+  /// The events of this run, for `events`.
   std::function<nlohmann::json()> events{};
 };
 
 /// Adds every method of CONTRACTS to `server`. @param actions  copied; must stay callable
 void add_operator_methods(StatusServer& server, const DaemonActions& actions);
 
-/// The method `controller_state`: from a bridge's JSON to its report, and the answer.
+/// The method `controller_state`: converts a bridge's JSON to its report, and returns the answer.
 ///
 /// params: {"session": whole number from 1, "taking": true, "applied_um": {"x": 1.5, "y": null},
-/// "signals": {"x_mm": 10.0, ...}}. Numbers are finite, null is "not known". Every axis of the
-/// configuration must be there; further axes and signals are what others may want.
+/// "signals": {"x_mm": 10.0, ...}}. Numbers are finite, null is "not known". Every configured axis
+/// must be present; further axes and signals are ignored.
 /// result: {"epoch": 3, "anew": false, "mode": "compensating", "offsets_um": {"x": 1.5, "y": null}}
-/// where null is "leave it as it is".
-/// @param mode  as a status calls it
+/// where null is "leave unchanged".
+/// @param mode  its name in the status
 /// @throws RpcError invalid_params (counted), refused
 [[nodiscard]] nlohmann::json answer_bridge(BridgeController& bridge,
                                            const BridgeControllerConfig& config,

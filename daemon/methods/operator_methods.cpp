@@ -19,15 +19,14 @@
 namespace thermocomp {
 namespace {
 
-/// What is read back may be so far from nothing (as in AxisChannel), and no more is applied [um].
+/// Offsets up to this count as zero (as in AxisChannel) [um].
 constexpr double at_nothing_um = 0.3;
 
 void add(std::string& why, const std::string& reason) {
   why.append(why.empty() ? "" : "; ").append(reason);
 }
 
-/// What is in effect at the machine, by what is sent and by what is read back; of a dry run what
-/// the controller applies by itself.
+/// The larger of sent offset and read-back [um]; in a dry run the offset shown by the controller.
 double in_effect_um(const StatusView& view, std::size_t i) {
   if (view.config.dry_run) {
     const auto& shown_um = view.controller_health.shown_um;
@@ -59,7 +58,7 @@ void add_axes(const StatusView& view, std::string& why) {
   }
 }
 
-/// The column that changes fastest is named; the others mostly follow it.
+/// Names the column that changes fastest; the others mostly follow it.
 void add_warming(const StatusView& view, std::string& why) {
   if (view.trend == nullptr) return;
   const auto columns = view.config.model.temperature_columns();
@@ -102,7 +101,7 @@ namespace {
 
 using nlohmann::json;
 
-/// By its name; an axis that the controller interpolates also by the name of any of its nodes.
+/// Finds an axis by its name; an axis with nodes also by the name of one of them.
 /// @return the first of its entries
 std::uint32_t axis_index(const StatusView& view, const json& params) {
   if (!params.contains("axis") || !params["axis"].is_string())
@@ -126,7 +125,7 @@ double value_um(const json& params) {
   return params["value_um"].get<double>();
 }
 
-/// Whether any entry of the axis, of a travel any node, is so.
+/// Whether the flag is set for any node of the axis.
 bool any_node(const StatusView& view, std::size_t axis, bool AxisReport::*is_so) {
   const AxisSpan span = span_of(view.config.estimator.axes, axis);
   for (std::size_t i = span.first; i < span.end(); ++i)
@@ -134,7 +133,7 @@ bool any_node(const StatusView& view, std::size_t axis, bool AxisReport::*is_so)
   return false;
 }
 
-/// A figure of the axis; of a travel where its slide stands.
+/// A figure of the axis, interpolated at the slide's position if the axis has nodes.
 template <class Figure>
 double where_it_stands(const StatusView& view, std::size_t axis, Figure figure) {
   const AxisSpan span = span_of(view.config.estimator.axes, axis);
@@ -170,7 +169,6 @@ void add_reads(StatusServer& server, const DaemonActions& actions) {
   });
 }
 
-/// `result` once `pending` has one.
 RpcPending then(RpcPending pending, std::function<json()> result) {
   return [pending = std::move(pending), result = std::move(result)]() -> std::optional<json> {
     if (!pending()) return std::nullopt;
@@ -201,10 +199,9 @@ RpcPending take_reference(const DaemonActions& actions, const json& params) {
   });
 }
 
-/// A measured displacement cannot be further from the model's than the axis may be moved at all,
-/// beyond three standard deviations of the model's own claim: a slip of the keyboard, another unit,
-/// another axis.
-/// @param expected_um  the model's; NaN where it is not known: none is expected
+/// Refuses a measured displacement that differs from the expected one by more than the axis' bound
+/// plus three claimed standard deviations: a typing error, a wrong unit or a wrong axis.
+/// @param expected_um  of the model; NaN (unknown) counts as 0
 void require_possible(const StatusView& view, const Command& command, double expected_um) {
   const AxisSpan span = span_of(view.config.estimator.axes, command.axis);
   double allowed_um = 0.0;
@@ -224,7 +221,7 @@ void require_possible(const StatusView& view, const Command& command, double exp
             command.value_um, from_um, allowed_um));
 }
 
-/// A number of the request; `otherwise` where it is not there.
+/// A number of the request; `otherwise` if the key is missing.
 double number_in(const json& params, const char* key, double low, double high, double otherwise) {
   if (!params.contains(key)) return otherwise;
   const json& value = params[key];
@@ -242,7 +239,7 @@ MeasuredSource source_in(const json& params) {
 }
 
 Command measured_command(const StatusView& view, const json& params) {
-  // A part has its own errors beside the machine's: clamping, the tool's edge, the gauge.
+  // A part has errors beside the machine's: clamping, the tool's edge, the gauge.
   constexpr double part_by_probe = 2.0;
   Command command{CommandKind::measured, axis_index(view, params), value_um(params)};
   command.source = source_in(params);
@@ -268,12 +265,12 @@ Command measured_command(const StatusView& view, const json& params) {
   return command;
 }
 
-/// A value that contradicts what the model claims is asked back.
+/// Refuses a value that contradicts the model's claimed error, until the operator confirms it.
 void ask_back(const StatusView& view, const Command& command, double expected_um,
               const json& params) {
   const bool is_confirmed = flag_in(params, "confirm");
   const AxisReport& axis = view.report.axes[command.axis];
-  // The larger of two errors counts: what the model claims, and what probings here have left of it.
+  // The larger of the claimed error and the RMS error of probings counts.
   const double claimed_um = std::isfinite(axis.probed_rms_um) && std::isfinite(axis.claimed_sd_um)
                                 ? std::max(axis.probed_rms_um, axis.claimed_sd_um)
                                 : axis.claimed_sd_um;
@@ -299,7 +296,7 @@ RpcPending note_measured(const DaemonActions& actions, const json& params) {
     return std::isfinite(axis.applied_um) ? axis.applied_um : axis.offset_um;
   });
   const double effect_um = view.config.estimator.axes[command.axis].sign * applied_um;
-  // What is left at the tool, where the model is right: nothing but what the offset still lacks.
+  // Expected at the tool if the model is right: displacement not compensated by the offset.
   const double left_um = displacement_um + effect_um;
   const double expected_um = remains ? left_um : displacement_um;
   require_possible(view, command, expected_um);
@@ -349,7 +346,7 @@ RpcPending release(const DaemonActions& actions, const json& params) {
   return actions.command(command);
 }
 
-/// An operator vouches for a value that nothing else confirms.
+/// Accepts an unconfirmed sensor value on the operator's word.
 RpcPending accept(const DaemonActions& actions, const json& params) {
   const auto view = actions.view();
   if (!params.contains("sensor") || !params["sensor"].is_string())

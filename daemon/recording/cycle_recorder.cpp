@@ -12,7 +12,7 @@ std::uint64_t cycles_in(nanoseconds duration, nanoseconds period) {
   return static_cast<std::uint64_t>(std::max<std::int64_t>(1, cycles));
 }
 
-/// The next multiple of `every` after `cycle`, so that skipped cycles do not shift the rhythm.
+/// The next multiple of `every` after `cycle`; keeps the phase when cycles are skipped.
 std::uint64_t next_multiple(std::uint64_t cycle, std::uint64_t every) noexcept {
   return cycle - cycle % every + every;
 }
@@ -87,7 +87,7 @@ void CycleRecorder::record(std::uint64_t cycle, std::span<const Reading> reading
       session_->requested.store(0, std::memory_order_relaxed);
     }
   } else if (broken_ && ring_.free_places() > ring_.capacity() / 2) {
-    // Only once the writer has caught up: a segment that breaks at once is of no use.
+    // Only once the writer has caught up, or the new segment would break at once.
     snapshot(cycle + 1, estimator, broken_reason_);
   }
 }
@@ -201,7 +201,7 @@ bool CycleRecorder::snapshot(std::uint64_t first_cycle, const Estimator& estimat
     record.session = session_->id;
     if (ring_.try_push(record)) {
       broken_ = false;
-      // The offsets of the cycle before are no part of the new segment.
+      // Offsets of the previous cycle do not belong to the new segment.
       noted_cycle_ = static_cast<std::int64_t>(first_cycle) - 1;
       return true;
     }

@@ -15,9 +15,9 @@
 
 namespace thermocomp {
 
-/// Where a replay can start: the estimator's exact state and the inputs last seen.
+/// Start point of a replay: the estimator's exact state and the inputs last seen.
 /// Hand-over: the cycle fills it while `taken` is false, sets `taken` and sends a `segment_begin`;
-/// the writer copies it and clears `taken`. No third party, nobody waits.
+/// the writer copies it and clears `taken`.
 struct Snapshot {
   std::vector<std::byte> estimator_state;
   std::vector<Reading> readings;
@@ -25,17 +25,16 @@ struct Snapshot {
   std::atomic<bool> taken{false};
 };
 
-/// What one configuration's recorder shares with the writer.
+/// State that a configuration's recorder shares with the writer.
 struct RecordingSession {
   std::uint16_t id{0};
   std::array<Snapshot, 2> snapshots;
-  /// Set by the writer: "take a snapshot at the next cycle". 0, or SegmentReason + 1.
+  /// Set by the writer to request a snapshot at the next cycle: 0, or SegmentReason + 1.
   std::atomic<std::uint8_t> requested{0};
 };
 
-/// One for each configuration: made on an ordinary thread (HistoryWriter::make_recorder), then used
-/// by the cycle alone. After construction nothing here waits, allocates, throws or calls the
-/// system.
+/// One per configuration: made on an ordinary thread (HistoryWriter::make_recorder), then used by
+/// the cycle alone. After construction it does not wait, allocate, throw or make system calls.
 ///
 /// Order of calls: begin() once before the first cycle (or, after a reload, by the cycle itself
 /// between two steps, after Estimator::adopt()); then for each cycle: skipped() if cycles before it
@@ -43,23 +42,23 @@ struct RecordingSession {
 class CycleRecorder {
  public:
   /// @param grid            the daemon's grid
-  /// @param offsets_period  offsets are noted this often
+  /// @param offsets_period  period of recording the offsets
   CycleRecorder(RecordRing& ring, std::shared_ptr<RecordingSession> session, const Grid& grid,
                 nanoseconds offsets_period, const Estimator& estimator);
 
-  /// A segment begins: the estimator stands as it is right before the step of `first_cycle`.
-  /// @param previous  the recorder that was in use until now; none at the start of the daemon
+  /// Begins a segment with the estimator's state before the step of `first_cycle`.
+  /// @param previous  the recorder in use until now; null at the start of the daemon
   void begin(std::uint64_t first_cycle, const Estimator& estimator, SegmentReason reason,
              const CycleRecorder* previous = nullptr) noexcept;
-  /// The command was given to Estimator::apply() before the step of `cycle`.
+  /// Records a command given to Estimator::apply() before the step of `cycle`.
   void command(std::uint64_t cycle, const Command& command) noexcept;
   /// Cycles `from`..`to` (both included) were not stepped.
   void skipped(std::uint64_t from, std::uint64_t to) noexcept;
-  /// After the step of `cycle`: exactly what was given to it and what came out.
+  /// Call after the step of `cycle`, with its inputs and offsets.
   void record(std::uint64_t cycle, std::span<const Reading> readings,
               const ControllerState& controller, const OffsetCommand& command,
               const Estimator& estimator) noexcept;
-  /// After the last cycle; any thread, once the cycle has ended.
+  /// Call after the last cycle has ended; any thread.
   void finish(std::uint64_t last_cycle, const OffsetCommand& command) noexcept;
 
  private:
@@ -82,10 +81,10 @@ class CycleRecorder {
   std::vector<Reading> readings_;  ///< as last recorded
   ControllerState controller_;     ///< as last recorded
   std::uint64_t next_offsets_{0};
-  std::int64_t noted_cycle_{-1};  ///< whose offsets were noted last
+  std::int64_t noted_cycle_{-1};  ///< last cycle with recorded offsets
   std::uint64_t next_done_{0};
   std::int64_t last_whole_cycle_{-1};
-  bool broken_{true};  ///< nothing is recorded until a snapshot is through
+  bool broken_{true};  ///< nothing is recorded until a snapshot succeeds
   SegmentReason broken_reason_{SegmentReason::start};
 };
 

@@ -19,7 +19,7 @@ namespace thermocomp {
 namespace {
 
 constexpr std::uint64_t magic = 0x746E6573636D6874u;  ///< "thmcsent"
-/// Raised with a change of what stands where.
+/// Incremented when the layout changes.
 constexpr std::uint64_t format = 1;
 
 [[noreturn]] void fail(const std::filesystem::path& file, const std::string& what) {
@@ -36,7 +36,7 @@ std::uint64_t mixed(std::uint64_t hash, const std::string& text) noexcept {
   return mixed(hash, text.size());
 }
 
-/// The boot of this system. A service may not see it; then a folder in memory is of this boot.
+/// Boot ID. A service may be unable to read it; a folder in memory is then of the present boot.
 std::string boot_of(const std::filesystem::path& file) {
   std::ifstream given("/proc/sys/kernel/random/boot_id");
   std::string id;
@@ -60,7 +60,7 @@ void* map(const std::filesystem::path& file, std::size_t size) {
   if (fd < 0) fail(file, std::strerror(errno));
   struct stat status {};
   const bool is_file = fstat(fd, &status) == 0 && S_ISREG(status.st_mode);
-  // Room that is there cannot run out while the cycle stores.
+  // Allocated now, so that the cycle's stores cannot fail for lack of space.
   const int no_room = is_file ? posix_fallocate(fd, 0, static_cast<off_t>(size)) : 0;
   void* memory = MAP_FAILED;
   if (is_file && no_room == 0)
@@ -113,9 +113,9 @@ void LastSent::note(const OffsetCommand& command, std::uint32_t forgotten) noexc
   if (next.known == now_.known && next.forgotten == now_.forgotten &&
       next.offset_um == now_.offset_um)
     return;
-  // The daemon has sent nothing yet, so a record of another format is still true.
+  // The daemon has sent nothing yet, so the record of another format is still valid.
   if (next.number == 0 && next.known == 0 && !problem_.empty()) return;
-  // What others left would be found again by them, and be wrong by then.
+  // Otherwise a later process with another key could read its own slot, obsolete by then.
   if (next.number == 0) *file_ = File{magic, format, {}};
   ++next.number;
   next.checksum = checksum_of(next);

@@ -1,4 +1,4 @@
-/// The offsets sent last, where they outlive the process: a small file that is mapped into memory.
+/// The last-sent record: a memory-mapped file that outlives the process.
 #pragma once
 
 #include <array>
@@ -17,16 +17,16 @@ namespace thermocomp {
 /// By axis [um].
 using Offsets = std::map<std::string, double>;
 
-/// Two places, written in turn, each with a number and a checksum: a process that ends while it
-/// writes one leaves the other. The checksum holds the boot of the system, the controller, names
-/// and signs of the axes, so that nobody else's offsets are taken for these. The file belongs into
-/// a folder in memory (/run): on a disk the system may keep a store waiting.
+/// Two slots, written alternately, each with a number and a checksum: a process that ends during a
+/// write leaves the other slot intact. The checksum covers boot ID, controller and the axes' names
+/// and signs, so that other offsets are never mistaken for these. The file belongs in a folder in
+/// memory (/run): on a disk, a store may block.
 ///
-/// A record of another format, which another version of the program wrote, is not read. It stays
-/// until the first offset is sent: from then on what it says is wrong, and it is replaced.
+/// A record of another format is not read. It is replaced when the first offset is sent, which
+/// makes it obsolete.
 class LastSent {
  public:
-  /// @param file        made where there is none
+  /// @param file        created if missing
   /// @param controller  to which the offsets are sent
   /// @throws std::runtime_error
   LastSent(const std::filesystem::path& file, const std::string& controller,
@@ -35,24 +35,23 @@ class LastSent {
   LastSent(const LastSent&) = delete;
   LastSent& operator=(const LastSent&) = delete;
 
-  /// As the process before left them, of this boot, controller and axes. NaN: that process knew
-  /// that what it had sent last was worth nothing any more.
+  /// The previous process' offsets for this boot, controller and axes. NaN: lost by the controller.
   [[nodiscard]] const Offsets& before() const noexcept { return before_; }
 
-  /// Why what is there is not read; empty: it is, or nothing is there.
+  /// Why an existing record is not read; else empty.
   [[nodiscard]] const std::string& problem() const noexcept { return problem_; }
 
-  /// Before a command is offered to the controller: plain stores, no system call. An axis that is
-  /// not driven keeps what it was sent last.
-  /// @param forgotten  by bits, one an axis: what it was sent last is worth nothing any more
+  /// Call before a command is offered to the controller: plain stores, no system call. An axis that
+  /// is not driven keeps its last offset.
+  /// @param forgotten  bit mask of axes whose offset the controller has lost
   void note(const OffsetCommand& command, std::uint32_t forgotten) noexcept;
 
  private:
   struct Place {
     std::uint64_t number{0};  ///< 0: never written
     std::array<double, axes_max> offset_um{};
-    std::uint64_t known{0};      ///< by bits, one an axis
-    std::uint64_t forgotten{0};  ///< by bits: the controller has lost it
+    std::uint64_t known{0};      ///< bit mask of axes
+    std::uint64_t forgotten{0};  ///< bit mask of axes whose offset the controller has lost
     std::uint64_t checksum{0};
   };
   struct File {

@@ -1,5 +1,5 @@
-/// What the cycle tells the history: records of fixed size on the cycle's grid of time, through a
-/// ring on which neither side ever waits.
+/// The records from the cycle to the history: fixed size, stamped with the grid cycle, passed
+/// through a wait-free ring.
 #pragma once
 
 #include <atomic>
@@ -14,8 +14,8 @@
 
 namespace thermocomp {
 
-/// The daemon's time: cycle k is stepped with exactly this time, however late it ran, so a replay
-/// needs no clock readings.
+/// The daemon's time: cycle k is stepped with exactly this time, however late it ran, so that a
+/// replay needs no clock readings.
 struct Grid {
   nanoseconds start{};  ///< CLOCK_MONOTONIC of cycle 0
   nanoseconds period{std::chrono::milliseconds(10)};
@@ -60,10 +60,10 @@ struct Record {
 };
 static_assert(sizeof(Record) == 32);
 
-/// Equal to the last bit, so that NaN equals itself and -0 differs from 0.
+/// Bitwise equality: NaN equals itself and -0 differs from 0.
 [[nodiscard]] bool same_bits(double a, double b) noexcept;
 
-/// What a record of kind `link` says of the controller: bit 0 online, bit 1 written.
+/// Detail of a record of kind `link`: bit 0 online, bit 1 written.
 [[nodiscard]] constexpr std::uint8_t link_bits(const ControllerState& controller) noexcept {
   return static_cast<std::uint8_t>((controller.online ? 1u : 0u) | (controller.written ? 2u : 0u));
 }
@@ -72,8 +72,8 @@ constexpr void set_link_bits(std::uint8_t bits, ControllerState& controller) noe
   controller.written = (bits & 2u) != 0;
 }
 
-/// What a record of kind `command` says of a `measured` beside its value; 0 in histories from
-/// before there was any. From bit 0: source, 30 bits of sd [nm], 30 bits of age [s].
+/// Further data of a `measured` command; 0 in older histories. From bit 0: 2 bits of source, 30
+/// bits of sd [nm], 30 bits of age [s].
 inline constexpr std::uint32_t measured_part_max = (1u << 30) - 1u;
 [[nodiscard]] constexpr std::int64_t measured_bits(const Command& command) noexcept {
   return static_cast<std::int64_t>(command.source) |
@@ -96,14 +96,14 @@ class RecordRing {
   /// @param capacity  records; rounded up to a power of two
   explicit RecordRing(std::size_t capacity = 65536);
 
-  /// Producer. @return false when the ring is full; the record is then not in it
+  /// Producer. @return false when the ring is full: the record is dropped
   [[nodiscard]] bool try_push(const Record& record) noexcept;
-  /// Producer: free places, at least.
+  /// Producer: lower bound of the free places.
   [[nodiscard]] std::size_t free_places() const noexcept;
-  /// Consumer: moves up to out.size() records into `out`. @return how many
+  /// Consumer: moves up to out.size() records into `out`. @return their number
   std::size_t pop(std::span<Record> out) noexcept;
 
-  /// Producer: counts what could not be recorded. Any thread may ask how much that is.
+  /// Producer: counts lost records; lost() may be called by any thread.
   void count_lost(std::uint64_t records) noexcept;
   [[nodiscard]] std::uint64_t lost() const noexcept;
   [[nodiscard]] std::size_t capacity() const noexcept { return mask_ + 1; }

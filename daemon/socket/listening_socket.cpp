@@ -58,7 +58,7 @@ std::optional<Peer> peer_of(int socket_fd) {
       return peer;
     }
     if (errno != ERANGE) break;
-    peer.groups.resize(count);  // the kernel says how many there are
+    peer.groups.resize(count);  // the kernel returned the required size
   }
   peer.groups.clear();
   return peer;
@@ -73,7 +73,7 @@ PeerAccess access_of(const Peer& peer, uid_t daemon_user, const AccessGroups& gr
   if (peer.user == 0) return PeerAccess::of_root();
   const bool is_own_user = peer.user == daemon_user;
   const auto allowed = [&](const std::optional<gid_t>& group) {
-    // Without the groups this is a development daemon, and its own user stands for all of them.
+    // On a development system without these groups, the daemon's own user has their permissions.
     return group ? is_member(peer, *group) : is_own_user;
   };
   PeerAccess access;
@@ -98,16 +98,15 @@ sockaddr_un address_of(const std::filesystem::path& path) {
   return address;
 }
 
-/// Connections that wait to be accepted; more wait in connect(). The kernel may allow fewer.
+/// Pending connections; further clients wait in connect(). The kernel may allow fewer.
 constexpr int backlog = 256;
-/// Of one connection, in the kernel. Its default of 208 KiB would be 250 MB for all of them.
+/// Per connection. The kernel's default of 208 KiB would be 250 MB in total.
 constexpr int send_buffer_bytes = 32 * 1024;
-/// What the daemon needs beside its clients: buses, history, log, epoll.
+/// For buses, history, log and epoll.
 constexpr rlim_t other_descriptors = 128;
 
-/// Of two daemons started at once, the second must see the first listening. The lock is on the
-/// socket's folder, so that no file is left; whoever can read the folder could hold it, so it is
-/// not waited for longer than another start takes.
+/// Makes two daemons started at once see each other. The lock is on the socket's folder, so that no
+/// file is left behind. Any user who can read the folder could hold it, hence the time-out of 1 s.
 class FolderLock {
  public:
   explicit FolderLock(const std::filesystem::path& folder)
@@ -191,7 +190,7 @@ void ListeningSocket::remove_stale() const {
 int ListeningSocket::accept_one() noexcept {
   const int fd = accept4(fd_, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
   if (fd < 0 && (errno == EMFILE || errno == ENFILE) && reserve_fd_ >= 0) {
-    // Otherwise the connection would stay, and keep the owner's loop awake for ever.
+    // Accepted and closed: a pending connection would keep the owner's loop awake.
     close(reserve_fd_);
     const int refused = accept4(fd_, nullptr, nullptr, SOCK_CLOEXEC);
     if (refused >= 0) close(refused);
@@ -216,7 +215,7 @@ std::size_t places_for_descriptors(std::size_t wanted) noexcept {
     if (setrlimit(RLIMIT_NOFILE, &raised) == 0) limit = raised;
   }
   if (limit.rlim_cur >= needed) return wanted;
-  // Some may have to share the low numbers with the buses then: half of them is theirs.
+  // The limit is too low: leave half of the descriptors below FD_SETSIZE to the buses.
   const rlim_t half = std::min<rlim_t>(limit.rlim_cur, FD_SETSIZE) / 2;
   const rlim_t beyond = limit.rlim_cur > FD_SETSIZE ? limit.rlim_cur - FD_SETSIZE : 0;
   return std::min<std::size_t>(wanted, std::max(half, beyond));

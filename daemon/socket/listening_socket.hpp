@@ -1,5 +1,5 @@
-/// A Unix stream socket at a path, with the care that a path needs; who is at the other end of a
-/// connection, and what that allows. Only for this folder's .cpp files.
+/// A listening Unix stream socket with its file, and the permissions of a connection's peer. Only
+/// for this folder's .cpp files.
 #pragma once
 
 #include <cstddef>
@@ -21,7 +21,7 @@ struct Peer {
   std::vector<gid_t> groups;  ///< supplementary
 };
 
-/// The groups of the configuration as the system knows them; none for those it does not know.
+/// IDs of the configured groups; none for a group unknown to the system.
 struct AccessGroups {
   std::optional<gid_t> read;
   std::optional<gid_t> operate;
@@ -29,25 +29,25 @@ struct AccessGroups {
   std::optional<gid_t> bridge;
 };
 
-/// Asks the system, which may in turn ask a server of the site: too slow for every connection.
+/// May query a network name service: too slow for every connection.
 [[nodiscard]] AccessGroups look_up_groups(const SocketConfig& config);
-/// As the kernel noted them at connect(). @return nothing when it does not tell
+/// Credentials at connect(), from the kernel. @return none if not available
 [[nodiscard]] std::optional<Peer> peer_of(int socket_fd);
 /// @param daemon_user  the effective user of the daemon
 [[nodiscard]] PeerAccess access_of(const Peer& peer, uid_t daemon_user, const AccessGroups& groups);
 
 class ListeningSocket {
  public:
-  /// @throws SocketError: somebody listens there, something else is there, folder missing, ...
+  /// @throws SocketError: another process listens there, another file exists, folder missing, ...
   explicit ListeningSocket(std::filesystem::path path);
   ~ListeningSocket();  ///< closes, and removes the file if it is still ours
   ListeningSocket(const ListeningSocket&) = delete;
   ListeningSocket& operator=(const ListeningSocket&) = delete;
 
   [[nodiscard]] int fd() const noexcept { return fd_; }
-  /// The next connection, non-blocking; -1 when there is none. Where the limit of open files allows
-  /// it, its number is beyond those that select() can wait for: libmodbus waits with select(), and
-  /// many clients must not use up the numbers that buses need.
+  /// The next connection, non-blocking; -1 when there is none. Its descriptor is above FD_SETSIZE
+  /// if the limit of open files allows: libmodbus uses select(), and the low descriptors must
+  /// remain for the buses.
   [[nodiscard]] int accept_one() noexcept;
 
  private:
@@ -55,13 +55,13 @@ class ListeningSocket {
 
   std::filesystem::path path_;
   int fd_{-1};
-  int reserve_fd_{-1};  ///< given up for a moment when descriptors run out
+  int reserve_fd_{-1};  ///< closed for a moment when descriptors run out
   dev_t device_{0};
   ino_t inode_{0};
 };
 
-/// Raises the process' soft limit of open files, as far as it may, to what `wanted` connections
-/// need beside the rest of the daemon. @return for how many of them there is room
+/// Raises the process' soft limit of open files to what `wanted` connections and the rest of the
+/// daemon need. @return the number of connections possible
 [[nodiscard]] std::size_t places_for_descriptors(std::size_t wanted) noexcept;
 
 }  // namespace thermocomp

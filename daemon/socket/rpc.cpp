@@ -16,7 +16,7 @@ using nlohmann::json;
 
 constexpr std::size_t subscribed_methods_max = 16;
 
-/// NaN becomes null; bytes that are no UTF-8 (a device's answer in an error text) are replaced.
+/// NaN becomes null; bytes that are not UTF-8 (a device's answer in an error text) are replaced.
 std::string to_line(const json& message) {
   return message.dump(-1, ' ', false, json::error_handler_t::replace) + "\n";
 }
@@ -53,9 +53,9 @@ std::string groups_of(const SocketConfig& config, AccessClass needed) {
   return "";
 }
 
-/// A request that has the shape of one.
+/// A valid request.
 struct Request {
-  json id;  ///< null where there is none
+  json id;  ///< null if missing
   bool is_notification{false};
   std::string method;
   json params = json::object();
@@ -66,7 +66,7 @@ void take_id(const json& id, Request& out) {
   if (!is_text && !id.is_number() && !id.is_null()) {
     throw RpcError(rpc::invalid_request, "id must be a string, a number or null");
   }
-  // It comes back in the answer, and must not be a way to make answers large.
+  // The id is echoed: its length limits the size of answers.
   if (is_text && id.get_ref<const std::string&>().size() > RpcDispatcher::id_bytes_max) {
     throw RpcError(rpc::invalid_request,
                    "id has at most " + std::to_string(RpcDispatcher::id_bytes_max) + " bytes");
@@ -74,7 +74,7 @@ void take_id(const json& id, Request& out) {
   out.id = id;
 }
 
-/// @throws RpcError; `out.id` is set as soon as it is known
+/// @throws RpcError; `out.id` is set as soon as it is parsed
 void parse_request(std::string_view line, Request& out) {
   json message;
   try {
@@ -97,7 +97,7 @@ void parse_request(std::string_view line, Request& out) {
     throw RpcError(rpc::invalid_request, "method must be a string");
   }
   out.method = method->get<std::string>();
-  // Only now: what is no request at all is answered also where it has no id.
+  // Set last: invalid requests are answered even without an id.
   out.is_notification = id == message.end();
   const auto params = message.find("params");
   if (params == message.end()) return;
@@ -105,8 +105,8 @@ void parse_request(std::string_view line, Request& out) {
   out.params = std::move(*params);
 }
 
-/// @param result  asked once; none: not yet
-/// @return whether `answer` now holds it, or the error in its place
+/// @param result  called once; none: not complete yet
+/// @return whether `answer` now holds the result or the error
 bool reply(const Request& request, const RpcPending& result, Answer& answer) {
   json message;
   try {
@@ -161,7 +161,7 @@ const RpcDispatcher::Method& RpcDispatcher::find(const PeerAccess& access,
                                                  const std::string& name) const {
   const auto method = methods_.find(name);
   if (method == methods_.end()) {
-    // Whoever may do nothing does not learn what there is.
+    // A client without any permission must not learn which methods exist.
     if (!access.any()) throw RpcError(rpc::not_permitted, "not permitted");
     throw RpcError(rpc::method_not_found, "there is no method of this name");
   }

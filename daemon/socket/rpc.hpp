@@ -1,5 +1,5 @@
-/// The words of the status socket: error codes, who may call what, what a handler is; and from a
-/// line of bytes to the line that answers it, JSON-RPC 2.0 without socket, clock or thread.
+/// JSON-RPC 2.0 of the status socket: error codes, permissions, handlers, and a dispatcher from a
+/// request line to its answer, without socket, clock or thread.
 #pragma once
 
 #include <chrono>
@@ -18,21 +18,21 @@
 
 namespace thermocomp {
 
-/// Why the operators' socket cannot be opened.
+/// The status socket cannot be opened.
 class SocketError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// Who may call a method. root always may.
+/// Permission that a method requires; root has all.
 enum class AccessClass {
-  read,     ///< the members of any group, and the daemon's own user
+  read,     ///< members of any group, and the daemon's own user
   operate,  ///< operator_group
-  model,    ///< which model runs: operator_group, model_group
+  model,    ///< change of the model: operator_group, model_group
   bridge    ///< bridge_group
 };
 
-/// What a peer may do.
+/// Permissions of a peer.
 struct PeerAccess {
   bool read{false};
   bool operate{false};
@@ -51,11 +51,12 @@ inline constexpr int method_not_found = -32601;
 inline constexpr int invalid_params = -32602;
 inline constexpr int internal_error = -32603;
 inline constexpr int not_permitted = -32001;
-inline constexpr int refused = -32002;  ///< understood, but not now (the message says why)
-inline constexpr int cut_off = -32003;  ///< the connection ends; the message says for which limit
+inline constexpr int refused = -32002;  ///< valid, but not possible now (see message)
+inline constexpr int cut_off =
+    -32003;  ///< the connection is closed; the message names the exceeded limit
 }  // namespace rpc
 
-/// Thrown by a handler: becomes the error of the answer.
+/// Thrown by a handler; becomes the error of the answer.
 class RpcError : public std::runtime_error {
  public:
   RpcError(int code, const std::string& message) : std::runtime_error(message), code_(code) {}
@@ -65,33 +66,32 @@ class RpcError : public std::runtime_error {
   int code_;
 };
 
-/// Gets `params` (an object; an empty one where the request has none), returns the result.
+/// Gets `params` (an object, empty if missing) and returns the result.
 using RpcHandler = std::function<nlohmann::json(const nlohmann::json& params)>;
 
-/// A result that takes time: called every millisecond until it is there, and forgotten when the
-/// client has gone. May throw what a handler throws.
+/// A delayed result: called every millisecond until complete, dropped when the client disconnects.
+/// Throws as a handler does.
 using RpcPending = std::function<std::optional<nlohmann::json>()>;
-/// Begins what was asked for.
+/// Begins an operation with a delayed result.
 using RpcSlowHandler = std::function<RpcPending(const nlohmann::json& params)>;
 
-/// What a client subscribes to, and how often.
+/// A client's subscribed methods and their period.
 struct Subscription {
-  std::vector<std::string> methods;  ///< each once, reading methods only
+  std::vector<std::string> methods;  ///< unique, reading methods only
   std::chrono::nanoseconds period{};
 };
 
 struct Answer {
-  std::string text;  ///< one line with its end; empty: none is due (the protocol's "notification")
+  std::string text;  ///< one line with its end; empty for a notification of the protocol
   bool is_error{false};
-  std::optional<Subscription> subscription;  ///< takes the place of the one before
-  /// If set, nothing else is there yet. It is called again and again; once it returns true, the
-  /// answer it was given is complete.
+  std::optional<Subscription> subscription;  ///< replaces the previous one
+  /// If set, the answer is incomplete. It is called repeatedly until it has completed the answer
+  /// and returns true.
   std::function<bool(Answer&)> later{};
 };
 
-/// Not supported on purpose, and refused in words: batches (an array of requests; several lines do
-/// the same) and parameters by position. Members of a request that JSON-RPC does not know are
-/// ignored, as it asks.
+/// Batches (arrays of requests) and positional parameters are refused on purpose. Unknown members
+/// of a request are ignored, as JSON-RPC requires.
 class RpcDispatcher {
  public:
   static constexpr std::size_t id_bytes_max = 256;
@@ -104,14 +104,14 @@ class RpcDispatcher {
   void add_slow_method(const std::string& name, AccessClass access, RpcSlowHandler handler);
   /// @param line  any bytes; never throws because of them
   [[nodiscard]] Answer answer(const PeerAccess& access, std::string_view line) const;
-  /// The line that tells a subscriber the result of a reading method.
+  /// Notification line with the result of a reading method.
   /// @pre the method exists
   [[nodiscard]] std::string notification(const std::string& method) const;
 
  private:
   struct Method {
     AccessClass access{AccessClass::read};
-    RpcHandler handler;  ///< one of the two
+    RpcHandler handler;  ///< exactly one of the two is set
     RpcSlowHandler slow;
   };
 
@@ -123,9 +123,9 @@ class RpcDispatcher {
   std::map<std::string, Method, std::less<>> methods_;
 };
 
-/// A line with an error that answers no request in particular (id null).
+/// An error line with id null, for no particular request.
 [[nodiscard]] std::string error_line(int code, const std::string& message);
-/// A line that tells a subscriber how many notifications it did not get because it did not read.
+/// The line that reports missed notifications to a subscriber.
 [[nodiscard]] std::string missed_line(std::uint64_t count);
 
 }  // namespace thermocomp

@@ -9,7 +9,7 @@
 namespace thermocomp {
 namespace {
 
-/// An idle client keeps no more than this.
+/// Buffer capacity that an idle client keeps.
 constexpr std::size_t kept_bytes = 2048;
 
 }  // namespace
@@ -33,7 +33,7 @@ bool LineBuffer::is_too_long() const noexcept {
   return (has_line() ? end_ : bytes_.size()) - begin_ > line_bytes_max;
 }
 
-/// Also gives back what is done with.
+/// Finds the next line end; releases unused capacity.
 void LineBuffer::find_end() {
   end_ = bytes_.find('\n', searched_);
   if (has_line()) return;

@@ -1,5 +1,5 @@
-/// One connection of the status server: its socket, its buffers, its rate, where it stands. Only
-/// for this folder's .cpp files.
+/// One connection of the status server: socket, buffers, rate limit and state. Only for this
+/// folder's .cpp files.
 #pragma once
 
 #include <algorithm>
@@ -15,19 +15,19 @@
 
 namespace thermocomp {
 
-/// Bytes in, lines out; never holds more than the longest line and one read.
+/// Splits input into lines; holds at most the longest line and one read.
 class LineBuffer {
  public:
   static constexpr std::size_t line_bytes_max = std::size_t{64} * 1024;
 
   void add(std::string_view bytes);
-  /// The next line without its end ("\n" or "\r\n").
-  /// @return false when there is no whole line
+  /// Takes the next line without its end ("\n" or "\r\n").
+  /// @return false when no line is complete
   [[nodiscard]] bool take(std::string& line);
   [[nodiscard]] bool has_line() const noexcept { return end_ != std::string::npos; }
-  /// The line at the front, whole or not, has more than line_bytes_max: nothing is taken any more.
+  /// The first line, complete or not, exceeds line_bytes_max: it is never taken.
   [[nodiscard]] bool is_too_long() const noexcept;
-  /// A line has begun and is not whole.
+  /// A line has begun and is incomplete.
   [[nodiscard]] bool is_partial() const noexcept { return !has_line() && begin_ < bytes_.size(); }
   [[nodiscard]] std::size_t capacity_bytes() const noexcept { return bytes_.capacity(); }
 
@@ -35,13 +35,13 @@ class LineBuffer {
   void find_end();
 
   std::string bytes_;
-  std::size_t begin_{0};                ///< of the line at the front
+  std::size_t begin_{0};                ///< of the first line
   std::size_t end_{std::string::npos};  ///< its '\n'
-  std::size_t searched_{0};             ///< before this there is no '\n' of it
+  std::size_t searched_{0};             ///< bytes before this were searched for '\n'
 };
 
-/// A bound on how many things happen per second, and at once after a pause.
-/// Level l grows with `per_s` up to `burst`; taking needs l >= 1. Time is an argument.
+/// Rate limit with bursts: level l grows by `per_s` up to `burst`; taking one needs l >= 1.
+/// Time is an argument.
 class TokenBucket {
  public:
   using Clock = std::chrono::steady_clock;
@@ -55,7 +55,7 @@ class TokenBucket {
     return true;
   }
   void give_back() noexcept { level_ += 1.0; }
-  /// The earliest time at which one can be taken.
+  /// The earliest time at which a token can be taken.
   [[nodiscard]] Clock::time_point next(Clock::time_point now) noexcept {
     refill(now);
     if (level_ >= 1.0) return now;
@@ -86,45 +86,45 @@ struct ServedClient {
   ServedClient(const ServedClient&) = delete;
   ServedClient& operator=(const ServedClient&) = delete;
 
-  /// One read. Afterwards input_ended or broken may be set.
+  /// One read. May set input_ended or broken.
   void receive(Clock::time_point now);
-  /// Sends what the socket takes, keeps the rest. Afterwards broken may be set.
+  /// Sends what the socket accepts, keeps the rest. May set broken.
   void send(std::string_view text, Clock::time_point now);
   void flush(Clock::time_point now);
   [[nodiscard]] bool owes() const noexcept { return sent < output.size(); }
   [[nodiscard]] std::size_t held_bytes() const noexcept {
     return input.capacity_bytes() + output.capacity();
   }
-  /// Nothing is under way: neither request nor answer nor subscription.
+  /// No request, answer or subscription is pending.
   [[nodiscard]] bool is_idle() const noexcept {
     return !subscription && !queued && !owes() && !later;
   }
 
   int fd;
   PeerAccess access;
-  std::int64_t user{-1};  ///< as the kernel noted it; -1: it does not tell
+  std::int64_t user{-1};  ///< from the kernel; -1: unknown
   TokenBucket tokens;
   LineBuffer input;
   std::string output;
-  std::size_t sent{0};  ///< bytes at the front of `output` that are already sent
+  std::size_t sent{0};  ///< bytes of `output` already sent
 
-  bool input_ended{false};  ///< the peer sends no more; answers may still be owed
-  bool hung_up{false};      ///< nor does it read any more; what it has sent still counts
+  bool input_ended{false};  ///< the peer sends no more; answers may be pending
+  bool hung_up{false};      ///< the peer does not read either; received requests are still served
   bool close_when_sent{false};
-  bool broken{false};  ///< nothing can be done with it any more
-  bool ended{false};   ///< noted to be closed at the end of the turn
-  bool queued{false};  ///< waits for its turn or for its rate
+  bool broken{false};  ///< unusable
+  bool ended{false};   ///< to be closed at the end of the turn
+  bool queued{false};  ///< waits for its turn or its rate limit
   std::uint32_t watched{0};
-  std::size_t counted_bytes{0};  ///< of held_bytes(), as last added up
+  std::size_t counted_bytes{0};  ///< last held_bytes() added to the statistics
 
-  std::function<bool(Answer&)> later;  ///< Answer::later of its request that is under way
+  std::function<bool(Answer&)> later;  ///< Answer::later of the request under way
   std::optional<Subscription> subscription;
   Clock::time_point notified_next{};
-  std::uint64_t missed{0};  ///< notifications since the last that was sent
+  std::uint64_t missed{0};  ///< notifications since the last one sent
 
-  Clock::time_point last_request;  ///< or when it connected
+  Clock::time_point last_request;  ///< or time of connection
   Clock::time_point line_begun;    ///< while input.is_partial()
-  Clock::time_point last_taken;    ///< the peer took bytes, or there was nothing to take
+  Clock::time_point last_taken;    ///< time when the peer took bytes or nothing was pending
 };
 
 }  // namespace thermocomp

@@ -22,7 +22,7 @@ namespace {
 using nlohmann::json;
 using Clock = std::chrono::steady_clock;
 
-/// While the server's queue of connections is full.
+/// Retry period while the server's backlog is full.
 constexpr std::chrono::milliseconds connected_again_every(20);
 
 [[noreturn]] void no_daemon(const std::string& path, int error) {
@@ -36,7 +36,7 @@ constexpr std::chrono::milliseconds connected_again_every(20);
   throw ClientError("no answer in time from the daemon at " + path);
 }
 
-/// Never waits in the kernel: a server that stands still leaves its queue of connections full.
+/// Non-blocking: a server that hangs leaves its backlog full.
 int connect_to(const std::filesystem::path& path, Clock::time_point deadline) {
   const std::string text = path.string();
   sockaddr_un address{};
@@ -99,7 +99,7 @@ void StatusClient::Parts::send_all(const std::string& text, Clock::time_point de
     const ssize_t count =
         ::send(fd, text.data() + done, text.size() - done, MSG_NOSIGNAL | MSG_DONTWAIT);
     if (count < 0 && (errno == EAGAIN || errno == EINTR)) continue;
-    if (count < 0 && errno == EPIPE) return;  // what the daemon said before may explain why
+    if (count < 0 && errno == EPIPE) return;  // an error line already received may explain it
     if (count < 0) throw ClientError(path + ": " + std::strerror(errno));
     done += static_cast<std::size_t>(count);
   }
@@ -162,7 +162,7 @@ json StatusClient::call(const std::string& method, const json& params,
       continue;
     }
     const json answered = message.value("id", json());
-    if (!answered.is_null() && answered != id) continue;  // of a call that ran out of time
+    if (!answered.is_null() && answered != id) continue;  // answer of a call that timed out
     if (const auto error = message.find("error"); error != message.end() && error->is_object()) {
       const auto code = error->find("code");
       const auto text = error->find("message");

@@ -1,6 +1,5 @@
-/// The other end of the status socket, for command and gateway: small, blocking, and as careful as
-/// the server. Whoever listens there, no call outlasts its time, and no answer costs more memory
-/// than JsonLimits allow.
+/// Client of the status socket, for commands and gateway: small, blocking, and robust against any
+/// server. A call never exceeds its time-out, an answer never exceeds JsonLimits in memory.
 #pragma once
 
 #include <chrono>
@@ -14,7 +13,7 @@
 
 namespace thermocomp {
 
-/// No daemon there, no permission to connect, connection lost, no answer in time.
+/// No daemon, no permission, connection lost, or time-out.
 class ClientError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -33,21 +32,21 @@ class RemoteError : public std::runtime_error {
 class StatusClient {
  public:
   static constexpr std::chrono::seconds patience{5};
-  /// Beyond these the oldest notification is dropped.
+  /// When full, the oldest notification is dropped.
   static constexpr std::size_t notifications_max = 256;
 
-  /// @throws ClientError "no daemon at PATH: ...", or the connection is not taken in time
+  /// @throws ClientError "no daemon at PATH: ...", or on time-out
   explicit StatusClient(const std::filesystem::path& path,
                         std::chrono::milliseconds timeout = patience);
   ~StatusClient();
   StatusClient(StatusClient&&) noexcept;
 
-  /// One request and its answer; notifications that come in between are kept for next().
+  /// Sends a request and returns its answer; notifications in between are kept for next().
   /// @throws ClientError, RemoteError
   nlohmann::json call(const std::string& method, const nlohmann::json& params,
                       std::chrono::milliseconds timeout = patience);
   /// The next notification, {"method": ..., "params": ...}, after call("subscribe", ...).
-  /// @throws ClientError when the connection ends or nothing comes in time
+  /// @throws ClientError when the connection ends or on time-out
   nlohmann::json next(std::chrono::milliseconds timeout);
 
  private:

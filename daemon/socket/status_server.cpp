@@ -26,7 +26,7 @@ using Clock = std::chrono::steady_clock;
 using ClientId = std::uint64_t;
 using Alarms = std::multimap<Clock::time_point, ClientId>;
 
-// What epoll gives back for what is no client.
+// epoll data of descriptors that are not clients.
 constexpr ClientId listener_id = 0;
 constexpr ClientId timer_id = 1;
 constexpr ClientId first_client_id = 2;
@@ -35,8 +35,8 @@ constexpr int accepted_a_turn = 64;
 constexpr auto time_outs_checked_every = std::chrono::milliseconds(250);
 constexpr auto answers_asked_every = std::chrono::milliseconds(1);
 constexpr auto groups_known_for = std::chrono::seconds(5);
-/// The name service is asked beside main and waited for so long: a group of the system's own files
-/// is known at once, one of a server that does not answer holds nobody up.
+/// Time-outs of the name service, which is queried on a side thread: local groups are found at
+/// once, and a server that does not answer delays nobody.
 constexpr auto groups_first_within = std::chrono::seconds(2);
 constexpr auto groups_within = std::chrono::milliseconds(50);
 
@@ -51,20 +51,20 @@ struct StatusServer::Parts {
   SocketLimits limits;
   ListeningSocket listener;
   RpcDispatcher dispatcher;
-  std::int64_t caller{-1};  ///< of the request in hand
+  std::int64_t caller{-1};  ///< client of the present request
   int epoll_fd{-1};
   int timer_fd{-1};
   std::map<ClientId, ServedClient> clients;
   ClientId next_id{first_client_id};
   std::size_t strangers{0};
   TokenBucket all_tokens;
-  std::deque<ClientId> ready;     ///< have a whole request; each one's turn comes
-  std::vector<ClientId> waiting;  ///< their answer takes its time
-  Alarms resting;                 ///< the same, but over their rate until then
-  Alarms subscribers;             ///< when their next notification is due
+  std::deque<ClientId> ready;     ///< clients with a complete request, in turn
+  std::vector<ClientId> waiting;  ///< clients with a delayed answer
+  Alarms resting;                 ///< clients over their rate limit, until then
+  Alarms subscribers;             ///< time of the next notification
   std::vector<ClientId> broken;
   AccessGroups groups;
-  std::shared_ptr<AccessGroups> groups_found;  ///< the thread's while it is busy
+  std::shared_ptr<AccessGroups> groups_found;  ///< owned by the thread while it is busy
   Clock::time_point groups_asked{};
   SideThread groups_thread{"groups"};
   Clock::time_point time_outs_checked_next{};
@@ -136,7 +136,7 @@ ServedClient* StatusServer::Parts::find(ClientId id) {
   return found == clients.end() || found->second.broken ? nullptr : &found->second;
 }
 
-// ---- who is new
+// ---- new connections
 
 void StatusServer::Parts::accept_some() {
   const Clock::time_point now = Clock::now();
@@ -173,13 +173,13 @@ void StatusServer::Parts::take(int fd, Clock::time_point now) {
 
 void StatusServer::Parts::refuse(int fd, const std::string& why) {
   const std::string line = error_line(rpc::refused, why);
-  // A fresh socket's buffer always has room for a line; if not, closing says enough.
+  // A new socket's buffer has room for a line; if not, closing suffices.
   static_cast<void>(::send(fd, line.data(), line.size(), MSG_NOSIGNAL | MSG_DONTWAIT));
   close(fd);
   ++statistics.refused;
 }
 
-/// A group made later counts without a restart, within seconds.
+/// Applies group changes within seconds, without a restart.
 PeerAccess StatusServer::Parts::access(const Peer& peer, Clock::time_point now) {
   if (peer.user == 0) return PeerAccess::of_root();
   if (now - groups_asked > groups_known_for) ask_groups(groups_within);
@@ -188,17 +188,17 @@ PeerAccess StatusServer::Parts::access(const Peer& peer, Clock::time_point now) 
 
 void StatusServer::Parts::ask_groups(Clock::duration at_most) {
   if (groups_found) {
-    at_most = {};  // once is enough
+    at_most = {};  // waited for already
   } else {
     groups_found = std::make_shared<AccessGroups>();
     groups_thread.start([found = groups_found, asked = config] { *found = look_up_groups(asked); });
   }
-  if (!groups_thread.wait(at_most)) return;  // taken when it is asked for again
+  if (!groups_thread.wait(at_most)) return;  // collected at the next call
   groups = *std::exchange(groups_found, nullptr);
   groups_asked = Clock::now();
 }
 
-/// Ends the client that has been idle longest, if that is long.
+/// Closes the longest idle client if its idle time exceeds the limit.
 bool StatusServer::Parts::make_room(Clock::time_point now) {
   auto oldest = clients.end();
   for (auto each = clients.begin(); each != clients.end(); ++each) {
@@ -215,14 +215,14 @@ bool StatusServer::Parts::make_room(Clock::time_point now) {
   return true;
 }
 
-// ---- what clients want
+// ---- requests
 
 void StatusServer::Parts::on_client(ClientId id, std::uint32_t events) {
   ServedClient* client = find(id);
   if (client == nullptr) return;
   const Clock::time_point now = Clock::now();
   if ((events & (EPOLLHUP | EPOLLERR)) != 0) {
-    // epoll would report it for ever; what was sent before is still read and done.
+    // Removed, since epoll would report it repeatedly; received requests are still served.
     client->hung_up = true;
     epoll_ctl(epoll_fd, EPOLL_CTL_DEL, client->fd, nullptr);
   } else if ((events & EPOLLOUT) != 0) {
@@ -233,7 +233,7 @@ void StatusServer::Parts::on_client(ClientId id, std::uint32_t events) {
   arrange(id, *client);
 }
 
-/// Decides what the client waits for: its turn, its bytes, its reading, or its end.
+/// Decides which event of the client is awaited next, or closes it.
 void StatusServer::Parts::arrange(ClientId id, ServedClient& client) {
   if (client.input.is_too_long() && !client.close_when_sent) {
     return cut_off(id, client,
@@ -248,7 +248,7 @@ void StatusServer::Parts::arrange(ClientId id, ServedClient& client) {
   statistics.buffered_bytes += held - client.counted_bytes;
   client.counted_bytes = held;
 
-  // Who is owed an answer is waited for while it can still read; who is not may be done with.
+  // A pending answer keeps a client open while it can still read.
   if (client.broken || (client.owes() ? client.hung_up : client.close_when_sent)) {
     return end(id, client);
   }
@@ -256,7 +256,7 @@ void StatusServer::Parts::arrange(ClientId id, ServedClient& client) {
   if (client.owes()) {
     events = EPOLLOUT;
   } else if (client.later) {
-    // Neither read from nor ended; what it has sent meanwhile comes after the answer.
+    // Neither read nor closed: further requests follow the answer.
   } else if (client.input.has_line()) {
     if (!client.queued) ready.push_back(id);
     client.queued = true;
@@ -271,7 +271,7 @@ void StatusServer::Parts::arrange(ClientId id, ServedClient& client) {
 }
 
 void StatusServer::Parts::serve(Clock::time_point turn_end) {
-  // The first one always: commands may take longer than a turn.
+  // At least one request: a command may take longer than a turn.
   for (Clock::time_point now = Clock::now(); !ready.empty(); now = Clock::now()) {
     if (!all_tokens.try_take(now)) return;
     const ClientId id = ready.front();
@@ -346,14 +346,14 @@ void StatusServer::Parts::wake_rested(Clock::time_point now) {
 // ---- subscriptions
 
 void StatusServer::Parts::notify(Clock::time_point turn_end) {
-  std::map<std::string, std::string> lines;  // each method is asked once, however many subscribed
+  std::map<std::string, std::string> lines;  // each method is called once for all subscribers
   while (!subscribers.empty()) {
     const Clock::time_point now = Clock::now();
     const auto [due, id] = *subscribers.begin();
     if (due > now || now >= turn_end) return;
     subscribers.erase(subscribers.begin());
     ServedClient* client = find(id);
-    // Another time in the client: this entry was of the subscription before.
+    // The client has another due time: this entry is of an earlier subscription.
     if (client == nullptr || client->notified_next != due) continue;
     tell(*client, lines, now);
     client->notified_next = std::max(due + client->subscription->period, now);
@@ -379,7 +379,7 @@ void StatusServer::Parts::tell(ServedClient& client, std::map<std::string, std::
   client.send(text, now);
 }
 
-// ---- bounds
+// ---- limits
 
 void StatusServer::Parts::check_time_outs(Clock::time_point now) {
   if (now < time_outs_checked_next) return;
@@ -400,11 +400,11 @@ void StatusServer::Parts::check_time_outs(Clock::time_point now) {
   }
 }
 
-/// Says why, as far as the peer still reads, and ends it.
+/// Sends the reason, if the peer still reads, and closes the client.
 void StatusServer::Parts::cut_off(ClientId id, ServedClient& client, const std::string& why,
                                   int code) {
   ++statistics.cut_off;
-  // In the middle of an answer there is no place for another line.
+  // Another line must not be inserted into an answer.
   if (!client.owes()) client.send(error_line(code, why), Clock::now());
   end(id, client);
 }
@@ -449,7 +449,7 @@ void StatusServer::Parts::set_timer() {
   if (!clients.empty()) wake_at(time_outs_checked_next);
   itimerspec when{};
   if (next) {
-    // Absolute; zero would disarm it.
+    // Absolute time; zero would disarm the timer.
     const std::int64_t at_ns = std::max<std::int64_t>(
         1, std::chrono::duration_cast<std::chrono::nanoseconds>(next->time_since_epoch()).count());
     when.it_value.tv_sec = at_ns / 1'000'000'000;
@@ -458,7 +458,7 @@ void StatusServer::Parts::set_timer() {
   timerfd_settime(timer_fd, TFD_TIMER_ABSTIME, &when, nullptr);
 }
 
-// ---- from outside
+// ---- interface
 
 StatusServer::StatusServer(const SocketConfig& config, const SocketLimits& limits)
     : parts_(std::make_unique<Parts>(config, limits)) {}
@@ -496,7 +496,7 @@ void StatusServer::handle(std::chrono::milliseconds timeout) {
   }
   parts.ask_waiting();
   parts.wake_rested(now);
-  // Half of the turn each, so that neither questions nor subscriptions starve the other.
+  // Half of the turn each: requests and subscriptions must not starve each other.
   parts.notify(now + parts.limits.turn_max / 2);
   parts.serve(turn_end);
   parts.check_time_outs(now);

@@ -20,11 +20,11 @@ namespace {
 
 using nlohmann::json;
 
-/// Raised with a change by which an earlier program would read something else than was written.
+/// Incremented when older programs would misread the file.
 constexpr int format = 1;
 constexpr std::uintmax_t size_bytes_max = 1u << 20;
 
-/// What a later program wrote: kept under a name of its own, so that nothing takes its place.
+/// A newer program's file, moved to a name of its own so that it is not overwritten.
 class NewerFormat : public std::runtime_error {
  public:
   explicit NewerFormat(std::int64_t newer)
@@ -37,7 +37,7 @@ class NewerFormat : public std::runtime_error {
 json numbers(const std::map<std::string, double>& values) {
   json object = json::object();
   for (const auto& [name, value] : values) {
-    // NaN has no place in JSON, and says no more than a name that is missing.
+    // JSON has no NaN; a missing name means the same.
     if (std::isfinite(value)) object[name] = value;
   }
   return object;
@@ -59,7 +59,7 @@ std::map<std::string, double> numbers(const json& file, const char* key) {
   return values;
 }
 
-/// Only for people: what cannot be understood costs no reference.
+/// Informative only: an unreadable entry does not invalidate the reference.
 ReferenceRecord record_in(const json& file) {
   const auto found = file.find("reference_taken");
   if (found == file.end() || !found->is_object()) return {};
@@ -103,7 +103,7 @@ PersistentState from_text(const std::string& text, bool& reference_lost,
   if (!file.is_object() || file.value("program", "") != "thermocomp") {
     throw std::runtime_error("is not a state file of thermocomp");
   }
-  // Compared and shown as JSON: any number may stand there, or lists as deep as the file is long.
+  // Compared and printed as JSON: the value may be any number, or a deeply nested list.
   const json& its_format = file.at("format");
   if (its_format.is_number_integer() && its_format > format)
     throw NewerFormat(its_format.get<std::int64_t>());
@@ -124,7 +124,7 @@ PersistentState from_text(const std::string& text, bool& reference_lost,
   state.held_degC = numbers(file, "held_degC");
   state.held_signals = numbers(file, "held_signals");
   state.correction = numbers(file, "correction");
-  // Version 0.1.0 wrote none of these.
+  // Not written by version 0.1.0.
   if (file.contains("sign")) state.sign = numbers(file, "sign");
   state.controller = file.value("controller", "");
   if (file.contains("corridor_um")) state.corridor_um = numbers(file, "corridor_um");
@@ -132,14 +132,14 @@ PersistentState from_text(const std::string& text, bool& reference_lost,
   return state;
 }
 
-/// What stands there, a folder too, must not keep the next state from being written.
+/// Moves a file or folder out of the way of the next save.
 std::string move_aside(const std::filesystem::path& file, const std::string& ending) {
   constexpr int names_max = 9;
   std::error_code error;
   for (int name = 1; name <= names_max; ++name) {
     std::string aside = file.string() + ending;
     if (name > 1) aside += "." + std::to_string(name);
-    // A file takes the place of an older one; what cannot gets the next name.
+    // Replaces an older file; if that fails (a folder), the next name is tried.
     std::filesystem::rename(file, aside, error);
     if (!error) return "moved to " + aside;
   }
@@ -151,7 +151,7 @@ std::string move_aside(const std::filesystem::path& file, const std::string& end
 }
 
 void write_flushed(const std::string& path, const std::string& text) {
-  // A new one: what stands there may be left over, or a pipe.
+  // Created anew: a leftover or a pipe may have this name.
   unlink(path.c_str());
   const FileDescriptor file(open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0640));
   if (file.get() < 0) fail(path);
@@ -284,7 +284,7 @@ bool StateKeeper::must_be_written(const PersistentState& state) const {
          (writing_ == nullptr && !is_on_disk_);
 }
 
-/// Handed over or on disk: what is written next must differ from it.
+/// The state last handed over, against which changes are detected.
 const SavedState& StateKeeper::newest() const noexcept {
   if (waiting_) return *waiting_;
   return writing_ != nullptr ? writing_->what : on_disk_;

@@ -1,4 +1,4 @@
-/// Keeps what happened: the events of this run, the faults that still last.
+/// The events of this run and the faults that last.
 #pragma once
 
 #include <chrono>
@@ -15,9 +15,9 @@
 
 namespace thermocomp {
 
-/// Main's thread only. Every change is one event; the same fault again is none. A fault that
-/// returns within `returns_within` of its end comes and goes: that is one outage, which ends once
-/// it has stayed away for so long.
+/// Main's thread only. Every change is one event; a repeated fault is none. A fault that returns
+/// within `returns_within` of its end is intermittent: one outage, which ends once the fault has
+/// stayed away for that time.
 class EventJournal {
  public:
   struct Moment {
@@ -30,26 +30,26 @@ class EventJournal {
   static constexpr std::size_t faults_of_outage_max = 8;
 
   explicit EventJournal(Now now = system_now) : now_(std::move(now)) {}
-  /// Is called with every event from now on, such as the history's writer.
+  /// Calls `listener` (the history's writer) with every event from now on.
   void tell(std::function<void(const Event&)> listener) { listener_ = std::move(listener); }
 
-  /// The subject has this fault from now on. Each kind of fault is one event in an outage, which
-  /// counts from the first.
-  /// @param fault  its subject, code, detail and value; the journal sets the rest
+  /// The subject has this fault from now on. Each kind of fault is one event per outage, which
+  /// begins with the first.
+  /// @param fault  subject, code, detail and value; the journal sets the rest
   /// @return whether it became an event
   bool fault(Event fault);
-  /// The subject has none; nothing where it had none.
-  /// @param hold  the outage ends once it has had none for so long
+  /// The subject has no fault; no effect if it had none.
+  /// @param hold  time without a fault after which the outage ends
   /// @return how long the outage lasted [s] if its end became an event, else NaN
   double recovery(const Subject& subject, std::chrono::nanoseconds hold = {});
-  /// Ends the outages whose faults have stayed away for long enough; often.
+  /// Ends outages whose faults have stayed away long enough; to be called often.
   /// @return the events
   std::vector<Event> settle();
-  /// An outage that has begun and whose end is no event yet.
+  /// The subject has an outage whose end is not yet an event.
   [[nodiscard]] bool lasts(const Subject& subject) const;
-  /// Such a one whose faults come and go.
+  /// The same, and its faults are intermittent.
   [[nodiscard]] bool comes_and_goes(const Subject& subject) const;
-  /// A mode that begins; the same again is nothing.
+  /// A mode begins; no effect if unchanged.
   void mode(const std::string& name);
   /// @param command  its code, subject, value and user
   void command(Event command);
@@ -68,12 +68,12 @@ class EventJournal {
     std::chrono::nanoseconds since{};  ///< monotonic: a set clock must not change a duration
     Event newest;                      ///< fault
     std::vector<Event> reported;       ///< faults that became events
-    std::optional<std::chrono::nanoseconds> away_since;  ///< none: it has a fault now
+    std::optional<std::chrono::nanoseconds> away_since;  ///< none: it has a fault at present
     std::chrono::nanoseconds hold{};
     bool is_end_reported{false};
     bool comes_and_goes{false};
   };
-  /// Its end is an event, and what comes now is another outage.
+  /// The end was reported and the fault stayed away: a new fault is another outage.
   [[nodiscard]] static bool is_over(const Outage& outage, std::chrono::nanoseconds now);
   [[nodiscard]] const Outage* find(const Subject& subject) const;
   Event end_of(Outage& outage);

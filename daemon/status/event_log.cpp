@@ -9,11 +9,10 @@
 namespace thermocomp {
 namespace {
 
-/// So many clipped values in a row are news: the temperature really runs away from its past.
+/// Clipped values in a row that are logged: the temperature departs from its past.
 constexpr std::uint32_t clipped_in_a_row_news = 5;
 
-/// What is beyond a limit by a little comes and goes with the noise: over is it after a minute
-/// without.
+/// A value close to a limit crosses it with the noise: such a reason ends after a minute without.
 nanoseconds hold_of(Reason reason) {
   const bool has_limit = reason == Reason::at_bound || reason == Reason::outside_domain;
   return has_limit ? std::chrono::minutes(1) : nanoseconds{};
@@ -34,7 +33,7 @@ void EventLog::note_estimates(const Report& report, const EstimatorConfig& confi
   for (std::size_t i = 0; i < report.inputs.size(); ++i) {
     const InputReport& input = report.inputs[i];
     any = any || input.estimated;
-    // One that was never estimated is its sensors' news.
+    // Otherwise the sensors' faults are logged.
     const bool was_estimated = !input_states_[i].empty();
     std::string state = input.estimated ? "estimated" : !input.good && was_estimated ? "lost" : "";
     if (state == input_states_[i]) continue;
@@ -71,7 +70,7 @@ void EventLog::note_fault(const Event& fault, std::string_view more) {
 void EventLog::note_report(const Report& report, const EstimatorConfig& config, bool dry_run) {
   constexpr nanoseconds settles = std::chrono::seconds(5);
   if (settled_at_ == nanoseconds{}) settled_at_ = report.now + settles;
-  // A first start is switched off from the beginning, and has read nothing yet all the same.
+  // At a first start, compensation is disabled while readings are still missing.
   const auto off = static_cast<std::uint32_t>(Reason::operator_disabled) |
                    static_cast<std::uint32_t>(Reason::controller_disabled);
   const bool is_beginning = report.mode == Mode::starting ||
@@ -80,7 +79,7 @@ void EventLog::note_report(const Report& report, const EstimatorConfig& config, 
   note_ended_outages();
   note_sensors(report, config);
   note_mismatches(report, config);
-  note_mode(report, std::string(code_text(report.mode, dry_run).name));  // what comes of them
+  note_mode(report, std::string(code_text(report.mode, dry_run).name));  // follows from the above
   first_ = false;
 }
 
@@ -96,7 +95,7 @@ void EventLog::note_mode(const Report& report, const std::string& mode) {
   for (std::size_t i = 0; i < reasons_count; ++i) {
     const auto bit = std::uint32_t{1} << i;
     const auto reason = static_cast<Reason>(bit);
-    // Cutting comes and goes with every part; it is in the status, not in the log.
+    // Changes with every part: shown in the status, not logged.
     if (reason == Reason::cutting) continue;
     const bool is_given = has_reason(report.reasons, reason);
     note_reason(reason, is_given);
@@ -104,7 +103,7 @@ void EventLog::note_mode(const Report& report, const std::string& mode) {
     if (is_given || journal_.lasts(subject)) reasons_ |= bit;
     may_return = may_return || (!is_given && journal_.comes_and_goes(subject));
   }
-  // A mode that comes and goes with its reason is an event once the reason stays away.
+  // A mode with an intermittent reason is logged once the reason stays away.
   if (may_return && (reasons_ & ~before) == 0) return;
   if (first_ || report.mode != mode_ || reasons_ != before) {
     const bool good = report.mode == Mode::compensating && reasons_ == 0;
@@ -116,7 +115,7 @@ void EventLog::note_mode(const Report& report, const std::string& mode) {
 }
 
 void EventLog::note_reason(Reason reason, bool is_given) {
-  // What an operator wanted is no fault; the command and the mode tell of it.
+  // Commanded by the operator, hence not a fault; command and mode are events.
   if (reason == Reason::operator_disabled) return;
   const Subject subject{SubjectKind::reason, std::string(to_string(reason))};
   if (is_given)
@@ -131,7 +130,7 @@ void EventLog::note_sensors(const Report& report, const EstimatorConfig& config)
   suspected_.resize(report.sensors.size(), false);
   for (std::size_t i = 0; i < report.sensors.size(); ++i) {
     const SensorReport& sensor = report.sensors[i];
-    // One that settles ends what was reported before only once it counts.
+    // A settling sensor's fault ends only once its value counts.
     if (sensor.fault != faults_[i] && !sensor.settles()) {
       const Subject subject{SubjectKind::sensor, config.sensors[i].name};
       if (sensor.fault != Fault::none) {
@@ -201,7 +200,7 @@ void EventLog::note_link(const Subject& subject, bool connected, const std::stri
     spdlog::info("{}: connected", subject_text(subject));
 }
 
-// A bus that is not connected has an event of its own.
+// A lost connection is logged by note_link().
 void EventLog::note_state(const Subject& subject, bool connected, const std::string& state) {
   if (state.empty() || !connected) return;
   std::string& known = states_.try_emplace(subject, "active").first->second;
@@ -230,7 +229,7 @@ void EventLog::note_controller(const ControllerHealth& controller) {
   note_writes(controller);
 }
 
-/// Once an outage, with which write failed and how; a single write that fails is none.
+/// One event per outage, with the failed write and its error; a single failure is none.
 void EventLog::note_writes(const ControllerHealth& controller) {
   const Subject subject{SubjectKind::controller_writes, controller.name};
   const WriteHealth& write = controller.write;

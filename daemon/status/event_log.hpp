@@ -1,5 +1,4 @@
-/// Turns what changes in reports and health into lines of the log, so that no driver and no cycle
-/// has to log.
+/// Logs changes of reports and health, so that drivers and cycle need not log.
 #pragma once
 
 #include <chrono>
@@ -17,16 +16,15 @@
 
 namespace thermocomp {
 
-/// Main's thread only. Each change is one line; a state that stays is not repeated, and an outage
-/// that comes and goes is one, with its length at its end (EventJournal).
+/// Main's thread only. Each change is one line; a lasting state is not repeated, and an
+/// intermittent outage is one line, with its duration at its end (EventJournal).
 class EventLog {
  public:
-  /// @param journal  gets the same changes; outlives this
+  /// @param journal  also gets the changes; outlives this
   explicit EventLog(EventJournal& journal) : journal_(journal) {}
 
-  /// In the first seconds of a start nothing has been read yet, which is no news: the log begins
-  /// with the first mode other than `starting` (where it is switched off: once nothing else is
-  /// missing), or 5 s after the first report.
+  /// The log begins with the first mode other than `starting` (if switched off: once only that
+  /// reason is left), or 5 s after the first report: missing readings at start are no event.
   void note_report(const Report& report, const EstimatorConfig& config, bool dry_run = false);
   /// @param columns  names of the report's inputs
   void note_estimates(const Report& report, const EstimatorConfig& config,
@@ -37,10 +35,10 @@ class EventLog {
   void note_history(const HistoryStatistics& history, const std::vector<std::string>& news);
   void note_missed(std::uint64_t missed);
   void note_failed_sleeps(std::uint64_t failed);
-  /// Clients that were refused, cut off or missed notifications: at most one line a minute, since
-  /// whoever can connect could otherwise fill the log.
+  /// Refused or cut-off clients and missed notifications: at most one line per minute, so that
+  /// clients cannot fill the log.
   void note_socket(const SocketStatistics& statistics);
-  /// @param stands  nobody takes the log, lines are lost
+  /// @param stands  the log's reader hangs and lines are lost
   void note_log(bool stands);
 
  private:
@@ -53,14 +51,14 @@ class EventLog {
   void note_link(const Subject& subject, bool connected, const std::string& error);
   void note_writes(const ControllerHealth& controller);
   void note_state(const Subject& subject, bool connected, const std::string& state);
-  /// Into the journal and, where it becomes an event, the log. @param more  only for the log
+  /// Adds to the journal and, if it becomes an event, to the log. @param more  only for the log
   void note_fault(const Event& fault, std::string_view more = "");
 
   EventJournal& journal_;
   bool first_{true};
-  nanoseconds settled_at_{};  ///< of the reports
+  nanoseconds settled_at_{};  ///< report time
   Mode mode_{Mode::starting};
-  std::uint32_t reasons_{0};  ///< reported, and not yet over
+  std::uint32_t reasons_{0};  ///< reported and not over
   std::vector<bool> suspected_;
   std::vector<Fault> faults_;
   std::vector<bool> clipping_;
@@ -70,10 +68,10 @@ class EventLog {
   std::map<Subject, bool> connected_;
   std::map<Subject, std::string> states_;  ///< of CAN interfaces
   std::uint64_t lost_{0};                  ///< records of the history
-  WriteHealth write_;                      ///< when last looked at
-  std::uint64_t reads_{0};                 ///< then
-  bool unwritten_{false};                  ///< noted
-  bool late_{false};                       ///< noted
+  WriteHealth write_;                      ///< at the last look
+  std::uint64_t reads_{0};                 ///< at the last look
+  bool unwritten_{false};                  ///< reported
+  bool late_{false};                       ///< reported
   std::uint64_t missed_{0};
   std::uint64_t failed_sleeps_{0};
   SocketStatistics socket_;

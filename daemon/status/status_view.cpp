@@ -123,7 +123,7 @@ std::vector<InputStatus> inputs_of(const StatusView& view) {
   return list;
 }
 
-/// nullopt: the neighbours do not contradict the sensor.
+/// nullopt: the sensor agrees with its neighbours.
 std::optional<SensorError> suspicion_of(const StatusView& view, const SensorReport& sensor) {
   if (!sensor.suspected) return std::nullopt;
   return SensorError{sensor.suspected_size_K,
@@ -131,7 +131,7 @@ std::optional<SensorError> suspicion_of(const StatusView& view, const SensorRepo
                      sensor.weighed_down};
 }
 
-/// nullopt: no change waits to be confirmed.
+/// nullopt: no change awaits confirmation.
 std::optional<Jump> jump_of(const StatusView& view, const SensorReport& sensor) {
   if (!sensor.jumped) return std::nullopt;
   return Jump{sensor.jump_K, view.wall_s - to_seconds(view.report.now - sensor.jumped_at)};
@@ -148,7 +148,7 @@ std::vector<std::string> blocks_of(const StatusView& view, std::size_t sensor) {
 
 SensorStatus sensor_of(const StatusView& view, std::size_t index) {
   const SensorReport& sensor = view.report.sensors[index];
-  // Of one that jumped before a restart nothing was taken in this run.
+  // A sensor that jumped before a restart has no accepted value in this run.
   const bool ever = sensor.taken_at > nanoseconds{};
   return {.name = view.config.estimator.sensors[index].name,
           .blocks = blocks_of(view, index),
@@ -269,7 +269,7 @@ SocketStatus socket_of(const SocketStatistics& statistics) {
           .buffered_bytes = statistics.buffered_bytes};
 }
 
-/// Whether the reference is that of the model file, number for number.
+/// Whether the reference equals that of the model file.
 bool is_of_model_file(const StatusView& view) {
   const std::vector<double>& given = view.config.model.reference_degC;
   if (given.empty() || given.size() > view.report.inputs.size()) return false;
@@ -293,7 +293,7 @@ ReferenceStatus reference_of(const StatusView& view) {
   return status;
 }
 
-/// A figure of each axis by its name.
+/// A figure of each axis, by axis name.
 std::map<std::string, double> by_axis(const StatusView& view, double AxisReport::*figure) {
   std::map<std::string, double> figures;
   for (std::size_t i = 0; i < view.report.axes.size(); ++i)
@@ -324,7 +324,7 @@ ModelStatus model_of(const StatusView& view) {
   return status;
 }
 
-/// What the model file says it was made from; null: nothing.
+/// The model file's data on its origin; null: none.
 json made_from(const ThermalModel& model) {
   if (!model.made_from) return nullptr;
   json outputs = json::object();

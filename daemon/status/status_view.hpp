@@ -21,7 +21,7 @@
 
 namespace thermocomp {
 
-/// All that a status is made from, at one moment.
+/// The data of a status at one moment.
 struct StatusView {
   const DaemonConfig& config;
   const Report& report;
@@ -34,27 +34,27 @@ struct StatusView {
   double uptime_s{0.0};
   bool real_time{false};
   SocketStatistics socket;
-  std::vector<Event> ended{};              ///< outages that ended in the last minutes, newest first
-  const TemperatureTrend* trend{nullptr};  ///< nullptr: nobody watches the temperatures
-  const WarmUp* warm_up{nullptr};          ///< nullptr: nobody watches the axes, as the next
+  std::vector<Event> ended{};              ///< outages ended in the last minutes, newest first
+  const TemperatureTrend* trend{nullptr};  ///< nullptr: temperatures are not watched
+  const WarmUp* warm_up{nullptr};          ///< nullptr: axes are not watched; also the next
   const SinceProbing* since_probing{nullptr};
   ReferenceRecord reference{};
   bool reference_lost{false};   ///< see StateKeeper
   double wall_s{not_a_number};  ///< now, since 1970
-  /// For so long every axis has been driven in mode `compensating`.
+  /// Time for which every axis has been driven in mode `compensating` [s].
   double compensating_s{not_a_number};
-  const ModelContest::Score* contest{nullptr};  ///< nullptr: no candidate runs beside
+  const ModelContest::Score* contest{nullptr};  ///< nullptr: no candidate runs
 };
 
 [[nodiscard]] Status status_of(const StatusView& view);
 [[nodiscard]] SensorsAnswer sensors_of(const StatusView& view);
 [[nodiscard]] OffsetsAnswer offsets_of(const StatusView& view);
-/// nullopt: none is named, or it is the model itself.
-/// @param contest  nullptr: none runs
+/// nullopt: no candidate is configured, or it is the model itself.
+/// @param contest  nullptr: no candidate runs
 [[nodiscard]] std::optional<CandidateStatus> candidate_of(const DaemonConfig& config,
                                                           const ModelContest::Score* contest);
 [[nodiscard]] CycleStatus timing_of(const StatusView& view);
-/// The answer of `model`: the file that runs.
+/// The answer of `model`: the model file in use.
 [[nodiscard]] nlohmann::json model_json(const DaemonConfig& config);
 /// One line for systemctl status.
 [[nodiscard]] std::string status_line(const StatusView& view);

@@ -13,7 +13,7 @@
 namespace thermocomp {
 namespace {
 
-/// Sums of a straight line through points, as they come.
+/// Running sums of a straight-line fit.
 struct LineSums {
   double count{0.0}, t{0.0}, tt{0.0}, y{0.0}, ty{0.0};
   void add(double time_s, double value) noexcept {
@@ -54,7 +54,7 @@ TemperatureTrend::Change TemperatureTrend::change(std::size_t column, nanosecond
                                                   double temp_degC) const {
   if (!std::isfinite(temp_degC)) return {};
   LineSums sums;
-  // Against the present value: differences keep their digits.
+  // Relative to the present value, for precision.
   sums.add(0.0, 0.0);
   double first_s = 0.0;
   double farthest_K = 0.0;
@@ -78,8 +78,8 @@ constexpr std::size_t points_min = 15;
 constexpr std::array<double, 4> taus_min{10.0, 30.0, 90.0, 270.0};
 constexpr std::size_t usual_taus = 3;
 constexpr double misfit_of_bound_max = 0.1;
-constexpr double misfit_of_bound_small = 0.03;  ///< nothing better is looked for
-/// So much smaller must the squares be for the slowest of the taus, which noise alone imitates.
+constexpr double misfit_of_bound_small = 0.03;  ///< below this the fit is good enough
+/// Required reduction of the squares for the slowest tau, which noise alone can imitate.
 constexpr double squares_for_slowest = 0.7;
 
 struct Point {
@@ -102,7 +102,7 @@ struct Approach {
 
 using Columns = Eigen::Matrix<double, Eigen::Dynamic, static_cast<int>(taus_min.size()) + 1>;
 
-/// Least squares over every choice of taus; of those with amplitudes of one sign the best.
+/// Least squares for every subset of taus; returns the best with amplitudes of one sign.
 Approach best_approach(const Columns& columns, const Eigen::VectorXd& course_um, std::size_t taus) {
   Approach best;
   for (unsigned chosen = 0; chosen < 1u << taus; ++chosen) {
@@ -163,9 +163,9 @@ RemainingDrift WarmUp::remaining_of(std::size_t axis, double bound_um) const {
       points.push_back({minutes, row.displacement_um[axis]});
       first_min = std::min(first_min, minutes);
     }
-    // A shorter stretch is looked at by itself where the longer one is not there.
+    // Too few data for this stretch; a shorter one is tried.
     if (points.size() < points_min || first_min > -0.9 * stretch_min) continue;
-    const double middle_um = points.back().um;  // differences keep their digits
+    const double middle_um = points.back().um;  // for precision
     for (Point& point : points) point.um -= middle_um;
     const Approach found = approach_of(points, bound_um);
     const double misfit_um = std::sqrt(found.squares_um2 / static_cast<double>(points.size()));

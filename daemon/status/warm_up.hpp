@@ -1,5 +1,4 @@
-/// How fast the machine's temperatures change, when it is warm enough, and when it is time to
-/// probe.
+/// Rates of the temperatures, remaining warm-up drift, and the error that makes a probing due.
 #pragma once
 
 #include <chrono>
@@ -24,30 +23,30 @@ class TemperatureTrend {
   /// warming.
   static constexpr nanoseconds window = std::chrono::minutes(30);
   static constexpr nanoseconds pace = std::chrono::seconds(5);
-  /// Until there are a few: a machine that jumps shows it from the first seconds on.
+  /// Pace of the first rows: a jumping temperature shows within seconds.
   static constexpr nanoseconds first_pace = std::chrono::seconds(1);
   static constexpr std::size_t first_rows = 60;
 
   struct Change {
-    double rate_K_per_h{not_a_number};  ///< slope of the straight line; NaN: fewer than two values
-    double span_s{0.0};                 ///< the values that it goes by are so far apart
-    double farthest_K{0.0};             ///< from the present one, of all of them
-    /// Warming or cooling, and by more than the resolution of a coarse module.
+    double rate_K_per_h{not_a_number};  ///< slope of the fitted line; NaN: fewer than two values
+    double span_s{0.0};                 ///< time between the first value and now
+    double farthest_K{0.0};             ///< largest difference from the present value
+    /// Warming or cooling, by more than the resolution of a coarse module.
     [[nodiscard]] bool is_uneven() const noexcept;
   };
-  /// Largest rate of a column that stands still enough for a reference [K/h]. In 32 h of a recorded
+  /// Largest rate of a column at rest, as needed for a reference [K/h]. In 32 h of a recorded
   /// spindle the fastest structural sensor stayed below 1.1 K/h in 99 % of all half hours that
   /// began 3 h after the last change of speed, and above 4.2 K/h in 95 % of those in the first hour
   /// after a rise.
   static constexpr double even_rate_K_per_h_max = 3.0;
-  /// A smaller change cannot be distinguished from the steps of a module with 0.1 K.
+  /// Smallest change distinguishable from the 0.1 K steps of a module.
   static constexpr double change_K_min = 0.3;
 
   [[nodiscard]] bool is_due(nanoseconds now) const noexcept;
-  /// @param columns  of the model; if they differ from before, all begins anew
+  /// @param columns  of the model; a change discards all rows
   void note(nanoseconds now, const std::vector<std::string>& columns,
             std::span<const InputReport> inputs);
-  /// @param temp_degC  of this column, now
+  /// @param temp_degC  present value of the column
   [[nodiscard]] Change change(std::size_t column, nanoseconds now, double temp_degC) const;
 
  private:
@@ -59,21 +58,20 @@ class TemperatureTrend {
   std::deque<Row> rows_;
 };
 
-/// What is still to come of a displacement while the machine goes on as it does.
+/// Displacement still to come if the load stays constant.
 struct RemainingDrift {
-  double um{not_a_number};       ///< NaN: not known
-  double minutes{not_a_number};  ///< until less than the bound is to come; 0: it is less already
+  double um{not_a_number};       ///< NaN: unknown
+  double minutes{not_a_number};  ///< until less than the bound remains; 0: it does already
 };
 
-/// Extrapolates the displacement of each axis as it approaches an end in several ways at once,
+/// Extrapolates the displacement of each axis as a sum of exponentials:
 ///
 ///     d(t) = d_end + sum of a_k exp(-t / tau_k),   tau_k = 10, 30, 90, 270 min,
 ///
-/// all a_k of one sign, by least squares over the last 240, 120, 60, 30 or 20 min: the longest of
-/// them in which the curve leaves less than a tenth of the bound, so that a change of load, after
-/// which another end is approached, shows in its misfit. The slowest is used only where the
-/// others leave much more. How well it does: docs/measurements.md. Main's thread only; time is an
-/// argument.
+/// all a_k of one sign, by least squares over the longest of 240, 120, 60, 30 or 20 min with an RMS
+/// misfit below a tenth of the bound: a change of load, which changes d_end, shows as misfit. The
+/// slowest tau is used only if the others fit much worse. Accuracy: docs/measurements.md. Main's
+/// thread only; time is an argument.
 class WarmUp {
  public:
   static constexpr nanoseconds pace = std::chrono::minutes(1);
@@ -82,9 +80,9 @@ class WarmUp {
   [[nodiscard]] bool is_due(nanoseconds now) const noexcept {
     return rows_.empty() || now - rows_.back().at >= pace;
   }
-  /// @param displacement_um  one an axis; NaN: not known. Another number of axes begins anew
+  /// @param displacement_um  per axis; NaN: unknown. Another number of axes discards all rows
   void note(nanoseconds now, std::vector<double> displacement_um, double bound_um);
-  /// As of the last note(); one an axis.
+  /// Per axis, as of the last note().
   [[nodiscard]] const std::vector<RemainingDrift>& remaining() const noexcept { return remaining_; }
 
  private:
@@ -98,19 +96,19 @@ class WarmUp {
   std::vector<RemainingDrift> remaining_;
 };
 
-/// By how much the model may be off by now, of what the axis has moved since it was last probed, or
-/// since the daemon started:
+/// Error of the model, from the axis' movement since it was last probed or the daemon started:
 ///
 ///     e = s / D |d - d_probed|,
 ///
-/// s: spread_um() of the output, D: its displacement where the model was judged (RMS without a
-/// model). Where [correction] learns from probings, its own spread instead.
+/// s: spread_um() of the output, D: its RMS displacement in the runs left out of the fit. With
+/// [correction] in use, its own standard deviation instead.
 class SinceProbing {
  public:
-  /// @param model  checksum. When another one runs, the displacement of the last probing moves by
-  ///               what the two models are apart at this moment
+  /// @param model  checksum. When it changes, the displacement of the last probing is shifted by
+  /// the
+  ///               present difference of the two models
   void note(std::span<const AxisReport> axes, const std::string& model);
-  /// @return NaN: the model does not say what it was made from, or the axis has no displacement
+  /// @return NaN: the model file has no data on its origin, or the displacement is unknown
   [[nodiscard]] double error_um(std::size_t axis, const AxisReport& now, const ThermalModel& model,
                                 const std::string& output, bool is_corrected) const;
 
@@ -118,7 +116,7 @@ class SinceProbing {
   struct Probed {
     std::uint64_t probings{0};
     double displacement_um{not_a_number};
-    double last_um{not_a_number};  ///< at the last note
+    double last_um{not_a_number};  ///< at the last note()
   };
   std::string model_;
   std::vector<Probed> probed_;

@@ -17,14 +17,14 @@
 namespace thermocomp {
 namespace {
 
-/// Some thousand lines: a start or a storm of events; bounded, since memory is locked.
+/// Room for some thousand lines, as at a start or a storm of events; bounded, as memory is locked.
 constexpr std::size_t waiting_bytes_max = std::size_t{2} * 1024 * 1024;
 
 std::size_t size_of(const spdlog::details::log_msg& line) {
   return sizeof(spdlog::details::log_msg_buffer) + line.payload.size() + line.logger_name.size();
 }
 
-/// Lines on their way to a sink that may stand.
+/// Queue of lines for a sink that may block.
 class LogQueue {
  public:
   explicit LogQueue(spdlog::sink_ptr sink) : sink_(std::move(sink)) {}
@@ -80,7 +80,7 @@ class LogQueue {
   }
 
  private:
-  /// In their place, in front of the first line that was not lost.
+  /// Logged before the first line after the lost ones.
   void tell_lost(const spdlog::details::log_msg& next, std::uint64_t lost) {
     const std::string text = fmt::format("{} lines of the log were lost: nobody took them", lost);
     spdlog::details::log_msg line(next.time, next.source, next.logger_name, spdlog::level::warn,
@@ -111,7 +111,7 @@ class QueuedSink final : public spdlog::sinks::sink {
   ~QueuedSink() override { queue_->stop(); }
 
   void log(const spdlog::details::log_msg& line) override { queue_->add(line); }
-  void flush() override {}  // spdlog's own calls must not wait: flush_log()
+  void flush() override {}  // spdlog must not block here; see flush_log()
   void set_pattern(const std::string& pattern) override { sink_->set_pattern(pattern); }
   void set_formatter(std::unique_ptr<spdlog::formatter> formatter) override {
     sink_->set_formatter(std::move(formatter));

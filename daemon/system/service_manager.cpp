@@ -24,7 +24,7 @@ constexpr auto alive_period_max = std::chrono::milliseconds(500);
 ServiceManager::ServiceManager() {
   std::uint64_t watchdog_us = 0;
   if (sd_watchdog_enabled(0, &watchdog_us) > 0)
-    // At least three times in its period: one late tick of main is no reason to be killed.
+    // At least three times per period: one late tick of main must not trigger the watchdog.
     watchdog_period_ = std::min<std::chrono::steady_clock::duration>(
         std::chrono::microseconds(watchdog_us / 3), alive_period_max);
   const char* path = std::getenv("NOTIFY_SOCKET");

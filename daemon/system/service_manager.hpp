@@ -1,4 +1,4 @@
-/// What is sent to systemd: readiness, status, watchdog. Silent where the daemon is not a service.
+/// Notifications to systemd: readiness, status, watchdog. Does nothing if not run as a service.
 #pragma once
 
 #include <chrono>
@@ -10,8 +10,8 @@
 
 namespace thermocomp {
 
-/// Main never waits for it, as sd_notify() would when systemd does not read: what it did not take
-/// is sent again with the next news, a sign of life is not.
+/// Never blocks, unlike sd_notify(): text that systemd did not accept is sent again with the next
+/// notification; a watchdog signal is not repeated.
 class ServiceManager {
  public:
   ServiceManager();
@@ -22,17 +22,17 @@ class ServiceManager {
   void ready(const std::string& status) noexcept;
   void reloading() noexcept;
   void stopping(const std::string& status) noexcept;
-  /// Announces a slow stop: the daemon is not to be killed for the next `time`.
+  /// Announces a slow stop: extends the stop time-out by `time`.
   void extend_stop(std::chrono::microseconds time) noexcept;
-  void status(const std::string& status) noexcept;  ///< only sent when it has changed
-  /// Feeds the watchdog; called only when the cycle has advanced.
+  void status(const std::string& status) noexcept;  ///< sent on change only
+  /// Feeds the watchdog; to be called only when the cycle has advanced.
   void alive() noexcept;
 
  private:
   static constexpr std::size_t unsent_bytes_max = 2048;
   void send(const std::string& news, bool is_kept = true) noexcept;
 
-  int fd_{-1};  ///< -1: no service
+  int fd_{-1};  ///< -1: not a service
   sockaddr_un address_{};
   socklen_t address_bytes_{0};
   std::string unsent_;

@@ -13,7 +13,7 @@
 namespace thermocomp {
 namespace {
 
-/// Room for a configuration's parser, which recurses; only what is touched is locked.
+/// Large enough for the recursive parser of a configuration; only touched pages are locked.
 constexpr std::size_t stack_bytes = std::size_t{4096} * 1024;
 
 }  // namespace
@@ -22,7 +22,7 @@ struct SideThread::Shared {
   std::mutex mutex;
   std::condition_variable given;
   std::condition_variable ended;
-  std::function<void()> job;  ///< until it has ended
+  std::function<void()> job;  ///< reset when it has ended
   bool stopping{false};
 
   void run() {
@@ -44,7 +44,7 @@ SideThread::SideThread(const char* name) : shared_(std::make_shared<Shared>()) {
   pthread_attr_init(&attributes);
   pthread_attr_setstacksize(&attributes, stack_bytes);
   pthread_attr_setdetachstate(&attributes, PTHREAD_CREATE_DETACHED);
-  // Blocked before the thread exists: signals are main's.
+  // Blocked before the thread is created: main handles all signals.
   sigset_t all;
   sigset_t before;
   sigfillset(&all);

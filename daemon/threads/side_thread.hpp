@@ -1,4 +1,4 @@
-/// A thread for what may stand still: a disk, a name service, a pipe that nobody reads.
+/// A thread for calls that may block: disk, name service, pipe.
 #pragma once
 
 #include <chrono>
@@ -7,15 +7,14 @@
 
 namespace thermocomp {
 
-/// Does one job at a time; whoever gives it one never waits. Neither the thread nor its job can be
-/// interrupted: a job that stands when the owner goes is left to the end of the process, so a job
-/// owns all that it uses. A job does not throw.
+/// Runs one job at a time; start() never blocks. A job cannot be interrupted and may run on until
+/// the process ends, so it must own everything it uses. A job must not throw.
 class SideThread {
  public:
-  /// @param name  as the system lists it, at most 15 characters
-  /// @throws std::system_error when the system gives no thread
+  /// @param name  shown by the system, at most 15 characters
+  /// @throws std::system_error when no thread can be created
   explicit SideThread(const char* name);
-  /// Waits for the job under way, for at most `patience`.
+  /// Waits for the running job, for at most `patience`.
   ~SideThread();
   SideThread(const SideThread&) = delete;
   SideThread& operator=(const SideThread&) = delete;
@@ -24,9 +23,9 @@ class SideThread {
 
   /// @pre !is_busy()
   void start(std::function<void()> job);
-  /// False also makes visible what the job wrote.
+  /// False also makes the job's writes visible to the caller.
   [[nodiscard]] bool is_busy() const;
-  /// Waits for the end of the job. @return whether it has ended
+  /// Waits for the job to end. @return whether it has ended
   bool wait(std::chrono::steady_clock::duration at_most) const;
 
  private:

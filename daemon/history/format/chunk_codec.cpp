@@ -35,7 +35,7 @@ std::uint64_t read_value(ByteReader& reader) {
   return difference;
 }
 
-/// Differences wrap around on purpose: undefined behaviour is for signed numbers only.
+/// Unsigned arithmetic, since differences may wrap around.
 std::int64_t minus(std::int64_t a, std::int64_t b) {
   return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) - static_cast<std::uint64_t>(b));
 }

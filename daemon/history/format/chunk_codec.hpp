@@ -1,9 +1,9 @@
-/// Records <-> the bytes of one chunk: small changes take few bytes, and every bit is kept.
+/// Lossless compression of records into the bytes of one chunk.
 ///
-/// A record is: kind, detail, cycle (difference to the record before), index, time (difference to
-/// the last one of its kind), value (XOR with the last one of its kind and index; a byte that says
-/// how many bytes are zero at either end, then the bytes between). A typical reading takes 15 bytes
-/// instead of 32. Each chunk starts afresh, so that one can be read without the others.
+/// A record is: kind, detail, cycle (difference to the previous record), index, time (difference to
+/// the last one of its kind), value (XOR with the last one of its kind and index: a byte with the
+/// numbers of zero bytes at either end, then the bytes between). A typical reading takes 15 bytes
+/// instead of 32. Each chunk can be read without the others.
 #pragma once
 
 #include <array>
@@ -20,7 +20,7 @@
 
 namespace thermocomp {
 
-/// Small numbers of either sign become small unsigned ones: 0, -1, 1, -2 -> 0, 1, 2, 3.
+/// Maps small signed numbers to small unsigned ones: 0, -1, 1, -2 -> 0, 1, 2, 3.
 [[nodiscard]] constexpr std::uint64_t zigzag(std::int64_t value) noexcept {
   return (static_cast<std::uint64_t>(value) << 1) ^ static_cast<std::uint64_t>(value >> 63);
 }
@@ -28,7 +28,7 @@ namespace thermocomp {
   return static_cast<std::int64_t>((value >> 1) ^ (~(value & 1) + 1));
 }
 
-/// FNV-1a, 64 bits, going on from `hash`. Source: draft-eastlake-fnv, section 2.
+/// FNV-1a, 64 bits, continuing from `hash`. Source: draft-eastlake-fnv, section 2.
 [[nodiscard]] constexpr std::uint64_t fnv_1a(std::span<const std::byte> bytes,
                                              std::uint64_t hash = 0xcbf29ce484222325u) noexcept {
   for (const std::byte byte : bytes)
@@ -36,7 +36,7 @@ namespace thermocomp {
   return hash;
 }
 
-/// The little-endian pieces that records and snapshots are made of.
+/// Little-endian encoder of records and snapshots.
 class ByteWriter {
  public:
   void u8(std::uint8_t value) { bytes_.push_back(static_cast<std::byte>(value)); }
@@ -85,13 +85,13 @@ class ByteReader {
   std::size_t at_{0};
 };
 
-/// What both sides predict the next record from.
+/// State from which encoder and decoder predict the next record.
 class RecordPrediction {
  public:
   static constexpr std::size_t indices_max = 4096;  ///< beyond this, values are stored in full
   std::uint64_t cycle{0};
   std::array<std::int64_t, record_kinds_count> time_ns{};
-  /// Bits of the last value of this kind and index, or nullptr where none are kept.
+  /// Bits of the last value of this kind and index; nullptr if not kept.
   [[nodiscard]] std::uint64_t* value_bits(RecordKind kind, std::uint32_t index);
 
  private:
@@ -103,7 +103,7 @@ class ChunkEncoder {
   void add(const Record& record);
   [[nodiscard]] std::uint64_t count() const noexcept { return count_; }
   [[nodiscard]] std::size_t size_bytes() const noexcept { return writer_.bytes().size(); }
-  /// The chunk so far; the encoder is then empty.
+  /// The chunk so far; empties the encoder.
   [[nodiscard]] std::vector<std::byte> take();
 
  private:
@@ -118,7 +118,7 @@ class ChunkDecoder {
   ChunkDecoder(const ChunkDecoder&) = delete;
   ChunkDecoder& operator=(const ChunkDecoder&) = delete;
   /// @return false when all `count` records were read
-  /// @throws HistoryError when the bytes cannot be what an encoder wrote
+  /// @throws HistoryError when the bytes are not an encoder's output
   bool next(Record& out);
 
  private:
@@ -128,19 +128,18 @@ class ChunkDecoder {
   std::uint64_t left_;
 };
 
-/// Whether a time on the daemon's grid is possible: not before the start of the system, nor
-/// centuries later.
+/// Plausibility of a time on the daemon's grid: not before system start, nor centuries later.
 [[nodiscard]] constexpr bool is_grid_time(std::int64_t time_ns) noexcept {
   return time_ns >= 0 && time_ns <= (std::int64_t{1} << 61);
 }
 
-/// Adds a checksum: the estimator's state has inner counts and places that are believed when it is
-/// loaded, so bytes that changed on the disk must be refused.
+/// Appends a checksum: loading the estimator's state trusts the counts and indices in it, so bytes
+/// changed on disk must be refused.
 void add_seal(std::vector<std::byte>& bytes);
-/// Takes the checksum off. @throws HistoryError when it does not fit
+/// Removes the checksum. @throws HistoryError when it does not match
 void take_seal(std::vector<std::byte>& bytes);
 
-/// The inputs in force at the start of a segment.
+/// The inputs at the start of a segment.
 [[nodiscard]] std::vector<std::byte> encode_inputs(std::span<const Reading> readings,
                                                    const ControllerState& controller);
 /// @throws HistoryError

@@ -13,8 +13,8 @@
 namespace thermocomp {
 namespace {
 
-/// A history on read-only media, or in a folder the reader may not write to: SQLite wants to make
-/// the shared-memory file of the write-ahead log there. Without a log nobody is writing either.
+/// For a history on read-only media or in a read-only folder, where SQLite cannot create the
+/// write-ahead log's shared-memory file. Without a log there is no writer either.
 std::string immutable_uri(const std::filesystem::path& file) {
   std::string uri = "file:";
   for (const char c : std::filesystem::absolute(file).string()) {
@@ -31,8 +31,8 @@ std::string immutable_uri(const std::filesystem::path& file) {
   return uri + "?immutable=1";
 }
 
-/// The file behind all links, found by the system: SQLite follows them by itself with a frame of
-/// four kilobytes each, which a loop makes more than a thread's stack has.
+/// Resolves links by the system: SQLite does so recursively with 4 KB of stack per link, and a loop
+/// would exceed a thread's stack.
 /// @throws DatabaseError
 std::filesystem::path followed(const std::filesystem::path& file) {
   std::filesystem::path path = std::filesystem::absolute(file);
@@ -49,7 +49,7 @@ std::filesystem::path followed(const std::filesystem::path& file) {
   return real;
 }
 
-/// SQLite opens what stands there, and opening a pipe waits for its other end.
+/// Refuses pipes and the like, on which SQLite's open() would block.
 /// @throws DatabaseError
 void refuse_what_waits(const std::filesystem::path& real) {
   for (const char* part : {"", "-journal", "-wal", "-shm"}) {
@@ -126,7 +126,7 @@ void refuse_foreign_history(const std::filesystem::path& file) {
     Database database(file, DatabaseMode::read_only);
     if (!is_without_tables(database)) require_history(database);
   } catch (const DatabaseError&) {
-    // The writer moves aside what is damaged, and waits for the disk.
+    // A damaged file is moved aside by the writer, which also retries disk errors.
   }
 }
 
@@ -168,7 +168,7 @@ Statement& Statement::bind(std::string_view value) {
 }
 
 Statement& Statement::bind(std::span<const std::byte> value) {
-  // An empty span may have a null pointer, which SQLite would take for NULL.
+  // An empty span may have a null pointer, which SQLite would store as NULL.
   sqlite3_bind_blob64(handle_, ++bound_,
                       value.empty() ? "" : static_cast<const void*>(value.data()), value.size(),
                       SQLITE_TRANSIENT);

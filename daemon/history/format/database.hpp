@@ -1,9 +1,9 @@
-/// The little of SQLite that the history uses, with errors as exceptions and handles that close
-/// themselves. Only for the .cpp files of this folder.
+/// RAII wrappers for the part of SQLite that the history uses; errors are exceptions. Only for the
+/// .cpp files of this folder.
 ///
-/// SQLite has no checksums of its own, and a packed value with a flipped bit is still a value:
-/// `chunk.checksum` covers the chunk's numbers and records, `segment.checksum` what is written once
-/// for a segment and the texts of its setup. A row with NULL is judged by what else it says.
+/// SQLite has no checksums, and a packed value with a flipped bit is still valid: `chunk.checksum`
+/// covers the chunk's numbers and records, `segment.checksum` the constant part of a segment and
+/// the texts of its setup. A NULL checksum is not checked.
 #pragma once
 
 #include <cstddef>
@@ -21,20 +21,20 @@
 
 namespace thermocomp {
 
-/// "thco": marks a SQLite file as a history of ours.
+/// "thco": marks a SQLite file as a history.
 inline constexpr std::int64_t history_application_id = 0x7468636F;
-/// Raised with a change by which an earlier program would read something else than was written.
+/// Incremented when older programs would misread the file.
 inline constexpr std::int64_t history_version = 1;
 
 class DatabaseError : public HistoryError {
  public:
   DatabaseError(int code, const std::string& message) : HistoryError(message), code_(code) {}
   [[nodiscard]] int code() const noexcept { return code_; }
-  /// The file's content is wrong, as opposed to the disk not working.
+  /// The file's content is wrong, as opposed to a disk error.
   [[nodiscard]] bool is_damage() const noexcept {
     return (code_ & 0xFF) == SQLITE_CORRUPT || (code_ & 0xFF) == SQLITE_NOTADB;
   }
-  /// No room, or the disk takes nothing now; the connection is as good as before.
+  /// Disk full or temporary write error; the connection remains usable.
   [[nodiscard]] bool is_for_now() const noexcept {
     return (code_ & 0xFF) == SQLITE_FULL || code_ == SQLITE_IOERR_WRITE ||
            code_ == SQLITE_IOERR_FSYNC;
@@ -66,14 +66,13 @@ class Database {
 
 [[nodiscard]] bool is_without_tables(Database& database);
 
-/// @throws HistoryError: the file is another program's, or of an unknown version
+/// @throws HistoryError when the file is another program's, or of an unknown version
 void require_history(Database& database);
 
-/// Whether the table `event` keeps whole records, or only their texts as version 0.1.0 did.
+/// Whether the table `event` has whole records, or only texts as in version 0.1.0.
 [[nodiscard]] bool has_event_records(Database& database);
 
-/// The same before a daemon reads, moves or makes anything. A file that is missing, empty or
-/// damaged is none of another program.
+/// The same check before a daemon touches files; passes a missing, empty or damaged file.
 void refuse_foreign_history(const std::filesystem::path& file);
 
 class Statement {
@@ -83,13 +82,13 @@ class Statement {
   Statement(const Statement&) = delete;
   Statement& operator=(const Statement&) = delete;
 
-  /// Values in the order of the question marks; then step().
+  /// Binds values in the order of the question marks.
   Statement& bind(std::int64_t value);
   Statement& bind(std::string_view value);
   Statement& bind(std::span<const std::byte> value);
   /// @return whether there is a row
   bool step();
-  /// For statements without rows: runs and makes ready for the next values.
+  /// For statements without rows: runs, then resets for the next values.
   void run();
   [[nodiscard]] std::int64_t number(int column) const;
   [[nodiscard]] std::string text(int column) const;
@@ -101,11 +100,11 @@ class Statement {
   int bound_{0};
 };
 
-/// FNV-1a, 64 bits, as the signed number that SQLite keeps. Source: draft-eastlake-fnv, section 2.
+/// FNV-1a, 64 bits, as SQLite's signed integer. Source: draft-eastlake-fnv, section 2.
 class RowChecksum {
  public:
   RowChecksum& add(std::int64_t value) noexcept;
-  RowChecksum& add(std::span<const std::byte> bytes) noexcept;  ///< with its length
+  RowChecksum& add(std::span<const std::byte> bytes) noexcept;  ///< including its length
   RowChecksum& add(std::string_view text) noexcept;
   [[nodiscard]] std::int64_t value() const noexcept;
 
@@ -126,13 +125,13 @@ struct ChunkContent {
   ChunkNumbers numbers;
   std::vector<std::byte> records;
 };
-/// Empty: there is no such row. @throws HistoryError when it does not fit its checksum
+/// Empty: no such row. @throws HistoryError when the checksum does not match
 [[nodiscard]] std::optional<ChunkContent> read_chunk(Database& database, std::int64_t segment,
                                                      std::int64_t number);
 
-/// The checksum that the row of this segment should have. @throws HistoryError: no such row
+/// The expected checksum of the segment's row. @throws HistoryError: no such row
 [[nodiscard]] std::int64_t segment_checksum(Database& database, std::int64_t segment);
-/// @throws HistoryError when the row does not fit its checksum
+/// @throws HistoryError when the checksum does not match
 void check_segment_row(Database& database, std::int64_t segment);
 
 }  // namespace thermocomp

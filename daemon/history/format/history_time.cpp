@@ -22,7 +22,7 @@ int digits(std::string_view text, std::size_t from, std::size_t count) {
   return code == std::errc() && end == begin + count && text[from] != '-' ? value : -1;
 }
 
-/// "", "Z", "+hh:mm", "-hh:mm". @return false when it is none of these
+/// "", "Z", "+hh:mm", "-hh:mm". @return false if it is none of these
 bool parse_zone(std::string_view text, bool& is_local, int& seconds_east) {
   is_local = text.empty();
   seconds_east = 0;
@@ -74,7 +74,7 @@ std::optional<std::int64_t> parse_wall_ns(std::string_view text) {
   return static_cast<std::int64_t>(seconds) * 1'000'000'000;
 }
 
-/// Of "8 hours", "90min", "-1.5 h" without its sign: 0 where it is no unit of time.
+/// Seconds of a unit of time; 0 if unknown.
 double seconds_of_unit(std::string_view unit) {
   constexpr std::array<std::pair<std::string_view, double>, 20> units{{
       {"s", 1.0},        {"sec", 1.0},       {"second", 1.0},     {"seconds", 1.0},
@@ -88,7 +88,7 @@ double seconds_of_unit(std::string_view unit) {
   return 0.0;
 }
 
-/// "now", "8 hours ago", "-8h": the wall time that is meant.
+/// Wall time of "now", "8 hours ago", "-8h".
 std::optional<std::int64_t> parse_ago_ns(std::string_view text, std::chrono::nanoseconds now) {
   constexpr std::string_view ago = " ago";
   constexpr double seconds_max = 100.0 * 366.0 * 86400.0;

@@ -1,4 +1,4 @@
-/// A moment in a history, as a person writes it.
+/// Parser and formatter for times in a history.
 #pragma once
 
 #include <chrono>
@@ -14,7 +14,7 @@ struct HistoryTime {
   std::optional<std::int64_t> wall_ns;
 };
 
-/// Whether a moment lies before a bound. @param seconds  since the history's first cycle
+/// @param seconds  since the history's first cycle
 [[nodiscard]] inline bool is_before(double seconds, std::int64_t wall_ns,
                                     const HistoryTime& bound) {
   return bound.seconds ? seconds < *bound.seconds : wall_ns < *bound.wall_ns;

@@ -21,7 +21,7 @@ GridKey grid_of(const SegmentInfo& segment) {
   return {segment.grid.start.count(), segment.grid.period.count()};
 }
 
-/// The grid that most segments of each run have; of equals the one that came first.
+/// The most frequent grid of each run; in a tie the first.
 std::map<std::int64_t, GridKey> usual_grids(const std::vector<SegmentInfo>& segments) {
   std::map<std::int64_t, std::map<GridKey, int>> counts;
   std::map<std::int64_t, GridKey> usual;
@@ -34,7 +34,7 @@ std::map<std::int64_t, GridKey> usual_grids(const std::vector<SegmentInfo>& segm
   return usual;
 }
 
-/// From the same run, else from the segment in front, else from the one behind.
+/// Estimate from the same run, else the previous segment, else the next one.
 std::int64_t likely_wall_ns(const std::vector<SegmentInfo>& segments, std::size_t at) {
   const SegmentInfo& segment = segments[at];
   const auto is_good = [](const SegmentInfo& other) { return is_wall_time(other.wall_ns); };
@@ -44,7 +44,7 @@ std::int64_t likely_wall_ns(const std::vector<SegmentInfo>& segments, std::size_
   std::int64_t wall_ns = 0;
   if (peer != segments.end()) {
     wall_ns = peer->wall_ns + begin_ns(segment) - begin_ns(*peer);
-  } else if (at > 0) {  // made good already
+  } else if (at > 0) {  // corrected already
     const SegmentInfo& before = segments[at - 1];
     wall_ns = before.wall_ns + end_ns(before) - begin_ns(before);
   } else {

@@ -1,5 +1,4 @@
-/// What a history says about its segments, which of them can be those of one history, and which
-/// parts of it cannot be used.
+/// Segments of a history: their description, plausibility checks, and damage.
 #pragma once
 
 #include <cstdint>
@@ -12,18 +11,18 @@
 
 namespace thermocomp {
 
-/// A history cannot be used; the text names the file and the reason.
+/// The history cannot be used; the text names the file and the reason.
 class HistoryError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// @throws HistoryError "damaged: ..." unless it holds
+/// @throws HistoryError "damaged: ..." unless `holds`
 inline void require_sound(bool holds, const char* damage) {
   if (!holds) throw HistoryError(std::string("damaged: ") + damage);
 }
 
-/// What a replay needs besides the records.
+/// Texts that a replay needs besides the records.
 struct SegmentSetup {
   std::string config_text;
   std::string model_text;
@@ -32,12 +31,12 @@ struct SegmentSetup {
 
 struct SegmentInfo {
   std::int64_t id{0};
-  std::int64_t run{0};    ///< one number for each start of the daemon
-  std::int64_t setup{0};  ///< which configuration and model
+  std::int64_t run{0};    ///< number of the daemon's start
+  std::int64_t setup{0};  ///< ID of configuration and model
   SegmentReason reason{SegmentReason::start};
   Grid grid;
   std::uint64_t first_cycle{0};
-  /// Last cycle that is recorded whole; first_cycle - 1 when there is none yet.
+  /// Last cycle that is recorded completely; first_cycle - 1 if none.
   std::int64_t last_cycle{-1};
   std::int64_t wall_ns{0};  ///< wall clock of first_cycle, since 1970 [ns]
   std::uint64_t records{0};
@@ -45,7 +44,7 @@ struct SegmentInfo {
   std::string program_version;
 };
 
-/// A part of a history that cannot be used, and why.
+/// A part of a history that cannot be used, with the reason.
 struct HistoryDamage {
   std::int64_t segment{0};  ///< 0: the file as a whole
   std::string why;          ///< one line
@@ -53,13 +52,13 @@ struct HistoryDamage {
 /// "segment 3: chunk 7 is missing"
 [[nodiscard]] std::string to_string(const HistoryDamage& damage);
 
-/// Cycles never go back, and within a cycle the offsets, which come out of its step, are the last.
+/// Checks the order of records: cycles never decrease, and the offsets of a cycle come last.
 class RecordOrder {
  public:
-  /// @param first_cycle  no record is of an earlier one
+  /// @param first_cycle  lowest valid cycle
   explicit RecordOrder(std::uint64_t first_cycle = 0) : cycle_(first_cycle) {}
 
-  /// @return whether `next` may follow what came before; what may not is not counted as there
+  /// @return whether `next` may follow the records so far; if not, it is ignored
   [[nodiscard]] bool admits(const Record& next) noexcept {
     const bool is_offset = next.kind == RecordKind::offset;
     if (next.cycle < cycle_ || (next.cycle == cycle_ && has_offsets_ && !is_offset)) return false;
@@ -73,32 +72,33 @@ class RecordOrder {
   bool has_offsets_{false};  ///< the newest record is an offset of that cycle
 };
 
-/// Beyond these limits the arithmetic of times would overflow, or a replay would never end.
-inline constexpr std::int64_t grid_ns_max = std::int64_t{1} << 60;  ///< 36 years of a system's run
-inline constexpr std::int64_t span_ns_max = std::int64_t{1} << 55;  ///< a year; segments last weeks
+/// Beyond these limits time arithmetic would overflow, or a replay would not end.
+inline constexpr std::int64_t grid_ns_max = std::int64_t{1} << 60;  ///< 36 years of uptime
+inline constexpr std::int64_t span_ns_max = std::int64_t{1}
+                                            << 55;  ///< a year; segments last weeks at most
 inline constexpr std::int64_t wall_ns_max = std::int64_t{1} << 62;  ///< in the year 2116
 
 [[nodiscard]] constexpr bool is_wall_time(std::int64_t wall_ns) noexcept {
   return wall_ns >= 0 && wall_ns <= wall_ns_max;
 }
 
-/// @throws HistoryError when the numbers of the segment are impossible, its wall time apart
+/// @throws HistoryError when the segment's numbers, except its wall time, are impossible
 void check_times(const SegmentInfo& segment);
 
-/// Leaves out, and tells in `damage`: a segment on another grid than most of its run; one that
-/// begins before the one in front of it ends; one whose times go beyond all bounds. Replaces an
-/// impossible wall time by a likely one.
+/// Drops segments, with an entry in `damage`, that are on another grid than most of their run,
+/// begin before the previous one ends, or exceed the limits above. Replaces an impossible wall time
+/// by an estimate.
 /// @param segments  by id, each passed by check_times()
 [[nodiscard]] std::vector<SegmentInfo> sound_segments(std::vector<SegmentInfo> segments,
                                                       std::vector<HistoryDamage>& damage);
 
-/// Places segments one after the other in the history's own time: within a run of the daemon the
-/// grid counts; between two of them the wall clock does, but time never runs backwards.
+/// Places segments on the history's own time axis: within a run of the daemon by the grid, between
+/// runs by the wall clock, but never backwards.
 class HistoryPlaces {
  public:
-  /// @return why the segment cannot follow those before it; empty: it does, and has its place
+  /// @return why the segment cannot follow the previous ones; empty: it is placed
   std::string add(const SegmentInfo& segment);
-  /// From the grid of `run` to the history's time. @pre a segment of it has its place
+  /// From the grid of `run` to the history's time. @pre a segment of the run is placed
   [[nodiscard]] std::int64_t grid_to_history_ns(std::int64_t run) const {
     return grid_to_history_ns_.at(run);
   }

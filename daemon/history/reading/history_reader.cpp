@@ -15,7 +15,7 @@
 namespace thermocomp {
 namespace {
 
-/// An earlier version kept only texts.
+/// Earlier versions stored only texts.
 Event event_of_texts(const Statement& row) {
   Event event;
   event.kind = event_kind_named(row.text(3));
@@ -131,7 +131,7 @@ bool HistoryReader::Parts::knows(std::int64_t id, const std::vector<SegmentInfo>
                      [id](const HistoryDamage& part) { return part.segment == id; });
 }
 
-/// The rows in that order up to one that is known already. @throws DatabaseError
+/// Reads rows in that order up to a known one. @throws DatabaseError
 void HistoryReader::Parts::read(const char* order, std::vector<SegmentInfo>& found) {
   Statement rows(database, (std::string(columns_of_segment) + order).c_str());
   while (rows.step()) {
@@ -148,7 +148,7 @@ void HistoryReader::Parts::read(const char* order, std::vector<SegmentInfo>& fou
   }
 }
 
-/// A last cycle that no chunk reaches would let a replay go on with old inputs for ever.
+/// Limits the last cycle to the chunks: beyond them a replay would continue with old inputs.
 void HistoryReader::Parts::limit_to_chunks(SegmentInfo& segment) {
   const std::int64_t none = static_cast<std::int64_t>(segment.first_cycle) - 1;
   if (segment.last_cycle == none) return;
@@ -171,12 +171,12 @@ HistoryReader::HistoryReader(const std::filesystem::path& file) {
   }
   parts_ = std::make_unique<Parts>(file);
   require_history(parts_->database);
-  parts_->database.run("PRAGMA cache_size = -256");  // chunks are read once, one after the other
+  parts_->database.run("PRAGMA cache_size = -256");  // chunks are read once, sequentially
   std::vector<SegmentInfo> found;
   try {
     parts_->read(" ORDER BY id", found);
   } catch (const DatabaseError& error) {
-    // A page of the table is damaged: what stands behind it is read from the other end.
+    // A page of the table is damaged: rows behind it are read from the other end.
     parts_->damage.push_back({0, std::string("some segments cannot be read: ") + error.what()});
     try {
       parts_->read(" ORDER BY id DESC", found);
@@ -240,12 +240,12 @@ struct RecordCursor::Parts {
   Database& database;
   SegmentInfo segment;
   std::int64_t next_chunk{0};
-  std::int64_t through{-1};  ///< last cycle that the chunks read so far hold whole
+  std::int64_t through{-1};  ///< last complete cycle of the chunks read so far
   std::int64_t wall_minus_grid_ns{0};
   bool wall_was_impossible{false};
   RecordOrder order;            ///< of the chunks so far
-  std::vector<Record> records;  ///< of the chunk
-  std::size_t given{0};         ///< of those
+  std::vector<Record> records;  ///< of the present chunk
+  std::size_t given{0};         ///< number of records returned
 };
 
 RecordCursor::RecordCursor(const HistoryReader& reader, const SegmentInfo& segment)
@@ -265,7 +265,7 @@ bool RecordCursor::wall_time_was_impossible() const noexcept {
   return parts_->wall_was_impossible;
 }
 
-/// All of it, before any of it is given out.
+/// Decodes the whole chunk before any record is returned.
 void RecordCursor::Parts::decode(std::vector<std::byte> bytes, std::uint64_t count) {
   if (count > bytes.size()) throw HistoryError("damaged: more records than bytes");
   std::vector<Record> decoded;
@@ -279,11 +279,11 @@ void RecordCursor::Parts::decode(std::vector<std::byte> bytes, std::uint64_t cou
   given = 0;
 }
 
-/// @return false when the segment's chunks are at their end
+/// @return false after the segment's last chunk
 bool RecordCursor::load_chunk() {
   Parts& parts = *parts_;
-  // A statement of its own for each chunk: a read transaction that stays open would keep the
-  // daemon's write-ahead log from being taken back.
+  // One statement per chunk: a read transaction kept open would block the checkpoint of the
+  // daemon's write-ahead log.
   std::optional<ChunkContent> content =
       read_chunk(parts.database, parts.segment.id, parts.next_chunk);
   const std::string chunk = "chunk " + std::to_string(parts.next_chunk);
@@ -315,7 +315,7 @@ bool RecordCursor::next(Record& out) {
     if (!load_chunk()) return false;
   }
   out = parts.records[parts.given];
-  // What follows the last cycle was cut off before its cycle was whole.
+  // Records after the last complete cycle belong to an incomplete one.
   const bool is_whole = out.cycle < static_cast<std::uint64_t>(parts.segment.last_cycle + 1);
   if (is_whole) ++parts.given;
   return is_whole;

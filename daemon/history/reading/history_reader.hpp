@@ -1,5 +1,4 @@
-/// Reads a history, even one that a daemon is writing at the moment: its events, segments and
-/// records.
+/// Reads a history, also while a daemon writes it: events, segments and records.
 #pragma once
 
 #include <cstddef>
@@ -18,20 +17,19 @@
 
 namespace thermocomp {
 
-/// The events, oldest first. Times of `from` and `to` are wall times; seconds count from the first
-/// event.
-/// @throws HistoryError: no history, or one that cannot be read
+/// The events, oldest first. Seconds in `from` and `to` count from the first event.
+/// @throws HistoryError: no history, or unreadable
 [[nodiscard]] std::vector<RecordedEvent> read_events(const std::filesystem::path& history,
                                                      const std::optional<HistoryTime>& from = {},
                                                      const std::optional<HistoryTime>& to = {});
 
-/// The events after that of `run` and `number`, by run and number, `count` at most.
-/// @throws HistoryError: no history, or one that cannot be read
+/// At most `count` events after that of `run` and `number`, in this order.
+/// @throws HistoryError: no history, or unreadable
 [[nodiscard]] std::vector<RecordedEvent> read_events_after(const std::filesystem::path& history,
                                                            std::int64_t run, std::uint64_t number,
                                                            std::int64_t count);
 
-/// What was in force right before the first cycle of a segment.
+/// State and inputs right before the first cycle of a segment.
 struct SegmentStart {
   std::vector<std::byte> estimator_state;
   std::vector<Reading> readings;
@@ -40,24 +38,24 @@ struct SegmentStart {
 
 class HistoryReader;
 
-/// The records of one segment in the order in which they reached the estimator, a chunk at a time.
+/// Reads the records of a segment in the order of their arrival at the estimator, chunk by chunk.
 class RecordCursor {
  public:
   RecordCursor(const HistoryReader& reader, const SegmentInfo& segment);
   ~RecordCursor();
   RecordCursor(RecordCursor&&) noexcept;
-  /// Gives records of sound chunks only: the checksum must fit and the whole chunk must decode.
-  /// @return false after the last record of the segment's whole cycles
-  /// @throws HistoryError when a chunk is damaged or missing, or the segment was deleted meanwhile
+  /// Returns records of sound chunks only: the checksum matches and the whole chunk decodes.
+  /// @return false after the last record of the segment's complete cycles
+  /// @throws HistoryError when a chunk is damaged or missing, or the segment was deleted
   bool next(Record& out);
-  /// After an error: goes on with the next chunk there is. What the damaged one said is unknown.
+  /// After an error: continues with the next existing chunk; the damaged one's records are lost.
   /// @return false when there is none
   bool resume();
-  /// The segment has grown: next() goes on after what was its last whole cycle.
+  /// The segment has grown: next() continues beyond its previous last cycle.
   void extend(std::int64_t last_cycle);
-  /// Whether a chunk so far gave an impossible wall time; the last good difference then counts.
+  /// Whether a chunk had an impossible wall time; the last valid difference is then kept.
   [[nodiscard]] bool wall_time_was_impossible() const noexcept;
-  /// Wall clock minus the grid's time, as noted with the record last returned [ns].
+  /// Wall clock minus grid time, as of the record last returned [ns].
   [[nodiscard]] std::int64_t wall_minus_grid_ns() const noexcept;
 
  private:
@@ -68,11 +66,11 @@ class RecordCursor {
 
 class HistoryReader {
  public:
-  /// Opens for reading only and takes note of the segments there are now. An impossible segment (or
-  /// one that overlaps the one in front of it) is left out and reported by damage(); an impossible
-  /// wall time, from a clock that was set wrong, is replaced by what the segments beside it say.
-  /// @throws HistoryError naming the file: missing, no history, of an unknown version, or so
-  ///                      damaged that nothing can be taken from it
+  /// Opens the file read-only and lists the present segments. Drops an impossible segment (or one
+  /// that overlaps the previous one) and reports it in damage(). Replaces an impossible wall time,
+  /// from a wrong clock, by an estimate from other segments.
+  /// @throws HistoryError naming the file: missing, not a history, of an unknown version, or too
+  ///                      damaged to be read at all
   explicit HistoryReader(const std::filesystem::path& file);
   ~HistoryReader();
   HistoryReader(HistoryReader&&) noexcept;

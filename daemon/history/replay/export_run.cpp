@@ -15,7 +15,7 @@
 namespace thermocomp {
 namespace {
 
-/// A comment line where nothing is known between two segments; empty where they join.
+/// Comment line for a gap between two segments; empty if they are contiguous.
 std::string gap_line(const HistoryClock& clock, const SegmentInfo& before, const SegmentInfo& after,
                      double first_s) {
   const double from_s =
@@ -30,7 +30,7 @@ std::string gap_line(const HistoryClock& clock, const SegmentInfo& before, const
   return text.data();
 }
 
-/// Whether all of the segment lies beside [from, to), as far as seconds tell.
+/// Whether the whole segment is outside [from, to), as far as seconds tell.
 bool is_beside(const HistoryClock& clock, const SegmentInfo& segment,
                const std::optional<HistoryTime>& from, const std::optional<HistoryTime>& to) {
   const auto end = static_cast<std::uint64_t>(segment.last_cycle + 1);
@@ -44,14 +44,13 @@ bool is_beside(const HistoryClock& clock, const SegmentInfo& segment,
 std::string comment_at(double time_s, const std::string& what) {
   std::array<char, 40> time{};
   std::snprintf(time.data(), time.size(), "# %.3f s: ", time_s);
-  return time.data() + printable_text(what) + "\n";  // a damaged file may say anything
+  return time.data() + printable_text(what) + "\n";  // a damaged file may contain any text
 }
 
-/// Says when a row's wall time is worth a comment: the first, one an hour, and one that does not
-/// follow from the last that was written.
+/// Selects rows for a wall-time comment: the first, one per hour, and after a step of the clock.
 class WallComments {
  public:
-  /// @return empty: nothing to tell
+  /// @return empty: no comment
   std::string at(double time_s, std::int64_t wall_ns) {
     constexpr double every_s = 3600.0;
     constexpr double off_s_max = 0.5;
@@ -71,7 +70,7 @@ class WallComments {
   std::int64_t written_wall_ns_{0};
 };
 
-/// Writes rows as the segments give them, and between them comment lines.
+/// Writes the segments' rows, with comment lines between them.
 class RunExport {
  public:
   RunExport(const HistoryReader& reader, const SetupParser& parser, ExportContent content,
@@ -106,7 +105,7 @@ class RunExport {
   }
 
  private:
-  /// By setup, which axes were probed in the segments that are exported.
+  /// By setup: axes probed in the exported segments.
   [[nodiscard]] std::map<std::int64_t, std::vector<bool>> find_probed() const {
     std::map<std::int64_t, std::vector<bool>> probed;
     for (const SegmentInfo& segment : reader_.segments()) {
@@ -187,7 +186,7 @@ class RunExport {
   RunColumns columns_;
   std::map<std::int64_t, ExportPlaces> places_;
   ExportSummary summary_;
-  std::size_t reported_{0};  ///< of its damage
+  std::size_t reported_{0};  ///< number of damage entries reported
   std::string text_;
   std::vector<double> row_;
   std::optional<double> first_s_;

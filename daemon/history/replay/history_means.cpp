@@ -13,10 +13,10 @@ namespace {
 constexpr std::int64_t ns_per_s = 1'000'000'000;
 
 std::int64_t begin_of_mean_s(std::int64_t wall_ns) {
-  return wall_ns / ns_per_s / mean_s * mean_s;  // impossible times are replaced by the reader
+  return wall_ns / ns_per_s / mean_s * mean_s;  // the reader has replaced impossible times
 }
 
-/// The mean that is being made.
+/// The mean being accumulated.
 struct OpenMean {
   std::int64_t at_s{0};
   HistoryPosition begin;
@@ -35,7 +35,7 @@ struct OpenMean {
   }
 };
 
-/// A segment on the way.
+/// A segment being read.
 struct Walk {
   Walk(std::shared_ptr<const HistoryReader> from, SegmentInfo segment)
       : reader(std::move(from)),
@@ -53,7 +53,7 @@ struct Walk {
     return std::find(places.measured.begin(), places.measured.end(), column) !=
            places.measured.end();
   }
-  /// Probings are rows of their own.
+  /// Removes the columns of probings, which are returned separately.
   template <class Value>
   [[nodiscard]] std::vector<Value> without_measured(const std::vector<Value>& all) const {
     std::vector<Value> kept;
@@ -77,11 +77,11 @@ struct Walk {
 
 struct HistoryMeans::Parts {
   std::filesystem::path file;
-  HistoryPosition from;  ///< cycles before it are passed over
+  HistoryPosition from;  ///< earlier cycles are skipped
   bool continued{false};
   std::uint64_t damaged{0};
   std::unique_ptr<Walk> walk;
-  std::int64_t walked{0};  ///< segments up to this one are done with
+  std::int64_t walked{0};  ///< segments up to this ID are finished
   HistoryPosition end;     ///< of the rows taken
   std::optional<OpenMean> open;
   MeansBatch batch;
@@ -114,8 +114,7 @@ std::uint64_t HistoryMeans::damaged() const noexcept {
   return parts_->damaged + (parts_->walk ? parts_->walk->damage.size() : 0);
 }
 
-/// What the daemon has written since. A file that another has taken the place of has no end of this
-/// segment: its segments come from the first on.
+/// Reads the list of segments again; of a replaced file all segments are read.
 void HistoryMeans::Parts::refresh() {
   newest = std::make_shared<const HistoryReader>(file);
   if (!walk) return;
@@ -130,7 +129,7 @@ void HistoryMeans::Parts::refresh() {
   if (is_other_file) walked = 0;
 }
 
-/// @return false when there is none
+/// @return false when there are no more segments
 bool HistoryMeans::Parts::open_next() {
   for (const SegmentInfo& segment : newest->segments()) {
     if (segment.id <= walked) continue;
@@ -141,7 +140,7 @@ bool HistoryMeans::Parts::open_next() {
       walk = std::move(following);
       return true;
     } catch (const std::exception&) {
-      ++damaged;  // its own segment is lost, the next one is tried
+      ++damaged;  // skip the damaged segment
     }
   }
   return false;
@@ -209,7 +208,7 @@ std::optional<MeansBatch> HistoryMeans::next(std::size_t rows_max, std::int64_t 
         parts.walk->info.program_version != before.program_version) {
       parts.close_mean();
       parts.end = parts.walk->at(parts.walk->info.first_cycle);
-      if (!parts.batch.rows.empty()) break;  // the next call goes on with this segment
+      if (!parts.batch.rows.empty()) break;  // the next call continues with this segment
       parts.begin_batch();
     }
   }

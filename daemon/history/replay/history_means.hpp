@@ -1,4 +1,4 @@
-/// A history as means of 10 s, on and on while a daemon writes it.
+/// Means over 10 s of a history, continued while a daemon writes it.
 #pragma once
 
 #include <cstdint>
@@ -14,33 +14,33 @@
 
 namespace thermocomp {
 
-/// A moment of a history: what is before this cycle is done with.
+/// A position in a history: cycles before it are finished.
 struct HistoryPosition {
   std::int64_t segment{0};  ///< 0: the beginning
-  std::int64_t wall_ns{0};  ///< of the segment's first cycle: that it is still the same file
+  std::int64_t wall_ns{0};  ///< of the segment's first cycle; identifies the file
   std::uint64_t cycle{0};
 };
 
 inline constexpr std::int64_t mean_s = 10;
 
 struct MeanRow {
-  std::int64_t at_s{0};     ///< beginning, since 1970, a multiple of mean_s
-  std::vector<float> mean;  ///< NaN: nothing good was recorded
+  std::int64_t at_s{0};     ///< start of the interval, since 1970, a multiple of mean_s
+  std::vector<float> mean;  ///< NaN: no good value was recorded
 };
 
 struct RecordedProbing {
   std::string output;  ///< of the model
-  int number{0};       ///< counts those of this output at the same moment
+  int number{0};       ///< counts probings of this output at the same time
   std::int64_t wall_ns{0};
-  double measured_um{not_a_number};      ///< as it was given
+  double measured_um{not_a_number};      ///< as entered
   double displacement_um{not_a_number};  ///< without the offset in effect
-  double modelled_um{not_a_number};      ///< of the model alone; NaN: not known
-  double claimed_um{not_a_number};       ///< standard deviation that the model states; NaN: none
+  double modelled_um{not_a_number};      ///< model without correction; NaN: unknown
+  double claimed_um{not_a_number};       ///< standard deviation claimed by the model; NaN: none
   double sd_um{not_a_number};            ///< NaN: as configured
   std::string source;
 };
 
-/// What was recorded with one configuration.
+/// Rows of one configuration.
 struct MeansBatch {
   SegmentSetup setup;
   std::string program_version;
@@ -50,26 +50,26 @@ struct MeansBatch {
   HistoryPosition after;
 };
 
-/// Columns: the model's inputs as the daemon computed with them, sensors of no block, signals, and
-/// of each axis what was sent and applied.
+/// Columns: the model's inputs as used by the daemon, sensors without a block, signals, and the
+/// sent and applied offset of each axis.
 class HistoryMeans {
  public:
-  /// @param from  from the beginning where the file does not have it (any more)
+  /// @param from  if not in the file (any more): from the beginning
   HistoryMeans(std::filesystem::path history, const HistoryPosition& from);
   ~HistoryMeans();
   HistoryMeans(HistoryMeans&&) noexcept;
 
-  /// Whether the file has the position that it was to begin at.
+  /// Whether the file contains `from`.
   [[nodiscard]] bool is_continued() const noexcept;
-  /// Parts of the file that could not be read so far.
+  /// Number of parts of the file that could not be read so far.
   [[nodiscard]] std::uint64_t damaged() const noexcept;
 
-  /// The next rows, as many as there are, up to about `rows_max`. Means of 10 s that have just
-  /// passed wait until something later was recorded, or `settled_s` have passed.
-  /// @param wall_s  the clock's time now
-  /// @param rest    called often; may throw to end it
+  /// The next rows, at most about `rows_max`. The last interval is held back until a later row is
+  /// recorded or `settled_s` have passed.
+  /// @param wall_s  wall clock, since 1970 [s]
+  /// @param rest    called often; may throw to abort
   /// @return nullopt: nothing new yet
-  /// @throws HistoryError when nothing can be taken from the file
+  /// @throws HistoryError when the file cannot be read at all
   [[nodiscard]] std::optional<MeansBatch> next(std::size_t rows_max, std::int64_t wall_s,
                                                const std::function<void()>& rest);
   static constexpr std::int64_t settled_s = 300;

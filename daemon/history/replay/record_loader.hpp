@@ -1,4 +1,4 @@
-/// A recording as a run file, whether it is a file of numbers or a daemon's history.
+/// Loads a recording as a run: either a run file or a daemon's history.
 #pragma once
 
 #include <string>
@@ -8,11 +8,10 @@
 
 namespace thermocomp::cli {
 
-/// Whether a file is a database as thermocompd writes its history.
 [[nodiscard]] bool is_history(const std::string& file);
 
-/// RUN.csv[@T0:T1] by `loader`, or a history (with @T0:T1 as well, seconds since its start) as
-/// `thermocomp export` gives it; what of it is damaged is printed on stderr.
+/// RUN.csv[@T0:T1] by `loader`, or a history (also with @T0:T1, seconds since its start) as
+/// exported by `thermocomp export`; damage is printed on stderr.
 /// @throws ConfigurationError, HistoryError
 [[nodiscard]] RunFile load_record(const std::string& argument, RunLoader& loader);
 

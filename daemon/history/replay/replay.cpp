@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::uint64_t progress_every = 1u << 16;  ///< steps
 
-/// The axes of an offset group as the daemon noted them.
+/// Recorded offsets of all axes at one cycle.
 struct NotedOffsets {
   std::array<double, axes_max> offset_um{};
   std::array<bool, axes_max> valid{};
@@ -32,7 +32,7 @@ class SegmentReplay {
         sink_(sink),
         summary_(summary) {}
 
-  /// @param each  called now and then with the cycles done
+  /// @param each  called from time to time with the cycles done
   void run(const std::function<void(std::uint64_t)>& each) {
     while (steps_.step()) {
       ++summary_.cycles;
@@ -174,7 +174,7 @@ ReplaySummary replay_to_csv(const std::filesystem::path& history, std::ostream& 
 
 namespace {
 
-/// Calls `look`; what it throws is damage of the segment.
+/// Calls `look`; an exception becomes damage of the segment.
 template <class Look>
 bool is_good(SegmentCheck& check, Look look) {
   try {
@@ -191,7 +191,7 @@ void require(bool holds, const char* why) {
   if (!holds) throw HistoryError(why);
 }
 
-/// What a record says must be possible for the configuration.
+/// Checks a record's indices and values against the configuration.
 void check_record(const Record& record, const EstimatorConfig& config, InputsInForce& inputs) {
   switch (record.kind) {
     case RecordKind::offset:
@@ -242,7 +242,7 @@ HistoryCheck check_history(const std::filesystem::path& history, const Progress&
     for (const HistoryDamage& damage : reader.damage()) {
       if (damage.segment == segment.id) check.damage.push_back(damage);
     }
-    // Without its configuration nothing of a segment can be judged.
+    // A segment's records cannot be checked without its configuration.
     is_good(check, [&] {
       const EstimatorConfig& config = setups.of(segment).estimator;
       is_good(check, [&] { static_cast<void>(inputs_at(reader.start(segment), config)); });

@@ -20,7 +20,7 @@ namespace {
 constexpr double step_period_s_max = 1.0;
 constexpr double steps_max = 5e8;
 constexpr double stale_in_sample_distances = 2.5;
-/// The first row's time on the estimator's clock: not 0, which stands for "never".
+/// The first row's time on the estimator's clock; 0 means "never".
 constexpr nanoseconds origin = std::chrono::seconds(1);
 
 nanoseconds as_ns(double seconds) {
@@ -35,7 +35,7 @@ double shortest_distance_s(const std::vector<double>& times_s) {
   return shortest;
 }
 
-/// Of the rows where the column has a value; 0 with fewer than two.
+/// Median distance of rows with a value [s]; 0 with fewer than two.
 double median_distance_s(const std::vector<double>& times_s, const std::vector<double>& values) {
   std::vector<double> distances;
   std::optional<double> last;
@@ -53,7 +53,7 @@ nanoseconds step_period(double rate_hz, const std::vector<double>& times_s) {
   return loop * std::max<std::int64_t>(1, as_ns(longest_s) / loop);
 }
 
-/// The columns of a run that stand for the machine.
+/// The run's columns for sensors and signals.
 class RunBinding {
  public:
   /// @throws ConfigurationError
@@ -113,13 +113,13 @@ class RunBinding {
   std::vector<Problem> problems_;
 };
 
-/// What a run file needs: nobody is there to enable it, and its samples may be far apart.
+/// Adapts a configuration to a run file: enabled, and with limits for its sample distances.
 EstimatorConfig adapted(EstimatorConfig config, const RunBinding& binding, const RunFile& run,
                         std::vector<std::string>& notes) {
   config.compensation.enabled_at_first_start = true;
   for (std::size_t i = 0; i < config.sensors.size(); ++i) {
     if (!binding.sensors()[i]) continue;
-    // What is in a run was there: its first row counts.
+    // Values in a run file are settled from the first row on.
     config.sensors[i].screening.settle_s = 0.0;
     const double needed_s = stale_in_sample_distances *
                             median_distance_s(run.time_s(), run.values[*binding.sensors()[i]]);

@@ -23,7 +23,7 @@ double good_value(const Reading& reading) {
   return reading.fault == Fault::none ? reading.temp_degC : not_a_number;
 }
 
-/// Mean of the block's good readings, each as a difference where it has a reference sensor.
+/// Mean of the block's good readings, each relative to its reference sensor if it has one.
 double block_mean(const BlockConfig& block, const EstimatorConfig& config,
                   const std::vector<Reading>& readings) {
   double sum = 0.0;
@@ -140,12 +140,12 @@ void SegmentExport::fill(std::vector<double>& row, std::uint64_t cycle) {
     row[places_.signals[i]] = inputs_.controller.signals[i];
   for (std::size_t i = 0; i < places_.offsets.size(); ++i) {
     row[places_.offsets[i]] = offset_um_[i];
-    // What a dry run shows in its place was not applied.
+    // The offset shown in a dry run was not applied.
     row[places_.applied[i]] = dry_run_ ? not_a_number : inputs_.controller.applied_um[i];
     row[places_.measured[i]] = measured_um_[i];
     if (places_.displacement[i] != none) row[places_.displacement[i]] = displacement_um_[i];
   }
-  // The negative of no displacement: as text, "-0" only puzzles.
+  // -0 would be printed as "-0".
   std::replace(row.begin(), row.end(), -0.0, 0.0);
   measured_um_.fill(not_a_number);
   displacement_um_.fill(not_a_number);
@@ -199,7 +199,7 @@ void SegmentExport::note(const std::string& why) {
   if (reported_ == shown_max + 1) damage_.push_back({segment_.id, "and more of the kind"});
 }
 
-/// The next record that can be read.
+/// Advances to the next readable record.
 void SegmentExport::advance() {
   for (;;) {
     try {
@@ -242,7 +242,7 @@ void SegmentExport::take_offsets() {
 void SegmentExport::take_command() {
   if (record_.detail >= command_kinds_count) throw HistoryError("damaged: unknown command");
   const auto kind = static_cast<CommandKind>(record_.detail);
-  if (kind == CommandKind::saved) return;  // not an operator's
+  if (kind == CommandKind::saved) return;  // not from an operator
   const bool names_axis =
       kind == CommandKind::measured || kind == CommandKind::prove || kind == CommandKind::release;
   if (names_axis && record_.index >= config_.axes.size()) return;
@@ -256,7 +256,7 @@ void SegmentExport::take_command() {
   if (kind == CommandKind::measured) take_measured();
 }
 
-/// As the estimator takes it: without the offset in effect, which moved the tool.
+/// Records the displacement as the estimator uses it: without the offset in effect.
 void SegmentExport::take_measured() {
   const std::size_t axis = record_.index;
   measured_um_[axis] = record_.value;
@@ -274,7 +274,7 @@ void SegmentExport::take_measured() {
                        .source = command.source});
 }
 
-/// What the axis is offset by; of a travel where its slide stands.
+/// Offset in effect; with nodes, interpolated at the slide's position.
 double SegmentExport::effect_um(std::size_t axis) const {
   const AxisSpan span = span_of(config_.axes, axis);
   std::array<double, axes_max> nodes_um{};
@@ -291,7 +291,7 @@ double SegmentExport::effect_um(std::size_t axis) const {
       inputs_.controller.signals[static_cast<std::size_t>(signal - names.begin())]);
 }
 
-/// Steps the estimator up to and with the cycle.
+/// Steps the estimator up to and including the cycle.
 void SegmentExport::follow(std::uint64_t cycle) {
   if (!steps_) return;
   try {
@@ -328,7 +328,7 @@ void SegmentExport::fill_inputs(std::vector<double>& row) {
   }
 }
 
-/// The fault after screening, which knows of more than the driver does.
+/// The fault after screening, if the estimator is stepped; else the driver's.
 Fault SegmentExport::fault_of(std::size_t sensor) const {
   return steps_ ? report_.sensors[sensor].fault : inputs_.readings[sensor].fault;
 }
@@ -337,11 +337,11 @@ void SegmentExport::tell_faults() {
   for (std::size_t i = 0; i < faults_reported_.size(); ++i) {
     const Fault fault = fault_of(i);
     if (fault == faults_reported_[i]) continue;
-    // A value that settles is the end of what was written before, once it counts.
+    // A settling value ends the reported fault only once it counts.
     if (steps_ && report_.sensors[i].settles()) continue;
     const bool is_first_value = faults_reported_[i] == Fault::never_read && fault == Fault::none;
     faults_reported_[i] = fault;
-    if (is_first_value) continue;  // that nothing was read before it is no news
+    if (is_first_value) continue;  // the first value is no recovery
     happened_.push_back("sensor " + config_.sensors[i].name + ": " +
                         (fault == Fault::none ? "good again" : std::string(to_string(fault))));
   }

@@ -1,4 +1,4 @@
-/// The rows of an exported run file, segment by segment. Only for the .cpp files of this folder.
+/// Rows of an exported run file, segment by segment. Only for the .cpp files of this folder.
 #pragma once
 
 #include <array>
@@ -15,63 +15,64 @@
 
 namespace thermocomp {
 
-/// Where the values of one configuration go.
+/// Column indices for the values of one configuration.
 struct ExportPlaces {
   static constexpr std::size_t none = static_cast<std::size_t>(-1);
-  std::vector<std::size_t> inputs;  ///< temperatures of the model; none with ExportContent::sensors
-  std::vector<std::size_t> sensors;  ///< none: the sensor is known by its block's input
+  std::vector<std::size_t>
+      inputs;  ///< temperatures of the model; empty with ExportContent::sensors
+  std::vector<std::size_t> sensors;  ///< none: included in its block's input
   std::vector<std::size_t> signals;
-  std::vector<std::size_t> displacement;  ///< by axis; none where nothing was probed
+  std::vector<std::size_t> displacement;  ///< by axis; none if not probed
   std::vector<std::size_t> offsets;
   std::vector<std::size_t> applied;
   std::vector<std::size_t> measured;
 };
 
-/// Makes the columns of a configuration.
-/// @param probed  by axis: whether a displacement of it was measured somewhere in the file
+/// Creates the columns of a configuration.
+/// @param probed  by axis: whether its displacement was measured anywhere in the file
 [[nodiscard]] ExportPlaces export_places(const ReplaySetup& setup, ExportContent content,
                                          const std::vector<bool>& probed, RunColumns& columns);
 
-/// A displacement that an operator or a probe gave.
+/// A displacement entered by an operator or a probe.
 struct ExportedProbing {
   std::size_t axis{0};
-  std::int64_t wall_ns{0};               ///< when the tool was there
-  double measured_um{not_a_number};      ///< as it was given
+  std::int64_t wall_ns{0};               ///< time of the measurement
+  double measured_um{not_a_number};      ///< as entered
   double displacement_um{not_a_number};  ///< without the offset in effect
-  double modelled_um{not_a_number};      ///< of the model alone; NaN: not known
-  double claimed_um{not_a_number};       ///< standard deviation that the model states; NaN: none
+  double modelled_um{not_a_number};      ///< model without correction; NaN: unknown
+  double claimed_um{not_a_number};       ///< standard deviation claimed by the model; NaN: none
   double sd_um{not_a_number};            ///< NaN: as configured
   MeasuredSource source{MeasuredSource::probe};
 };
 
-/// Marks the axes of which an operator measured a displacement in this segment. What cannot be read
-/// is not reported here but by the export itself.
+/// Marks the axes with a measured displacement in this segment. Damage is reported by the export
+/// itself, not here.
 void note_probed(const HistoryReader& reader, const SegmentInfo& segment,
                  std::vector<bool>& probed) noexcept;
 
-/// Walks through a segment, from one cycle whose offsets were noted to the next. Beside it the
-/// estimator is stepped as in a replay, so that the inputs are those that the daemon computed with.
+/// Walks through a segment, from one cycle with recorded offsets to the next, and steps the
+/// estimator as in a replay, to obtain the daemon's inputs.
 class SegmentExport {
  public:
-  /// @param damage  what is found on the way
-  /// @throws HistoryError when its start cannot be used
+  /// @param damage  gets the damage found
+  /// @throws HistoryError when the segment's start cannot be used
   SegmentExport(const HistoryReader& reader, const SegmentInfo& segment, const ReplaySetup& setup,
                 const ExportPlaces& places, std::vector<HistoryDamage>& damage);
 
-  /// Goes on to the next cycle whose offsets were noted. @return false when there is none
+  /// Advances to the next cycle with recorded offsets. @return false when there is none
   bool next(std::uint64_t& cycle);
   [[nodiscard]] std::int64_t wall_ns(std::uint64_t cycle) const;
 
-  /// @param row     all missing before
-  /// @param cycle   what next() gave
+  /// @param row     all NaN on entry
+  /// @param cycle   from next()
   void fill(std::vector<double>& row, std::uint64_t cycle);
-  /// Since the last call: faults that begin and end, and commands; one text each.
+  /// Begin and end of faults, and commands since the last call; one text each.
   [[nodiscard]] std::vector<std::string> happened();
-  /// What was measured between the fill() before and the last one.
+  /// Probings between the last two calls of fill().
   [[nodiscard]] std::vector<ExportedProbing> probings();
-  /// The segment has grown: next() goes on.
+  /// The segment has grown: next() continues.
   void extend(std::int64_t last_cycle);
-  /// The cycle that next() gave is not wanted, nor what was commanded before it.
+  /// Discards the cycle of the last next(), with the commands before it.
   void skip();
 
  private:
@@ -98,16 +99,16 @@ class SegmentExport {
   RecordCursor cursor_;
   InputsInForce inputs_;
   std::array<double, axes_max> offset_um_{};
-  std::array<double, axes_max> measured_um_{};      ///< as the operator said it
+  std::array<double, axes_max> measured_um_{};      ///< as entered
   std::array<double, axes_max> displacement_um_{};  ///< ... without the offset in effect
   Record record_;
   bool has_record_{false};
-  std::unique_ptr<SegmentSteps> steps_;  ///< null once it cannot be stepped any more
+  std::unique_ptr<SegmentSteps> steps_;  ///< null once stepping has failed
   Report report_;
   std::vector<Fault> faults_reported_;
   std::vector<std::string> happened_;
   std::vector<ExportedProbing> probings_;
-  std::string not_followed_;  ///< why the estimator is not stepped any more, until it is reported
+  std::string not_followed_;  ///< why stepping has failed, until reported
 };
 
 }  // namespace thermocomp

@@ -57,7 +57,7 @@ InputsInForce inputs_at(const SegmentStart& start, const EstimatorConfig& config
 HistoryClock::HistoryClock(const HistoryReader& reader) {
   for (const SegmentInfo& segment : reader.segments()) {
     const std::string why = places_.add(segment);
-    THERMOCOMP_ENSURE(why.empty());  // the reader has left out what has no place
+    THERMOCOMP_ENSURE(why.empty());  // the reader has dropped segments without a place
   }
 }
 
@@ -135,7 +135,7 @@ SegmentSteps::SegmentSteps(const HistoryReader& reader, const SegmentInfo& segme
 }
 
 bool SegmentSteps::step() {
-  // What was noted after the step before and nobody asked for.
+  // Skips unread offsets of the previous step.
   while (noted_offset() != nullptr) next();
   const auto end = static_cast<std::uint64_t>(segment_.last_cycle + 1);
   while (next_cycle_ < end) {
@@ -153,7 +153,7 @@ bool SegmentSteps::step() {
   return false;
 }
 
-/// Everything that reached the estimator before the step of `cycle`.
+/// Applies all records before the step of `cycle`.
 /// @return `cycle`, or the first cycle after those that were skipped
 std::uint64_t SegmentSteps::take_inputs(std::uint64_t cycle) {
   while (has_record_ && record_.cycle <= cycle && record_.kind != RecordKind::offset) {

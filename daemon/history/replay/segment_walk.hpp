@@ -1,5 +1,5 @@
-/// What replay and export share: what an estimator is built from, the inputs in force while a
-/// segment's records pass, its estimator stepped again through them, and the history's own time.
+/// Shared parts of replay and export: a segment's setup, its inputs while its records pass, its
+/// estimator stepped through them, and the history's time.
 #pragma once
 
 #include <cstdint>
@@ -16,32 +16,31 @@
 
 namespace thermocomp {
 
-/// What the estimator of a segment is built from.
+/// Configuration and model of a segment's estimator.
 struct ReplaySetup {
   EstimatorConfig estimator;
   ThermalModel model;
-  bool dry_run{false};  ///< nothing was written to the controller
+  bool dry_run{false};  ///< offsets were not written to the controller
 };
 /// Texts -> configuration and model. The default parses them as the daemon does.
 using SetupParser = std::function<ReplaySetup(const SegmentSetup&)>;
 [[nodiscard]] ReplaySetup parse_setup(const SegmentSetup& setup);
 
-/// The inputs of the estimator as they stood at a cycle.
+/// The estimator's inputs at a cycle.
 struct InputsInForce {
   std::vector<Reading> readings;
   ControllerState controller;
-  /// Takes over a reading, link, applied or signal record.
+  /// Applies a reading, link, applied or signal record.
   /// @throws HistoryError when its index is impossible
   void apply(const Record& record);
-  /// After lost records: nothing is known until it is recorded again.
+  /// After lost records: all inputs are unknown until recorded again.
   void forget();
 };
 
-/// @throws HistoryError when there are not as many readings as sensors
+/// @throws HistoryError when the number of readings differs from that of the sensors
 [[nodiscard]] InputsInForce inputs_at(const SegmentStart& start, const EstimatorConfig& config);
 
-/// Seconds since the history's first cycle. Within a start of the daemon the grid counts; between
-/// two of them the wall clock does, but time never runs backwards.
+/// Seconds since the history's first cycle, see HistoryPlaces.
 class HistoryClock {
  public:
   explicit HistoryClock(const HistoryReader& reader);
@@ -54,24 +53,24 @@ class HistoryClock {
 /// The setups of all segments, each parsed once.
 class ParsedSetups {
  public:
-  /// What cannot be parsed is reported by of().
+  /// Parse errors are reported by of().
   ParsedSetups(const HistoryReader& reader, const SetupParser& parser);
   /// @throws HistoryError when the segment's configuration is missing or cannot be used
   [[nodiscard]] const ReplaySetup& of(const SegmentInfo& segment) const;
   [[nodiscard]] const std::map<std::int64_t, ReplaySetup>& all() const noexcept { return setups_; }
 
  private:
-  std::map<std::int64_t, ReplaySetup> setups_;    ///< by setup, that is in order of appearance
-  std::map<std::int64_t, std::string> failures_;  ///< of the others
+  std::map<std::int64_t, ReplaySetup> setups_;    ///< by setup, in order of appearance
+  std::map<std::int64_t, std::string> failures_;  ///< by setup
 };
 
-/// A comment line of a run file.
+/// Comment line of a run file.
 [[nodiscard]] std::string damage_line(const HistoryDamage& damage);
 
-/// Columns of a run file that is written row by row.
+/// Columns of a run file written row by row.
 class RunColumns {
  public:
-  /// The column of this name, made where there is none yet.
+  /// Index of the column, created if missing.
   std::size_t column(const std::string& name);
   [[nodiscard]] const std::vector<std::string>& names() const noexcept { return names_; }
 
@@ -84,22 +83,21 @@ class RunColumns {
 void append_row(std::string& text, const std::vector<double>& values);
 void append_header(std::string& text, const std::vector<std::string>& names);
 
-/// Stands before the step of a cycle; step() takes that step and moves on, passing skipped cycles.
+/// Steps a segment's estimator; step() takes the next cycle and passes skipped ones.
 class SegmentSteps {
  public:
-  /// @throws HistoryError, std::runtime_error when the state at its start cannot be loaded
+  /// @throws HistoryError, std::runtime_error when the start state cannot be loaded
   SegmentSteps(const HistoryReader& reader, const SegmentInfo& segment, const ReplaySetup& setup);
 
-  /// @return false after the last cycle that is recorded whole. @throws HistoryError
+  /// @return false after the last complete cycle. @throws HistoryError
   [[nodiscard]] bool step();
-  /// Of the last step: its cycle, and what came out of it.
+  /// Cycle and offsets of the last step.
   [[nodiscard]] bool has_stepped() const noexcept { return stepped_; }
   [[nodiscard]] std::uint64_t cycle() const noexcept { return cycle_; }
   [[nodiscard]] const OffsetCommand& command() const noexcept { return command_; }
   [[nodiscard]] const Estimator& estimator() const noexcept { return estimator_; }
 
-  /// The next offset that the daemon noted at that cycle. @return none: no more. @throws
-  /// HistoryError
+  /// The next recorded offset of that cycle; null: no more.
   [[nodiscard]] const Record* noted_offset() const noexcept {
     const bool is_one =
         stepped_ && has_record_ && record_.cycle == cycle_ && record_.kind == RecordKind::offset;

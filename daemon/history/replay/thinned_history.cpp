@@ -19,7 +19,7 @@
 namespace thermocomp {
 namespace {
 
-/// Sums of what fell into each span.
+/// Sums of the values in each interval.
 class Means {
  public:
   explicit Means(std::size_t points) : sum_(points, 0.0), count_(points, 0) {}
@@ -39,23 +39,23 @@ class Means {
   std::vector<std::uint32_t> count_;
 };
 
-/// The later of `from_s` and the beginning of the history, where that is before `to_s`.
+/// The later of `from_s` and the history's beginning, if that is before `to_s`.
 double stretch_from(const HistoryReader& reader, double from_s, double to_s) {
-  constexpr double wander_s = 1.0;  // the clocks may part by so much before the first commit
+  constexpr double wander_s = 1.0;  // possible clock drift before the first commit
   double begins_s = to_s;
   for (const SegmentInfo& segment : reader.segments())
     begins_s = std::min(begins_s, 1e-9 * static_cast<double>(segment.wall_ns) - wander_s);
   return begins_s < to_s ? std::max(from_s, begins_s) : from_s;
 }
 
-/// Which chunks of a segment lie in the stretch: [first, end) of their numbers.
+/// Chunks of a segment within the stretch: [first, end) of their numbers.
 struct ChunkRange {
   const SegmentInfo* segment{nullptr};
   std::int64_t first{0};
   std::int64_t end{0};
 };
 
-/// Where the values of one configuration go.
+/// Column indices for the values of one configuration.
 struct Places {
   std::vector<std::size_t> sensors;
   std::vector<std::size_t> offsets;
@@ -95,8 +95,8 @@ class Thinning {
   }
 
  private:
-  /// Cycle of a segment at a wall time, by the clocks' difference at its start. Within a segment of
-  /// some hours the difference wanders by seconds at most, so one span more is read at either end.
+  /// Cycle of a segment at a wall time, by the clock difference at its start. The difference drifts
+  /// by seconds at most within hours; chunk_ranges() adds 10 s at either end.
   [[nodiscard]] static double cycle_at(const SegmentInfo& segment, double wall_s) {
     const double since_s = wall_s - 1e-9 * static_cast<double>(segment.wall_ns);
     return static_cast<double>(segment.first_cycle) +
@@ -141,7 +141,7 @@ class Thinning {
     }
   }
 
-  /// The last one recorded: a span may be shorter than the time between two records.
+  /// Last recorded offset: an interval may be shorter than the time between two records.
   [[nodiscard]] double offset_at(const std::string& axis, double wall_s) const {
     for (const ThinnedColumn& column : result_.columns) {
       if (column.name != axis + "_offset_um") continue;
@@ -199,7 +199,7 @@ class Thinning {
     return row.step() ? row.number(0) : 0;
   }
 
-  /// The first chunk that reaches the cycle, by halving; `end` where none does.
+  /// The first chunk that reaches the cycle, by bisection; `end` if none does.
   std::int64_t first_reaching(const SegmentInfo& segment, std::int64_t end, double cycle) {
     std::int64_t low = 0;
     std::int64_t high = end;
@@ -221,7 +221,7 @@ class Thinning {
   void take(const SegmentInfo& segment, std::int64_t number) {
     try {
       std::optional<ChunkContent> content = read_chunk(database_, segment.id, number);
-      if (!content) return;  // deleted meanwhile, or missing: its span stays empty
+      if (!content) return;  // deleted meanwhile, or missing: its interval stays empty
       ++result_.chunks_read;
       add_records(segment, content->numbers, std::move(content->records));
     } catch (const HistoryError& error) {
@@ -275,7 +275,7 @@ class Thinning {
   double span_s_;
   std::size_t points_;
   RunColumns columns_;
-  std::vector<Means> means_;               ///< one a column
+  std::vector<Means> means_;               ///< one per column
   std::map<std::int64_t, Places> places_;  ///< by setup
   ThinnedHistory result_;
 };

@@ -17,13 +17,13 @@
 namespace thermocomp {
 namespace {
 
-/// Deletion starts before the bound, so that the next commits do not pass it.
+/// Deletion starts below the bound, so that the next commits do not exceed it.
 constexpr double delete_at = 0.9;
-/// A segment is ended after `segment_h`, or a little later: a longer one has a damaged row, which
-/// must not make the others old.
+/// Segments end at `segment_h` or slightly later. Longer ones have a damaged row, which must not
+/// make the others old.
 constexpr double segment_lengths_max = 2.0;
 
-/// What SQLite adds to the name of the database: itself, the write-ahead log, its index.
+/// Endings of SQLite's files: database, write-ahead log, its index.
 constexpr std::array<const char*, 3> file_ends{"", "-wal", "-shm"};
 enum FileOf : std::size_t { database_file, wal_file, index_file };
 
@@ -48,7 +48,7 @@ constexpr const char* tables =
     " PRIMARY KEY (run, number)) WITHOUT ROWID;"
     "INSERT INTO meta VALUES ('format', 'thermocomp history'), ('schema_version', '1');";
 
-/// So many events are kept, or as many as take a twentieth of the file.
+/// The event table keeps at most this many events, and at most a twentieth of the file.
 constexpr double events_max = 20000.0;
 constexpr double event_bytes = 400.0;
 
@@ -69,7 +69,7 @@ class Transaction {
   }
   ~Transaction() {
     if (!committed_) {
-      // May fail where SQLite has rolled back by itself; then there is nothing left to do.
+      // May fail if SQLite has rolled back already.
       sqlite3_exec(database_.handle(), "ROLLBACK", nullptr, nullptr, nullptr);
     }
   }
@@ -124,7 +124,7 @@ HistoryStore::Files HistoryStore::look_at_files() const {
   return files;
 }
 
-/// The file that is not as this left it; empty: none.
+/// The file that another program changed; empty: none.
 std::string HistoryStore::changed_file() const {
   const Files now = look_at_files();
   for (std::size_t i = 0; i < now.size(); ++i)
@@ -158,9 +158,9 @@ bool HistoryStore::open_if_closed(std::int64_t needed_token) {
   return needed_token == 0 || tokens_.count(needed_token) != 0;
 }
 
-/// SQLite would go on writing into files that nobody finds any more. The open connection still has
-/// them: what is committed goes into the database, if that is still in its place; then -wal and
-/// -shm, whosever they are, hold nothing that it needs, and an older one would spoil it.
+/// Another program removed or replaced a file; SQLite would continue to write into unlinked ones.
+/// Moves committed data through the open connection into the database, if that is still in place.
+/// The database then needs no -wal and -shm, and older ones would damage it.
 void HistoryStore::rescue(const std::string& changed) {
   const Files now = look_at_files();
   const bool has_database = now[database_file].is_same_file(files_[database_file]);
@@ -171,20 +171,20 @@ void HistoryStore::rescue(const std::string& changed) {
   int code = SQLITE_ERROR;
   try {
     if (has_database) chunks_before_ = database_->number("SELECT count(*) FROM chunk");
-    // A checkpoint that fails sets both numbers to -1: alike, and nothing has been moved.
+    // A failed checkpoint sets both numbers to -1.
     if (!is_cut)
       code = sqlite3_wal_checkpoint_v2(database_->handle(), nullptr, SQLITE_CHECKPOINT_FULL,
                                        &in_log, &moved);
   } catch (const DatabaseError&) {
-    // The log cannot be read any more: what is in the database is what is left.
+    // The log is unreadable: only the database's content is left.
   }
-  // This connection has the only copy of a removed log: it stays open until the disk takes all of
-  // it. Half of it would leave a database that is damaged.
+  // This connection has the only copy of a removed log and stays open until the disk accepts all of
+  // it: a partial copy would damage the database.
   const DatabaseError failed(code, changed + " was removed, and the disk takes nothing (" +
                                        sqlite3_errstr(code) + "): tried again");
   if (failed.is_for_now() && has_database) throw failed;
   const bool is_moved = code == SQLITE_OK && in_log == moved;
-  // Closing would read the log once more, and remove whatever bears its name.
+  // Otherwise closing would checkpoint again and delete the file with the log's name.
   sqlite3_db_config(database_->handle(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
   close();
   if (has_database ? is_moved || is_cut || !is_wal_ours : is_wal_ours) {
@@ -197,7 +197,7 @@ void HistoryStore::rescue(const std::string& changed) {
                   (has_database ? "opened anew" : "a new history begins"));
 }
 
-/// Held until the end: also while the file is closed, moved aside or missing.
+/// Held until the end, also while the file is closed, moved aside or missing.
 void HistoryStore::lock() {
   if (lock_) return;
   try {
@@ -218,7 +218,7 @@ void HistoryStore::prepare() {
   database_->run("PRAGMA cache_size = -512; PRAGMA synchronous = FULL; PRAGMA temp_store = MEMORY");
   if (is_empty) create();
   database_->run(
-      // Every commit goes on into the database at once: a -wal that somebody removes holds nothing.
+      // Every commit is checkpointed at once, so that a removed -wal costs no data.
       "PRAGMA journal_mode = WAL; PRAGMA journal_size_limit = 1048576;"
       "PRAGMA wal_autocheckpoint = 1");
   if (!has_event_records(*database_))
@@ -232,7 +232,7 @@ void HistoryStore::prepare() {
   files_ = look_at_files();
 }
 
-/// A segment whose rows are not all in the file any more gets no further ones.
+/// A segment with missing rows in the file gets no further ones.
 void HistoryStore::forget_lost_tokens() {
   const std::int64_t chunks = database_->number("SELECT count(*) FROM chunk");
   if (chunks < chunks_before_) {
@@ -248,7 +248,7 @@ void HistoryStore::forget_lost_tokens() {
 }
 
 void HistoryStore::create() {
-  // Before the first table: pages that deleted segments leave can be given back to the system.
+  // Must precede the first table: lets deleted segments' pages be returned to the system.
   database_->run("PRAGMA auto_vacuum = INCREMENTAL");
   Transaction transaction(*database_);
   database_->run(tables);
@@ -300,7 +300,7 @@ void HistoryStore::write(const PendingRows& pending, bool prove) {
     }
   }
   transaction.commit();
-  // Only the newest segment can still get rows.
+  // Only the newest segment can get further rows.
   if (!tokens.empty()) tokens.erase(tokens.begin(), std::prev(tokens.end()));
   tokens_ = std::move(tokens);
   note_files();
@@ -348,7 +348,7 @@ std::int64_t HistoryStore::setup_id(const SegmentSetup& setup) {
 }
 
 void HistoryStore::insert(const SegmentRow& row, Tokens& tokens) {
-  // A commit that was reported as failed may have succeeded all the same.
+  // A commit reported as failed may have succeeded.
   Statement known(*database_, "SELECT id FROM segment WHERE run = ? AND token = ?");
   known.bind(run_).bind(row.token);
   if (known.step()) {
@@ -374,8 +374,7 @@ void HistoryStore::insert(const SegmentRow& row, Tokens& tokens) {
   seal.bind(segment_checksum(*database_, id)).bind(id).run();
 }
 
-/// As with segments: committed by a commit that was reported as failed. Never replaced, whatever is
-/// there.
+/// Whether the row exists, from a commit reported as failed. Existing rows are never replaced.
 bool HistoryStore::is_known(std::int64_t segment, const ChunkRow& row) {
   Statement known(*database_, "SELECT records FROM chunk WHERE segment = ? AND number = ?");
   known.bind(segment).bind(row.number);
@@ -408,7 +407,7 @@ void HistoryStore::insert(const ChunkRow& row, const Tokens& tokens) {
   update.bind(static_cast<std::int64_t>(row.records.size())).bind(segment->second).run();
 }
 
-/// One that is there already was committed by a commit that was reported as failed.
+/// Ignores an existing event, from a commit reported as failed.
 void HistoryStore::insert(const Event& row) {
   const std::string record =
       json_of(row).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
@@ -429,7 +428,7 @@ void HistoryStore::forget_old_events() {
   Statement statement(*database_,
                       "DELETE FROM event WHERE (run, number) IN (SELECT run, number FROM event"
                       " ORDER BY run DESC, number DESC LIMIT -1 OFFSET ?)");
-  // Some more at once, so that not every commit has one to delete.
+  // Deletes some more at once, so that not every commit has to.
   statement.bind(kept - kept / 10).run();
 }
 
@@ -486,7 +485,7 @@ void HistoryStore::keep_within_bounds(std::int64_t current_token) {
                           config_.age_days_max));
   say_deleted(much_count, much_records,
               fmt::format("the file reaches {} MB (history.size_MB_max)", config_.size_MB_max));
-  // Free pages are used again; only what would be beyond the bound is given back.
+  // Free pages are reused; only those beyond the bound are returned.
   if (static_cast<double>(database_->number("PRAGMA page_count")) * page_bytes > bytes_max) {
     database_->run("PRAGMA incremental_vacuum");
   }

@@ -1,15 +1,14 @@
-/// The history's tables: creating them, adding rows, deleting the oldest. One thread at a time.
+/// The history's tables: creation, insertion, deletion of the oldest rows. One thread at a time.
 /// Only for the .cpp files of this folder.
 ///
 /// Tables (PRAGMA user_version 1, PRAGMA application_id "thco"):
-///   meta     key, value: what wrote the file
+///   meta     key, value: the program that wrote the file
 ///   setup    configuration text, model text, model checksum; shared by segments
-///   segment  where a replay can start: run (one number for each start of the daemon), grid, first
-///            and last whole cycle, wall clock, reason, the estimator's exact state, the inputs in
-///            force
-///   chunk    the records of a segment in order, packed (chunk_codec.hpp), one row or more per
-///            commit; wall_minus_grid_ns: wall clock minus the grid's time when it was written
-///   event    what happened (status/event.hpp), the newest
+///   segment  start point of a replay: run (number of the daemon's start), grid, first and last
+///            complete cycle, wall clock, reason, the estimator's exact state, inputs
+///   chunk    the records of a segment in order, packed (chunk_codec.hpp), one or more rows per
+///            commit; wall_minus_grid_ns: wall clock minus grid time when it was written
+///   event    the newest events (status/event.hpp)
 /// segment and chunk have a checksum (database.hpp).
 #pragma once
 
@@ -37,7 +36,7 @@
 namespace thermocomp {
 
 struct SegmentRow {
-  std::int64_t token{0};  ///< the writer's own number; the file has another
+  std::int64_t token{0};  ///< the writer's number; the file has its own
   std::shared_ptr<const SegmentSetup> setup;
   SegmentReason reason{SegmentReason::start};
   Grid grid;
@@ -51,13 +50,13 @@ struct SegmentRow {
 struct ChunkRow {
   std::int64_t segment_token{0};
   std::int64_t number{0};
-  std::int64_t through_cycle{-1};  ///< every cycle up to this one is in this chunk or before it
+  std::int64_t through_cycle{-1};  ///< cycles up to this one are complete with this chunk
   std::int64_t wall_minus_grid_ns{0};
   std::uint64_t count{0};
   std::vector<std::byte> records;
 };
 
-/// What waits for the next commit.
+/// Rows for the next commit.
 class PendingRows {
  public:
   using Row = std::variant<SegmentRow, ChunkRow, Event>;
@@ -68,7 +67,7 @@ class PendingRows {
   [[nodiscard]] const std::vector<Row>& rows() const noexcept { return rows_; }
   [[nodiscard]] std::size_t bytes() const noexcept { return bytes_; }
   [[nodiscard]] std::uint64_t records() const noexcept { return records_; }
-  /// Whether the segment's own row waits here too.
+  /// Whether the segment's own row is pending too.
   [[nodiscard]] bool begins(std::int64_t segment_token) const noexcept;
 
  private:
@@ -79,36 +78,34 @@ class PendingRows {
 
 class HistoryStore {
  public:
-  /// @param wall_clock  since 1970, may be stepped
+  /// @param wall_clock  since 1970, may step
   HistoryStore(const HistoryConfig& config, std::function<nanoseconds()> wall_clock)
       : config_(config), wall_clock_(std::move(wall_clock)) {}
 
-  /// The database, its -wal and its -shm are watched together: where one of them was removed,
-  /// replaced or cut by another program, what is committed is brought into the database, which is
-  /// then opened anew with fresh companions; a database that is gone is begun anew.
+  /// Watches the database, its -wal and its -shm together: if another program removed, replaced or
+  /// truncated one of them, moves committed data into the database and opens it anew with new -wal
+  /// and -shm; a missing database is created.
   /// @param needed_token  a segment that must be in the file already; 0: none
-  /// @return false when that segment is not in the file: its rows have no place there
-  /// @throws DatabaseError; HistoryError when the file is not ours or of a newer version, or
-  ///         another process writes it
+  /// @return false when that segment is not in the file: its rows cannot be stored
+  /// @throws DatabaseError; HistoryError when the file is another program's or of a newer version,
+  ///         or another process writes it
   [[nodiscard]] bool open_if_closed(std::int64_t needed_token);
   void close() noexcept;
-  /// After a change of our own, one that failed too: so the files are left. What another program
-  /// has put in the place of one stays to be noticed.
+  /// Call after every change of our own, also a failed one: records the files' identity. A file
+  /// replaced by another program is still detected.
   void note_files();
-  /// Renames the file (and its log) to `<file>.damaged-<UTC>`.
+  /// Renames the file (and its -wal) to `<file>.damaged-<UTC>`.
   void move_aside(const std::string& why) noexcept;
 
-  /// All rows in one transaction. They count as written once a second connection, which opens the
-  /// files by their names, has read them back.
-  /// @param prove  writes something even without rows, to see whether the disk works
+  /// Writes all rows in one transaction, and reads them back through a second connection, which
+  /// opens the files by name, before they count as written.
+  /// @param prove  writes something even without rows, to test the disk
   void write(const PendingRows& pending, bool prove);
-  /// Deletes the oldest whole segments until size and age are in bounds. The age of a segment is
-  /// the time that was recorded after it, by the monotonic clock: no wall clock, however wrong,
-  /// makes it older.
+  /// Deletes the oldest whole segments until size and age are within their bounds. The age of a
+  /// segment is the time recorded after it by the monotonic clock, independent of the wall clock.
   void keep_within_bounds(std::int64_t current_token);
 
-  /// What somebody must know who looks for rows: segments deleted, files replaced or moved aside;
-  /// one sentence each, since the last call.
+  /// Deleted segments and replaced or moved files since the last call, one sentence each.
   [[nodiscard]] std::vector<std::string> take_news() noexcept { return std::exchange(news_, {}); }
   [[nodiscard]] std::uint64_t deleted() const noexcept { return deleted_; }    ///< segments
   [[nodiscard]] std::uint64_t replaced() const noexcept { return replaced_; }  ///< times
@@ -119,8 +116,8 @@ class HistoryStore {
   using Tokens = std::map<std::int64_t, std::int64_t>;  ///< token -> segment.id
   struct FileIdentity {
     dev_t device{0};
-    ino_t inode{0};  ///< 0: there is none
-    off_t bytes{0};  ///< of the -wal, which shrinks only by its owner
+    ino_t inode{0};  ///< 0: no file
+    off_t bytes{0};  ///< of the -wal, which only its owner may shorten
     [[nodiscard]] bool is_same_file(const FileIdentity& other) const noexcept {
       return device == other.device && inode == other.inode;
     }
@@ -144,7 +141,7 @@ class HistoryStore {
   void delete_segment(std::int64_t id);
   [[nodiscard]] std::int64_t wall_now_ns() const { return wall_clock_().count(); }
   struct OldSegment {
-    std::int64_t id{0};  ///< 0: there is none
+    std::int64_t id{0};  ///< 0: none
     std::int64_t records{0};
     double age_ns{0.0};
   };
@@ -155,8 +152,8 @@ class HistoryStore {
   std::function<nanoseconds()> wall_clock_;
   std::unique_ptr<FileLock> lock_;
   std::unique_ptr<Database> database_;
-  Files files_{};                  ///< as this left them
-  std::int64_t chunks_before_{0};  ///< in the file as it was left; 0: not known
+  Files files_{};                  ///< as of note_files()
+  std::int64_t chunks_before_{0};  ///< chunks in the file when last closed; 0: unknown
   std::int64_t run_{0};
   Tokens tokens_;
   std::uint64_t bytes_{0};

@@ -23,16 +23,16 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr milliseconds drain_period{50};
-/// Rule of the project: a commit at least every 10 s, with room for the commit itself.
+/// The project guarantees a commit every 10 s; leaves time for the commit itself.
 constexpr double commit_s_max = 9.5;
 constexpr std::size_t chunk_bytes_max = std::size_t{512} * 1024;
 constexpr double backoff_s_max = 60.0;
-/// More than anybody misses who asks every second.
+/// More than a client that polls every second can miss.
 constexpr std::ptrdiff_t news_max = 100;
-/// SQLite needs little; the default of 8 MB would count fully once memory is locked.
+/// SQLite needs little; the default of 8 MB would be locked completely.
 constexpr std::size_t stack_bytes = std::size_t{512} * 1024;
 
-/// Where opening fails for want of room, SQLite speaks of an I/O error; a person needs the cause.
+/// SQLite reports a full disk at open as an I/O error: adds the cause.
 std::string disk_note(const std::filesystem::path& file) {
   constexpr std::uint64_t room_bytes_min = std::uint64_t{256} * 1024;
   struct statvfs disk {};
@@ -46,11 +46,11 @@ nanoseconds as_duration(double seconds) {
   return std::chrono::duration_cast<nanoseconds>(std::chrono::duration<double>(seconds));
 }
 
-/// The segment that records go to at the moment.
+/// The segment being recorded.
 struct OpenSegment {
   std::int64_t token{0};
   std::uint64_t first_cycle{0};
-  std::int64_t through_cycle{-1};  ///< last cycle that is recorded whole
+  std::int64_t through_cycle{-1};  ///< last complete cycle
   std::int64_t chunk_through{-1};  ///< ... at the last chunk
   std::int64_t next_chunk{0};
   std::uint64_t bytes{0};
@@ -76,7 +76,7 @@ struct HistoryWriter::Parts {
   std::condition_variable wake;
   bool stopping{false};
   std::vector<KnownSession> sessions;
-  std::vector<Event> events;  ///< that no commit has taken yet
+  std::vector<Event> events;  ///< not yet committed
   std::uint16_t next_session{1};
   HistoryStatistics statistics;
   std::vector<std::string> news;
@@ -88,12 +88,12 @@ struct HistoryWriter::Parts {
   bool running{false};
   std::array<Record, 1024> batch{};
   PendingRows pending;
-  std::optional<OpenSegment> segment;  ///< where records go; none: they are dropped
+  std::optional<OpenSegment> segment;  ///< target of records; none: they are dropped
   KnownSession segment_session;
   std::int64_t next_token{1};
   std::uint64_t dropped{0};
   bool lost_before{false};  ///< the next segment begins after a gap
-  bool requested{false};    ///< a snapshot was asked for and has not come yet
+  bool requested{false};    ///< a snapshot is pending
   double backoff_s{0.0};
   nanoseconds next_commit{};
 
@@ -201,7 +201,7 @@ void HistoryWriter::Parts::begin_segment(const Record& record) {
   const std::lock_guard lock(mutex);
   if (reason == SegmentReason::gap) ++statistics.gaps;
   std::erase_if(sessions, [&](const KnownSession& old) {
-    // Older ones only: a later one's first segment may still be in the ring. Numbers wrap around.
+    // Older sessions only (numbers wrap around): a newer one's first segment may be in the ring.
     return static_cast<std::int16_t>(old.session->id - known.session->id) < 0 &&
            old.session.use_count() == 1;
   });
@@ -214,8 +214,8 @@ void HistoryWriter::Parts::close_segment(std::int64_t last_whole_cycle) {
   segment.reset();
 }
 
-/// What was recorded since the last chunk becomes a row; also without records, since it says up to
-/// which cycle nothing changed.
+/// Makes a chunk of the records since the last one; without records too, since it marks cycles
+/// without changes as complete.
 void HistoryWriter::Parts::cut_chunk() {
   if (!segment) return;
   if (segment->encoder.count() == 0 && segment->through_cycle == segment->chunk_through) return;
@@ -257,7 +257,7 @@ bool HistoryWriter::Parts::write() {
   try {
     const bool is_in_file = segment && !pending.begins(segment->token);
     if (!store.open_if_closed(is_in_file ? segment->token : 0)) {
-      // Another file than before: what belongs to a segment of the old one has no place in it.
+      // The file was replaced: rows of a segment in the old one cannot be stored.
       drop_pending();
     }
     store.write(pending, !is_working());
@@ -265,7 +265,7 @@ bool HistoryWriter::Parts::write() {
     store.keep_within_bounds(segment ? segment->token : 0);
   } catch (const DatabaseError& error) {
     if (error.is_damage()) store.move_aside(error.what());
-    // On a full disk it stays open: opening anew would need room, for this thread as for a reader.
+    // Stays open on a full disk: opening again would need space.
     if (error.is_for_now())
       store.note_files();
     else
@@ -297,7 +297,7 @@ bool HistoryWriter::Parts::is_working() const {
   return statistics.working;
 }
 
-/// The rows are on disk: whatever fails from here on, they must not be written again.
+/// The rows are on disk and must not be written again, whatever fails afterwards.
 void HistoryWriter::Parts::written(std::uint64_t records) {
   pending.clear();
   const std::lock_guard lock(mutex);
@@ -388,8 +388,7 @@ void HistoryWriter::open() {
   try {
     static_cast<void>(parts_->store.open_if_closed(0));
   } catch (const DatabaseError& error) {
-    // The thread tries again. Any other HistoryError says that the file is not ours to write,
-    // which the caller must know.
+    // The thread retries. After other HistoryErrors we must not write this file at all.
     if (error.is_damage()) parts_->store.move_aside(error.what());
     parts_->store.close();
     parts_->failed(error.what());

@@ -1,4 +1,4 @@
-/// Puts what the cycle recorded on disk.
+/// Writes the cycle's records to disk.
 #pragma once
 
 #include <chrono>
@@ -17,14 +17,14 @@
 
 namespace thermocomp {
 
-/// Where the writer gets its times from.
+/// The writer's clocks.
 struct WriterClocks {
-  std::function<nanoseconds()> monotonic;  ///< the grid's
-  std::function<nanoseconds()> wall;       ///< since 1970, may be stepped
+  std::function<nanoseconds()> monotonic;  ///< of the grid
+  std::function<nanoseconds()> wall;       ///< since 1970, may step
 };
 [[nodiscard]] WriterClocks system_clocks();
 
-/// For the operator.
+/// Statistics for the status.
 struct HistoryStatistics {
   bool working{false};       ///< the last attempt to write succeeded
   std::uint64_t records{0};  ///< committed since the start
@@ -34,54 +34,54 @@ struct HistoryStatistics {
   std::uint64_t gaps{0};      ///< segments that begin after a loss
   std::uint64_t segments{0};  ///< in the file
   std::uint64_t deleted{0};   ///< segments, for size or age
-  std::uint64_t replaced{0};  ///< times that the file, its -wal or its -shm was not ours any more
-  std::uint64_t bytes{0};     ///< of the file, without its write-ahead log
+  std::uint64_t replaced{0};  ///< times that the file, its -wal or its -shm was replaced
+  std::uint64_t bytes{0};     ///< size of the file, without its write-ahead log
   double last_commit_age_s{not_a_number};
-  std::string last_error;  ///< empty when the last attempt was good
+  std::string last_error;  ///< empty after a successful attempt
 };
 
-/// Drains the ring on a thread of its own. Not on main, where the watchdog is fed and the
-/// operators' socket answered: fsync on a worn SD card or a disk that spins up takes seconds, and a
-/// stalled disk must neither get the daemon killed nor leave an operator without an answer.
+/// Drains the ring on its own thread: fsync takes seconds on a worn SD card or a disk that spins
+/// up, and a stalled disk must neither stop main from feeding the watchdog nor from answering
+/// operators.
 ///
-/// Bounded by size and age: the oldest whole segments go first; the segment being written never
-/// does, so one that grows beyond an eighth of the bound is ended and another begun.
-/// Disk full, I/O error: what is recorded waits in memory (up to `memory_bytes_max`) and is tried
-/// again with growing pauses; beyond that it is dropped, counted, and the next segment starts
-/// fresh.
+/// Size and age are bounded: the oldest whole segments are deleted first. The current segment is
+/// never deleted, so it is ended when it exceeds an eighth of the bound.
+/// Disk full or I/O error: records wait in memory (up to `memory_bytes_max`) and are retried with
+/// growing pauses; beyond that they are dropped and counted, and a new segment begins.
 class HistoryWriter {
  public:
   static constexpr std::size_t memory_bytes_max = 4u << 20;
 
-  /// Opens nothing yet.
+  /// Opens nothing.
   HistoryWriter(const HistoryConfig& config, const Grid& grid, std::string program_version,
                 std::size_t ring_records = 65536, WriterClocks clocks = system_clocks());
   ~HistoryWriter();
   HistoryWriter(const HistoryWriter&) = delete;
   HistoryWriter& operator=(const HistoryWriter&) = delete;
 
-  /// A recorder for one configuration; again after a reload. Any ordinary thread. The recorder must
-  /// not outlive the writer.
+  /// Creates the recorder of a configuration, also after a reload. Any ordinary thread. The
+  /// recorder must not outlive the writer.
   [[nodiscard]] std::unique_ptr<CycleRecorder> make_recorder(const SegmentSetup& setup,
                                                              const Estimator& estimator);
-  /// Something has happened; it is on disk with the next commit. Any ordinary thread.
+  /// Adds an event to the next commit. Any ordinary thread.
   void note(Event event);
-  /// Opens the file and starts the thread. A damaged file is moved aside, which is among the news;
-  /// a disk that does not work is tried again for ever.
-  /// @throws HistoryError when the file is of a newer version or of another program, or another
-  ///         process writes it
+  /// Opens the file and starts the thread. A damaged file is moved aside, with an entry in the
+  /// news; a failing disk is retried without limit.
+  /// @throws HistoryError when the file is of a newer version or another program, or another
+  /// process
+  ///         writes it
   void start();
-  /// What start() does before it starts the thread, and what the thread does every 50 ms: for
-  /// callers with a time of their own and no thread.
+  /// For callers with their own clock and without the thread: start() without the thread, and the
+  /// work that the thread does every 50 ms.
   void open();
   void work();
-  /// Writes what is left and closes the file. Gives up on a disk that does not work after one try.
+  /// Writes pending rows and closes the file. Gives up on a failing disk after one attempt.
   void stop() noexcept;
-  /// The same for a caller that waits for no disk.
-  /// @return false: it has not ended, and only the end of the process will end it
+  /// The same with a time-out.
+  /// @return false: still running, until the process ends
   [[nodiscard]] bool stop_within(std::chrono::seconds at_most) noexcept;
   [[nodiscard]] HistoryStatistics statistics() const;
-  /// What happened to rows or files since the last call, one sentence each. Any ordinary thread.
+  /// News about rows or files since the last call, one sentence each. Any ordinary thread.
   [[nodiscard]] std::vector<std::string> take_news();
 
  private:
