@@ -1,4 +1,4 @@
-// The method `controller_state`: what it takes, what it refuses, what it answers.
+// The method `controller_state`: accepted and refused reports, and the answers.
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
 
@@ -47,7 +47,7 @@ TEST_CASE("a report becomes the controller's state and is answered", "[daemon][b
   CHECK(rig.answer(report())["offsets_um"]["x"] == 2.75);
 }
 
-TEST_CASE("null is not known", "[daemon][bridge]") {
+TEST_CASE("null means unknown", "[daemon][bridge]") {
   Rig rig;
   json told = report();
   told["signals"]["x_mm"] = nullptr;
@@ -58,8 +58,7 @@ TEST_CASE("null is not known", "[daemon][bridge]") {
   CHECK(state.signals[1] == 1.0);
 }
 
-TEST_CASE("a report that cannot be understood is refused, counted and changes nothing",
-          "[daemon][bridge]") {
+TEST_CASE("an invalid report is refused, counted and has no effect", "[daemon][bridge]") {
   const auto broken = [](const char* pointer, const json& value) {
     json told = report();
     told[json::json_pointer(pointer)] = value;
@@ -95,7 +94,7 @@ TEST_CASE("a report that cannot be understood is refused, counted and changes no
   CHECK_FALSE(state.online);
 }
 
-TEST_CASE("a second bridge is told so", "[daemon][bridge]") {
+TEST_CASE("a second bridge is refused", "[daemon][bridge]") {
   Rig rig;
   rig.answer(report());
   json other = report();

@@ -1,5 +1,4 @@
-// Main's side of the cycle, with a cycle that steps when the test says so and a clock that is a
-// number.
+// CycleHandle, with cycle and clock advanced by the test.
 #include "daemon/cycle/cycle_handle.hpp"
 
 #include <vector>
@@ -42,7 +41,7 @@ ThermalModel model(const std::vector<std::string>& axes, double gain_um_per_K) {
   return model;
 }
 
-/// A cycle of 10 ms whose steps are taken by the test.
+/// A cycle of 10 ms, stepped by the test.
 struct SteppedCycle {
   explicit SteppedCycle(const std::vector<std::string>& axes = {"z"})
       : controller({"none", axes.size()}),
@@ -81,7 +80,7 @@ constexpr Command measured{CommandKind::measured, 0, 3.0};
 
 }  // namespace
 
-TEST_CASE("a command that was withdrawn never reaches the consumer", "[cycle]") {
+TEST_CASE("a withdrawn command never reaches the consumer", "[cycle]") {
   CommandQueue queue;
   const auto first = queue.try_push(disable);
   const auto second = queue.try_push(measured);
@@ -94,13 +93,13 @@ TEST_CASE("a command that was withdrawn never reaches the consumer", "[cycle]") 
   CHECK(command.kind == CommandKind::measured);
   CHECK_FALSE(queue.withdraw(*second));
   CHECK(queue.taken() == 2);
-  // Also when its place has been used again.
+  // Also after its slot has been reused.
   for (std::size_t i = 0; i < CommandQueue::capacity; ++i) REQUIRE(queue.try_push(disable));
   CHECK_FALSE(queue.withdraw(*second));
   CHECK_FALSE(queue.try_push(disable));
 }
 
-TEST_CASE("a command is done with the step that takes it, and the report says so", "[cycle]") {
+TEST_CASE("a command is done with the step that takes it, and the report includes it", "[cycle]") {
   SteppedCycle stepped;
   const auto outcome = stepped.handle.send(disable, stepped.now);
   REQUIRE(outcome);
@@ -115,7 +114,7 @@ TEST_CASE("a command is done with the step that takes it, and the report says so
   CHECK_FALSE(stepped.handle.is_busy());
 }
 
-TEST_CASE("a command that is not taken in time is withdrawn for good", "[cycle]") {
+TEST_CASE("a command that is not taken in time is withdrawn permanently", "[cycle]") {
   SteppedCycle stepped;
   const auto outcome = stepped.handle.send(disable, stepped.now);
   stepped.handle.poll(stepped.now + CycleHandle::patience - 1ms);
@@ -128,7 +127,7 @@ TEST_CASE("a command that is not taken in time is withdrawn for good", "[cycle]"
   CHECK(stepped.done.empty());
 }
 
-TEST_CASE("new parts that is not taken in time is withdrawn, and the next one is taken",
+TEST_CASE("new parts that are not taken in time are withdrawn, and the next ones are taken",
           "[cycle]") {
   SteppedCycle stepped;
   auto late = stepped.handle.replace(stepped.next_parts(2.0), stepped.now);
@@ -138,7 +137,7 @@ TEST_CASE("new parts that is not taken in time is withdrawn, and the next one is
   CHECK_FALSE(stepped.handle.replacing());
   for (int i = 0; i < 20; ++i) stepped.step();
   CHECK(stepped.gain() == 1.0);
-  // What follows is told by, and done to, the parts that runs.
+  // Later commands and reports are those of the running parts.
   REQUIRE(stepped.handle.send(disable, stepped.now));
   stepped.step();
   stepped.handle.poll(stepped.now);
@@ -151,18 +150,18 @@ TEST_CASE("new parts that is not taken in time is withdrawn, and the next one is
   CHECK_FALSE(stepped.handle.report().enabled);
 }
 
-TEST_CASE("a change-over that main sees late is finished late, not left half done", "[cycle]") {
+TEST_CASE("a change-over that main sees late is completed late", "[cycle]") {
   SteppedCycle stepped;
   auto outcome = stepped.handle.replace(stepped.next_parts(2.0), stepped.now);
   stepped.step();
-  // Until main looks, configuration and reports are those of the old parts.
+  // Until poll(), configuration and reports are those of the old parts.
   CHECK(stepped.gain() == 1.0);
   stepped.handle.poll(stepped.now + 10 * CycleHandle::patience);
   CHECK(*outcome == Outcome::done);
   CHECK(stepped.gain() == 2.0);
 }
 
-TEST_CASE("a command of the step in which the parts changes is reported by the new one",
+TEST_CASE("a command of the step in which the parts change is reported by the new ones",
           "[cycle]") {
   SteppedCycle stepped;
   auto parts = stepped.handle.replace(stepped.next_parts(2.0), stepped.now);
@@ -174,7 +173,7 @@ TEST_CASE("a command of the step in which the parts changes is reported by the n
   CHECK_FALSE(stepped.handle.estimator().persistent_state(stepped.handle.report()).enabled);
 }
 
-TEST_CASE("new parts waits for commands that name an axis: it may number them otherwise",
+TEST_CASE("new parts wait for commands that name an axis, as they may number axes differently",
           "[cycle]") {
   SteppedCycle stepped({"y", "z"});
   const auto command = stepped.handle.send(measured, stepped.now);  // of y
@@ -190,14 +189,14 @@ TEST_CASE("new parts waits for commands that name an axis: it may number them ot
   CHECK(stepped.handle.report().axes[1].measured_um == 3.0);
 }
 
-TEST_CASE("more commands than the queue has places are refused, not lost", "[cycle]") {
+TEST_CASE("commands beyond the queue's capacity are refused, not lost", "[cycle]") {
   SteppedCycle stepped;
   std::vector<CycleHandle::Tracked> sent;
   while (auto outcome = stepped.handle.send(disable, stepped.now)) sent.push_back(outcome);
   CHECK(sent.size() == CommandQueue::capacity);
   stepped.handle.poll(stepped.now + CycleHandle::patience);
   for (const auto& outcome : sent) CHECK(*outcome == Outcome::withdrawn);
-  // Their places are free again once the cycle has passed over them.
+  // Their slots are free once the cycle has skipped them.
   CHECK_FALSE(stepped.handle.send(disable, stepped.now));
   stepped.step();
   const auto outcome = stepped.handle.send(disable, stepped.now);
@@ -207,7 +206,7 @@ TEST_CASE("more commands than the queue has places are refused, not lost", "[cyc
   CHECK(*outcome == Outcome::done);
 }
 
-TEST_CASE("after the cycle's end all that it did is done, and nothing else", "[cycle]") {
+TEST_CASE("after the cycle's end exactly the commands it carried out are done", "[cycle]") {
   SteppedCycle stepped;
   const auto taken = stepped.handle.send(disable, stepped.now);
   auto parts = stepped.handle.replace(stepped.next_parts(2.0), stepped.now);

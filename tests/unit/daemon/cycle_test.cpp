@@ -1,4 +1,4 @@
-// The cycle and its parts: what is counted, what is left out, what is handed over.
+// The cycle and its parts: timing, skipped cycles, hand-over.
 #include "daemon/cycle/cycle.hpp"
 
 #include <algorithm>
@@ -27,7 +27,7 @@ std::atomic<bool> sleep_fails{false};
 
 }  // namespace
 
-/// Takes the place of the C library's, to fail as a filter of system calls would make it.
+/// Replaces the C library's, to fail as under a system call filter.
 extern "C" int clock_nanosleep(clockid_t clock, int flags, const timespec* time, timespec* left) {
   if (sleep_fails) return EPERM;
   return syscall(SYS_clock_nanosleep, clock, flags, time, left) == 0 ? 0 : errno;
@@ -35,7 +35,7 @@ extern "C" int clock_nanosleep(clockid_t clock, int flags, const timespec* time,
 
 namespace {
 
-/// Called once a cycle; can be told to be slow, which no real source may be.
+/// Called once per cycle; can be made slow, which a real source must not be.
 class SlowSource final : public SensorSource {
  public:
   void start() override {}
@@ -73,7 +73,7 @@ std::unique_ptr<CycleParts> parts(double gain_um_per_K) {
   return std::make_unique<CycleParts>(Estimator(one_sensor(), one_input(gain_um_per_K)));
 }
 
-/// A cycle of 10 ms on a thread of its own, ended with the scope.
+/// A cycle of 10 ms on its own thread, ended with the scope.
 struct RunningCycle {
   SlowSource source;
   DryRunController controller{{"none", 1}};
@@ -101,7 +101,7 @@ struct RunningCycle {
 
 }  // namespace
 
-TEST_CASE("a histogram's percentiles are those of the samples to 1.6 percent", "[histogram]") {
+TEST_CASE("a histogram's percentiles are within 1.6 percent of the samples'", "[histogram]") {
   const unsigned seed = GENERATE(range(0u, 20u));
   std::mt19937 random(seed);
   std::lognormal_distribution<double> durations(10.0, 2.0);
@@ -123,7 +123,7 @@ TEST_CASE("a histogram's percentiles are those of the samples to 1.6 percent", "
   }
 }
 
-TEST_CASE("an empty histogram has no percentile and a negative duration counts as none",
+TEST_CASE("an empty histogram has no percentile and a negative duration counts as 0",
           "[histogram]") {
   DurationHistogram histogram;
   CHECK(histogram.percentile(0.99) == 0ns);
@@ -134,7 +134,7 @@ TEST_CASE("an empty histogram has no percentile and a negative duration counts a
   CHECK(histogram.count() == 0);
 }
 
-TEST_CASE("commands come out as they went in and a full queue refuses", "[cycle]") {
+TEST_CASE("the command queue keeps the order and refuses when full", "[cycle]") {
   CommandQueue queue;
   Command command;
   CHECK_FALSE(queue.try_pop(command));
@@ -156,12 +156,11 @@ TEST_CASE("cycles that were overrun are counted and the phase is kept", "[cycle]
   const int seen = running.source.seen.load();
   REQUIRE(running.eventually([&] { return running.source.seen.load() >= seen + 20; }));
   const Report& report = running.cycle.report();
-  // Every step's time lies on the grid, before and after.
+  // Every step's time is on the grid, before and after.
   CHECK((report.now - running.grid.start) % running.grid.period == 0ns);
 }
 
-TEST_CASE("what is noted at the end stands before the cycles that were skipped by then",
-          "[cycle]") {
+TEST_CASE("offsets recorded at the end precede the cycles skipped by then", "[cycle]") {
   DryRunController controller{{"none", 1}};
   const Grid grid{1h, 10ms};
   RecordRing ring{256};
@@ -170,7 +169,7 @@ TEST_CASE("what is noted at the end stands before the cycles that were skipped b
                                                        grid, 1s, recorded->estimator);
   Cycle cycle{grid, {}, controller, 1, std::move(recorded)};
   REQUIRE(cycle.begin(grid.start) == 0);
-  CHECK_FALSE(cycle.finish_recording());  // a daemon that is ended while it starts
+  CHECK_FALSE(cycle.finish_recording());  // a daemon ended during its start
   cycle.step(0);
   cycle.step(1);
   REQUIRE(cycle.next_after(1, grid.time_of(5)) == 5);
@@ -191,7 +190,7 @@ TEST_CASE("what is noted at the end stands before the cycles that were skipped b
   CHECK(skipped == (goes_on ? std::vector<std::uint64_t>{2} : std::vector<std::uint64_t>{}));
 }
 
-TEST_CASE("a handed over parts takes the place of the old one at once and bumpless", "[cycle]") {
+TEST_CASE("parts handed over replace the old ones in one step, without a jump", "[cycle]") {
   RunningCycle running;
   REQUIRE(running.eventually([&] { return running.cycle.report().cycle > 0; }));
   REQUIRE(running.cycle.send({CommandKind::disable, 0, 0.0}));
@@ -203,14 +202,14 @@ TEST_CASE("a handed over parts takes the place of the old one at once and bumple
   REQUIRE(running.eventually([&] { return (retired = running.cycle.take_retired()) != nullptr; }));
   CHECK(retired->estimator.model().matrix_um_per_K[0][0] == 1.0);
   CHECK(running.cycle.parts().estimator.model().matrix_um_per_K[0][0] == 2.0);
-  // The operator's switch and the reference are the machine's, not the configuration's.
+  // Switch and reference belong to the machine, not to the configuration.
   CHECK(running.cycle.report().mode == Mode::disabled);
   CHECK(running.cycle.report().inputs[0].reference_degC == 20.0);
 }
 
 namespace {
 
-/// A machine that warms up with every step, stepped by the test.
+/// A machine that warms up with every step; stepped by the test.
 struct WarmingMachine {
   class Source final : public SensorSource {
    public:
@@ -251,7 +250,7 @@ struct WarmingMachine {
   std::uint64_t next{0};
 };
 
-/// Three quarters of its effect follow late.
+/// Three quarters of its effect are lagged.
 ThermalModel late_input() {
   ThermalModel model = one_input(2.0);
   model.terms.push_back(
@@ -280,7 +279,7 @@ double better(CycleParts& parts) {
 
 }  // namespace
 
-TEST_CASE("a candidate changes no bit of what is sent", "[cycle][candidate]") {
+TEST_CASE("a candidate does not change any bit of the sent offsets", "[cycle][candidate]") {
   auto without = contested(1.0, 2.0);
   without->candidate.reset();
   WarmingMachine alone(std::move(without), 100ms, 0.001);
@@ -296,7 +295,7 @@ TEST_CASE("a candidate changes no bit of what is sent", "[cycle][candidate]") {
   CHECK(beside.cycle.parts().candidate->score()[0].probings == 40.0);
 }
 
-TEST_CASE("each probing scores the model and the candidate", "[cycle][candidate]") {
+TEST_CASE("each probing scores model and candidate", "[cycle][candidate]") {
   WarmingMachine machine(contested(1.0, 1.9));
   for (int i = 0; i < 20; ++i) {
     machine.step(2);
@@ -304,13 +303,12 @@ TEST_CASE("each probing scores the model and the candidate", "[cycle][candidate]
   }
   const ModelContest::AxisScore score = machine.cycle.parts().candidate->score()[0];
   CHECK(score.probings == 20.0);
-  // Off by 1 and by 0.1 um/K, at the same temperatures.
+  // Errors of 1 and 0.1 um/K, at the same temperatures.
   CHECK(score.model_um2 == Approx(100.0 * score.candidate_um2));
   CHECK(better(machine.cycle.parts()) > 0.99);
 }
 
-TEST_CASE("a score outlives restart and reload, and counts for its two models only",
-          "[cycle][candidate]") {
+TEST_CASE("a score survives restart and reload, for its two models only", "[cycle][candidate]") {
   WarmingMachine machine(contested(1.0, 2.0));
   for (int i = 0; i < 8; ++i) {
     machine.step(2);
@@ -335,13 +333,12 @@ TEST_CASE("a score outlives restart and reload, and counts for its two models on
   machine.step();
   REQUIRE(machine.cycle.take_retired() != nullptr);
   CHECK(better(machine.cycle.parts()) == Approx(expected));
-  // It knows the machine's reference: its errors go on to be none.
+  // It has the machine's reference: its errors stay 0.
   machine.probe();
   CHECK(machine.cycle.parts().candidate->score()[0].candidate_um2 == Approx(0.0).margin(1e-9));
 }
 
-TEST_CASE("a promoted candidate goes on with what its lags and inputs have lived through",
-          "[cycle][candidate]") {
+TEST_CASE("a promoted candidate keeps the state of its lags and inputs", "[cycle][candidate]") {
   const bool promotes = GENERATE(true, false);
   ThermalModel other_input = one_input(2.0);
   other_input.inputs = {"other_degC"};
@@ -363,7 +360,7 @@ TEST_CASE("a promoted candidate goes on with what its lags and inputs have lived
   CHECK((displacement_um == Approx(expected_um)) == promotes);
 }
 
-TEST_CASE("a system that refuses to sleep is counted, and no cycle runs ahead of time", "[cycle]") {
+TEST_CASE("a failed sleep is counted, and no cycle runs ahead of time", "[cycle]") {
   RunningCycle running;
   REQUIRE(running.eventually([&] { return running.source.seen > 3; }));
   CHECK(running.cycle.timing().failed_sleeps == 0);
@@ -373,6 +370,6 @@ TEST_CASE("a system that refuses to sleep is counted, and no cycle runs ahead of
   running.eventually([&] { return running.source.seen >= seen + 20; });
   const auto took = std::chrono::steady_clock::now() - began;
   sleep_fails = false;
-  CHECK(took > 180ms);  // a cycle more may have been under way
+  CHECK(took > 180ms);  // one more cycle may have been under way
   CHECK(running.cycle.timing().failed_sleeps > 10);
 }

@@ -1,4 +1,4 @@
-// What happened, in order and with how long it lasted, in a time of the test's own.
+// The event journal, with a clock set by the test.
 #include "daemon/status/event_journal.hpp"
 
 #include <catch2/catch.hpp>
@@ -22,12 +22,12 @@ struct Bench {
 
 }  // namespace
 
-TEST_CASE("an outage is a fault, a recovery, and how long it lasted", "[daemon][events]") {
+TEST_CASE("an outage has a fault, a recovery and a duration", "[daemon][events]") {
   Bench bench;
   bench.journal.fault({.subject = bed, .code = "no_answer"});
   bench.pass(2s);
-  bench.journal.fault({.subject = bed, .code = "no_answer"});  // nothing new
-  bench.journal.recovery({SubjectKind::sensor, "table"});      // never was bad
+  bench.journal.fault({.subject = bed, .code = "no_answer"});  // repeated
+  bench.journal.recovery({SubjectKind::sensor, "table"});      // had no fault
   REQUIRE(bench.journal.events().size() == 1);
   bench.journal.fault({.subject = bed, .code = "stale"});
   bench.pass(26s);
@@ -39,15 +39,15 @@ TEST_CASE("an outage is a fault, a recovery, and how long it lasted", "[daemon][
   CHECK(events[1].code == "stale");
   CHECK(events[2].kind == EventKind::recovery);
   CHECK(events[2].code == "stale");
-  CHECK(events[2].duration_s == Approx(28.0));  // from the first fault on
+  CHECK(events[2].duration_s == Approx(28.0));  // since the first fault
   CHECK(events[2].number == 3);
   CHECK(events[2].wall_s == 1'700'000'028.0);
 }
 
-TEST_CASE("a fault that comes and goes is one outage of four events", "[daemon][events]") {
+TEST_CASE("an intermittent fault is one outage of four events", "[daemon][events]") {
   Bench bench;
   int told = 0;
-  for (int i = 0; i < 1200; ++i) {  // four times a second for five minutes
+  for (int i = 0; i < 1200; ++i) {  // 4 Hz for five minutes
     told +=
         bench.journal.fault({.subject = bed, .code = i % 4 == 0 ? "no_answer" : "stale"}) ? 1 : 0;
     bench.pass(125ms);
@@ -63,21 +63,21 @@ TEST_CASE("a fault that comes and goes is one outage of four events", "[daemon][
   const auto ended = bench.journal.settle();
   REQUIRE(ended.size() == 1);
   CHECK(ended[0].kind == EventKind::recovery);
-  CHECK(ended[0].duration_s == Approx(300.0).margin(0.2));  // to where it went away
+  CHECK(ended[0].duration_s == Approx(300.0).margin(0.2));  // to its last end
   CHECK_FALSE(bench.journal.lasts(bed));
   const auto& events = bench.journal.events();
   REQUIRE(events.size() == 4);
   CHECK(events[0].code == "no_answer");
   CHECK(events[1].kind == EventKind::recovery);
   CHECK(what_text(events[2]) == "stale, comes and goes");
-  // What comes later is another outage.
+  // A later fault is another outage.
   bench.pass(60s);
   CHECK(bench.journal.fault({.subject = bed, .code = "no_answer"}));
   bench.pass(1s);
   CHECK(bench.journal.recovery(bed) == Approx(1.0));
 }
 
-TEST_CASE("each kind of fault is reported once in an outage", "[daemon][events]") {
+TEST_CASE("each kind of fault is reported once per outage", "[daemon][events]") {
   Bench bench;
   for (int i = 0; i < 1000; ++i) {
     bench.journal.fault({.subject = bed, .code = i % 2 == 0 ? "no_answer" : "stale"});
@@ -88,7 +88,7 @@ TEST_CASE("each kind of fault is reported once in an outage", "[daemon][events]"
   CHECK(bench.journal.recovery(bed) == Approx(250.0));
 }
 
-TEST_CASE("a clock that is set changes no duration", "[daemon][events]") {
+TEST_CASE("setting the clock does not change durations", "[daemon][events]") {
   Bench bench;
   bench.journal.mode("compensating");
   bench.pass(60s);
@@ -103,7 +103,7 @@ TEST_CASE("a clock that is set changes no duration", "[daemon][events]") {
   CHECK(events[1].duration_s == Approx(60.0));
 }
 
-TEST_CASE("what ended lately is reported, newest first", "[daemon][events]") {
+TEST_CASE("recently ended outages are reported, newest first", "[daemon][events]") {
   Bench bench;
   for (const char* name : {"a", "b", "c"}) {
     const Subject subject{SubjectKind::bus, name};

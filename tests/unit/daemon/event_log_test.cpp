@@ -1,4 +1,4 @@
-// What of the reports becomes an event, in a time of the test's own.
+// Events from reports, with a clock set by the test.
 #include "daemon/status/event_log.hpp"
 
 #include <algorithm>
@@ -49,7 +49,7 @@ TEST_CASE("a suspected sensor is a fault with its size, and recovers", "[daemon]
   bench.report.sensors[1].suspected_size_K = -2.04;
   bench.report.reasons = static_cast<std::uint32_t>(Reason::sensor_suspected);
   bench.pass(1s);
-  bench.report.sensors[1].suspected_size_K = -2.4;  // the same lie, followed on: no news
+  bench.report.sensors[1].suspected_size_K = -2.4;  // the same error, re-estimated: no event
   bench.pass(59s);
   bench.report.sensors[1].suspected = false;
   bench.report.reasons = 0;
@@ -66,7 +66,7 @@ TEST_CASE("a suspected sensor is a fault with its size, and recovers", "[daemon]
   CHECK(reason[1].duration_s == Approx(60.0));
 }
 
-TEST_CASE("a target that flickers about its bound is one outage", "[daemon][events]") {
+TEST_CASE("a target that oscillates about its bound is one outage", "[daemon][events]") {
   Bench bench;
   for (int i = 0; i < 100; ++i) {
     bench.report.reasons = i % 2 == 0 ? static_cast<std::uint32_t>(Reason::at_bound) : 0u;
@@ -79,10 +79,10 @@ TEST_CASE("a target that flickers about its bound is one outage", "[daemon][even
   const auto told = bench.about("reason at_bound");
   REQUIRE(told.size() == 2);
   CHECK(told[1].kind == EventKind::recovery);
-  CHECK(told[1].duration_s == Approx(99 * 20.0));  // to where it went away
+  CHECK(told[1].duration_s == Approx(99 * 20.0));  // to its last end
 }
 
-TEST_CASE("a block that is lost and back four times a second makes a few lines an outage",
+TEST_CASE("a block that is lost and back four times a second makes a few lines per outage",
           "[daemon][events]") {
   std::ostringstream text;
   auto before = spdlog::default_logger();
@@ -98,7 +98,7 @@ TEST_CASE("a block that is lost and back four times a second makes a few lines a
   bench.report.inputs.resize(2);
   bench.report.inputs[0].good = bench.report.inputs[1].good = true;
   const auto lost = static_cast<std::uint32_t>(Reason::block_lost);
-  for (int i = 0; i < 2400; ++i) {  // of ten minutes
+  for (int i = 0; i < 2400; ++i) {  // ten minutes
     const bool is_lost = i % 2 == 0;
     bench.report.sensors[0].fault = is_lost ? Fault::no_answer : Fault::none;
     bench.report.inputs[0].good = !is_lost;
@@ -119,7 +119,7 @@ TEST_CASE("a block that is lost and back four times a second makes a few lines a
   CHECK(bench.journal.events().back().code == "compensating");
 }
 
-TEST_CASE("what has no limit is over at once", "[daemon][events]") {
+TEST_CASE("a reason without a limit ends at once", "[daemon][events]") {
   Bench bench;
   bench.report.reasons = static_cast<std::uint32_t>(Reason::block_lost);
   bench.report.mode = Mode::holding;
@@ -132,7 +132,7 @@ TEST_CASE("what has no limit is over at once", "[daemon][events]") {
   CHECK(told[1].duration_s == Approx(7.0));
 }
 
-TEST_CASE("writes that fail are one outage with what failed, a single one is none",
+TEST_CASE("failing writes are one outage with its cause, a single failure is none",
           "[daemon][events]") {
   Bench bench;
   ControllerHealth controller;
@@ -142,7 +142,7 @@ TEST_CASE("writes that fail are one outage with what failed, a single one is non
   bench.log.note_controller(controller);
   controller.write.error = "the controller refuses writes (function 16, register 100)";
   controller.write.confirmed_at = 2s;
-  bench.log.note_controller(controller);  // since the last look another was confirmed
+  bench.log.note_controller(controller);  // another one was confirmed since the last call
   CHECK(bench.about("writes to controller plc").empty());
   for (int i = 0; i < 10; ++i) {
     bench.monotonic += 1s;

@@ -1,4 +1,4 @@
-/// What the tests of a history look at, and how they spoil its file.
+/// Checks of a history, and ways to damage its file.
 #pragma once
 
 #include <thread>

@@ -1,4 +1,4 @@
-// What leaves a history: run files and events.
+// Exports of a history: run files and events.
 #include <cmath>
 #include <sstream>
 #include <stdexcept>
@@ -22,8 +22,7 @@ bool has_negative_zero(const std::string& text) {
 
 }  // namespace
 
-TEST_CASE("an export is a run file with the model's inputs as the daemon had them",
-          "[history][export]") {
+TEST_CASE("an export is a run file with the daemon's model inputs", "[history][export]") {
   const TempFolder folder;
   const HistoryConfig config = history_config(folder / "h.db");
   RecordedMachine machine(config, 12);
@@ -46,7 +45,7 @@ TEST_CASE("an export is a run file with the model's inputs as the daemon had the
        {"bed_in_degC", "spindle_rpm", "y_offset_um", "z_applied_um", "z_measured_um"}) {
     CHECK(run.find(name).has_value());
   }
-  CHECK(!run.find("bed_degC"));  // its block tells it
+  CHECK(!run.find("bed_degC"));  // included in its block
 
   std::ostringstream all;
   REQUIRE(export_run(config.file, {}, {}, all, {}, parse_test_setup).damage.empty());
@@ -56,7 +55,7 @@ TEST_CASE("an export is a run file with the model's inputs as the daemon had the
   for (std::size_t i = 0; i < columns.size(); ++i) {
     const double told = whole.column(columns[i]).back();
     if (last.inputs[i].good)
-      CHECK(told == last.inputs[i].temp_degC);  // to the last bit
+      CHECK(told == last.inputs[i].temp_degC);  // bitwise
     else
       CHECK(std::isnan(told));
   }
@@ -67,7 +66,7 @@ TEST_CASE("an export is a run file with the model's inputs as the daemon had the
   CHECK(offsets.column("z_offset_um") == offsets.column("z_recorded_um"));
 }
 
-TEST_CASE("an export tells faults, commands, wall time and reloads by comments, with their times",
+TEST_CASE("an export has timed comments on faults, commands, wall time and reloads",
           "[history][export]") {
   const TempFolder folder;
   const HistoryConfig config = history_config(folder / "h.db");
@@ -85,7 +84,7 @@ TEST_CASE("an export tells faults, commands, wall time and reloads by comments, 
   CHECK_THAT(out.str(), Catch::Contains(": sensor bed: good again\n"));
   CHECK_THAT(out.str(), Catch::Contains(": command measured "));
   CHECK_THAT(out.str(), Catch::Contains("reloaded or restarted with another configuration"));
-  // Nothing of what was commanded before the part that is asked for.
+  // Without the commands before the exported part.
   std::ostringstream part;
   export_run(config.file, HistoryTime{49.0, {}}, {}, part, {}, parse_test_setup);
   const auto commands = [](const std::string& text) {
@@ -98,8 +97,7 @@ TEST_CASE("an export tells faults, commands, wall time and reloads by comments, 
   CHECK(commands(part.str()) < commands(out.str()));
 }
 
-TEST_CASE("with sensors an export has every sensor as read, and no input beside it",
-          "[history][export]") {
+TEST_CASE("an export of sensors has every raw reading and no inputs", "[history][export]") {
   const TempFolder folder;
   const HistoryConfig config = recorded_history(folder / "h.db", 1000, 0, 12);
   std::ostringstream out;
@@ -109,7 +107,7 @@ TEST_CASE("with sensors an export has every sensor as read, and no input beside 
   CHECK(!run.find("bed_in_degC"));
 }
 
-TEST_CASE("what was probed is exported as displacement, without the offset in effect",
+TEST_CASE("a probing is exported as displacement, without the offset in effect",
           "[history][export]") {
   const TempFolder folder;
   const HistoryConfig config = recorded_history(folder / "h.db", 20000, 0, 12);
@@ -126,7 +124,7 @@ TEST_CASE("what was probed is exported as displacement, without the offset in ef
     for (std::size_t row = 0; row < run.rows(); ++row) {
       CHECK(std::isnan(said[row]) == std::isnan(displacement[row]));
       if (std::isnan(said[row]) || !std::isfinite(applied[row])) continue;
-      // What was applied may have gone on by a tenth of a second.
+      // The applied offset may be a tenth of a second newer.
       CHECK(std::abs(said[row] - applied[row] - displacement[row]) < 0.2);
       ++probed;
     }
@@ -134,11 +132,10 @@ TEST_CASE("what was probed is exported as displacement, without the offset in ef
   CHECK(probed > 3);
 }
 
-TEST_CASE("events are in the history with the next commit, run by run, the newest of them",
-          "[history][events]") {
+TEST_CASE("the next commit writes events, by run, and keeps the newest", "[history][events]") {
   const TempFolder folder;
   HistoryConfig config = history_config(folder / "h.db");
-  config.size_MB_max = 2.67;  // then some three hundred are kept
+  config.size_MB_max = 2.67;  // keeps about 300
   for (int run = 0; run < 2; ++run) {
     HistoryWriter writer(config, {std::chrono::hours(7), std::chrono::milliseconds(10)}, "test");
     writer.start();
@@ -178,8 +175,7 @@ TEST_CASE("times are seconds or wall times, and anything else is refused", "[his
   }
 }
 
-TEST_CASE("what a damaged history says in its texts does not come as lines into an export",
-          "[history][export][damage]") {
+TEST_CASE("texts of a damaged history do not add lines to an export", "[history][export][damage]") {
   const TempFolder folder;
   const HistoryConfig config = recorded_history(folder / "h.db", 500, 0, 12);
   sqlite3* handle = nullptr;

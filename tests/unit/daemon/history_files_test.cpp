@@ -1,4 +1,4 @@
-// The files of a history that is being written: removed, damaged, foreign, on a full disk.
+// Files of a history removed, damaged, foreign, or on a full disk, while it is written.
 #include <fstream>
 #include <signal.h>
 
@@ -10,8 +10,9 @@
 using namespace thermocomp;
 using namespace thermocomp::testing;
 
-TEST_CASE("-wal or -shm removed, replaced or cut while running: no row is lost, and it is reported",
-          "[history][files]") {
+TEST_CASE(
+    "-wal or -shm removed, replaced or cut while running: no row is lost, and this is reported",
+    "[history][files]") {
   const TempFolder folder;
   const HistoryConfig config = history_config(folder / "h.db");
   const std::string wal = config.file.string() + "-wal";
@@ -50,7 +51,7 @@ TEST_CASE("-wal or -shm removed, replaced or cut while running: no row is lost, 
     CHECK(reader.segments().size() == 1);
   }
   const std::uint64_t written = machine.writer().statistics().records;
-  // As kill -9 would leave it at this moment: committed rows are in the database already.
+  // As after kill -9 at this moment: committed rows are in the database.
   std::filesystem::copy_file(config.file, folder / "killed.db");
   CHECK(records_in(folder / "killed.db") == written);
   commit();
@@ -69,7 +70,7 @@ TEST_CASE("-wal or -shm removed, replaced or cut while running: no row is lost, 
   CHECK(summary.segments == 1);
 }
 
-TEST_CASE("rows of which a removed -wal was the only copy wait until they can be written",
+TEST_CASE("rows whose only copy was in a removed -wal wait until they can be written",
           "[history][files]") {
   const TempFolder folder;
   const HistoryConfig config = history_config(folder / "h.db");
@@ -82,7 +83,7 @@ TEST_CASE("rows of which a removed -wal was the only copy wait until they can be
     machine.writer().work();
   };
   commit();
-  // What is committed while somebody reads stays in the log.
+  // Rows committed while a reader is active stay in the log.
   sqlite3* reader = nullptr;
   REQUIRE(sqlite3_open(config.file.c_str(), &reader) == SQLITE_OK);
   REQUIRE(sqlite3_exec(reader, "BEGIN; SELECT count(*) FROM chunk", nullptr, nullptr, nullptr) ==
@@ -117,8 +118,7 @@ TEST_CASE("rows of which a removed -wal was the only copy wait until they can be
   CHECK(summary.segments == 1);
 }
 
-TEST_CASE("a history that is moved away, or its folder, is reported and begun anew",
-          "[history][files]") {
+TEST_CASE("a moved history or folder is reported and a new history begins", "[history][files]") {
   const TempFolder folder;
   std::filesystem::create_directory(folder / "place");
   const HistoryConfig config = history_config(folder / "place/h.db");
@@ -150,7 +150,7 @@ TEST_CASE("a history that is moved away, or its folder, is reported and begun an
   CHECK(replay_quietly(config.file).segments >= 1);
 }
 
-TEST_CASE("a file that is no database is moved aside and a new one begun", "[history]") {
+TEST_CASE("a file that is not a database is moved aside and a new one begins", "[history]") {
   const TempFolder folder;
   const HistoryConfig config = history_config(folder / "h.db");
   std::ofstream(config.file) << std::string(20000, 'x');

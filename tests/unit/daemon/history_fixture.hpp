@@ -1,5 +1,5 @@
-/// A machine without buses: the real estimator, stepped on a grid with inputs by seed, recorded as
-/// the daemon records.
+/// A machine without buses: the real estimator with random inputs by seed, recorded as by the
+/// daemon.
 #pragma once
 
 #include <array>
@@ -45,7 +45,7 @@ inline ReplaySetup machine_setup(double gain_um_per_K) {
   return setup;
 }
 
-/// Text of a configuration in these tests: the gain of its model.
+/// Configuration text of these tests: the gain of the model.
 inline ReplaySetup parse_test_setup(const SegmentSetup& setup) {
   return machine_setup(std::stod(setup.config_text));
 }
@@ -66,7 +66,7 @@ class RecordedMachine {
     writer_.start();
     recorder_->begin(0, *estimator_, SegmentReason::start);
   }
-  /// Without the writer's thread: writer().work() is then the test's to call.
+  /// Without the writer's thread: the test calls writer().work().
   void open() {
     writer_.open();
     recorder_->begin(0, *estimator_, SegmentReason::start);
@@ -85,7 +85,7 @@ class RecordedMachine {
     recorder_->begin(next_cycle_, *estimator_, SegmentReason::reload, old_recorder.get());
   }
 
-  /// Readings about once a second, faults, commands and skipped cycles now and then.
+  /// Readings about once a second, with occasional faults, commands and skipped cycles.
   void run(std::uint64_t cycles) {
     for (const std::uint64_t end = next_cycle_ + cycles; next_cycle_ < end; ++next_cycle_) {
       if (one_in(500)) {
@@ -157,7 +157,7 @@ inline HistoryConfig history_config(const std::filesystem::path& file) {
   return config;
 }
 
-/// Records some cycles, and after a reload others.
+/// Records cycles before and after a reload.
 inline HistoryConfig recorded_history(const std::filesystem::path& file, std::uint64_t cycles,
                                       std::uint64_t after_reload = 0, unsigned seed = 3) {
   const HistoryConfig config = history_config(file);

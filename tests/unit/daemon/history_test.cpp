@@ -14,7 +14,7 @@
 using namespace thermocomp;
 using namespace thermocomp::testing;
 
-TEST_CASE("replay gives the daemon's offsets bit for bit", "[history][replay]") {
+TEST_CASE("replay reproduces the daemon's offsets bit for bit", "[history][replay]") {
   const unsigned seed = GENERATE(range(0u, 30u));
   const TempFolder folder;
   HistoryConfig config = history_config(folder / "h.db");
@@ -35,8 +35,7 @@ TEST_CASE("replay gives the daemon's offsets bit for bit", "[history][replay]") 
   CHECK(summary.segments >= 2);
 }
 
-TEST_CASE("a stop in the cycle in which a segment begins leaves a segment that is read",
-          "[history][replay]") {
+TEST_CASE("a stop in the first cycle of a segment leaves a readable segment", "[history][replay]") {
   const TempFolder folder;
   HistoryConfig config = history_config(folder / "h.db");
   config.segment_h = 3.0 / 3600.0;
@@ -57,7 +56,7 @@ TEST_CASE("a stop in the cycle in which a segment begins leaves a segment that i
   CHECK(summary.compared > 0);
 }
 
-TEST_CASE("replay notices a history that was changed", "[history][replay]") {
+TEST_CASE("replay detects a modified history", "[history][replay]") {
   const TempFolder folder;
   const HistoryConfig config = recorded_history(folder / "h.db", 3000);
   run_sql(config.file,
@@ -68,10 +67,8 @@ TEST_CASE("replay notices a history that was changed", "[history][replay]") {
   CHECK(summary.first_different_cycle.has_value());
 }
 
-TEST_CASE(
-    "of a history with rows that no daemon wrote it is told what is damaged, and it is never "
-    "replayed for ever",
-    "[history][damage]") {
+TEST_CASE("rows that no daemon wrote are reported as damage and never make a replay endless",
+          "[history][damage]") {
   const std::string damage = GENERATE(
       as<std::string>(), "UPDATE segment SET period_ns = 1",
       "UPDATE segment SET last_cycle = 9223372036854775807", "UPDATE segment SET first_cycle = -5",
@@ -81,15 +78,15 @@ TEST_CASE(
       "UPDATE segment SET estimator_state = zeroblob(length(estimator_state))",
       "UPDATE segment SET inputs = x'00'", "UPDATE chunk SET records = x'0000000000', count = 1",
       "UPDATE chunk SET wall_minus_grid_ns = -9223372036854775807",
-      // a reading taken at -1 ns; two records of which the second is of an earlier cycle
+      // a reading taken at -1 ns; a record of an earlier cycle than the one before
       "UPDATE chunk SET records = x'00000000' || x'0100', count = 1",
       "UPDATE chunk SET records = x'020004000000' || x'020001000000', count = 2",
-      // an input of a cycle after the offset that came out of its step
+      // an input after the offset of the same cycle
       "UPDATE chunk SET records = x'060100000200' || x'020000000000', count = 2");
   const TempFolder folder;
   const HistoryConfig config = recorded_history(folder / "h.db", 500);
   run_sql(config.file, damage.c_str());
-  // Without checksums what a row says is looked at itself.
+  // Without checksums the values themselves are checked.
   const bool has_checksums = GENERATE(false, true);
   if (!has_checksums) {
     run_sql(config.file, "UPDATE segment SET checksum = NULL; UPDATE chunk SET checksum = NULL");
@@ -105,7 +102,7 @@ TEST_CASE(
   CHECK(!check_history(config.file, {}, parse_test_setup).is_sound());
 }
 
-TEST_CASE("one flipped bit costs one chunk, before and behind it all is exported and replayed",
+TEST_CASE("one flipped bit costs one chunk; all others are exported and replayed",
           "[history][damage]") {
   const TempFolder folder;
   const HistoryConfig config = history_config(folder / "h.db");
@@ -113,7 +110,7 @@ TEST_CASE("one flipped bit costs one chunk, before and behind it all is exported
   machine.start();
   for (int part = 0; part < 8; ++part) {
     machine.run(200);
-    std::this_thread::sleep_for(std::chrono::milliseconds(300));  // a commit, and with it a chunk
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));  // one commit, hence one chunk
   }
   machine.reload(3.0);
   machine.run(500);
@@ -142,8 +139,7 @@ TEST_CASE("one flipped bit costs one chunk, before and behind it all is exported
   CHECK(replayed.different == 0);
 }
 
-TEST_CASE("a clock that was set beyond the year 2116 costs nothing but the wall time",
-          "[history][damage]") {
+TEST_CASE("a clock set beyond the year 2116 costs only the wall time", "[history][damage]") {
   const TempFolder folder;
   const HistoryConfig config = recorded_history(folder / "h.db", 500, 500);
   std::ostringstream whole;
@@ -157,7 +153,7 @@ TEST_CASE("a clock that was set beyond the year 2116 costs nothing but the wall 
   CHECK(replay_quietly(config.file).segments == 2);
 }
 
-TEST_CASE("of a segment that claims more cycles than its chunks hold those there are are replayed",
+TEST_CASE("a segment that claims more cycles than its chunks hold is replayed to their end",
           "[history][damage]") {
   const TempFolder folder;
   const HistoryConfig config = recorded_history(folder / "h.db", 500);
@@ -168,7 +164,7 @@ TEST_CASE("of a segment that claims more cycles than its chunks hold those there
   CHECK(summary.different == 0);
 }
 
-TEST_CASE("a state of a later time than its first cycle is refused", "[history][damage]") {
+TEST_CASE("a start state later than the segment's first cycle is refused", "[history][damage]") {
   const TempFolder folder;
   const HistoryConfig config = recorded_history(folder / "h.db", 500, 500);
   run_sql(config.file,
@@ -177,7 +173,7 @@ TEST_CASE("a state of a later time than its first cycle is refused", "[history][
   CHECK_THAT(told(replay_quietly(config.file).damage), Catch::Contains("of a later time"));
 }
 
-TEST_CASE("segments that overlap in time are no history", "[history][damage]") {
+TEST_CASE("segments that overlap in time are damage", "[history][damage]") {
   const TempFolder folder;
   const HistoryConfig config = recorded_history(folder / "h.db", 500, 500);
   run_sql(config.file, "UPDATE segment SET first_cycle = 0 WHERE id = 2");
@@ -187,7 +183,7 @@ TEST_CASE("segments that overlap in time are no history", "[history][damage]") {
   CHECK(summary.different == 0);
 }
 
-TEST_CASE("a ring that overflows leaves a gap and a replay that still agrees", "[history]") {
+TEST_CASE("a ring overflow leaves a gap, and the replay still agrees", "[history]") {
   const TempFolder folder;
   const HistoryConfig config = history_config(folder / "h.db");
   RecordedMachine machine(config, 4, 256);
@@ -205,7 +201,7 @@ TEST_CASE("a ring that overflows leaves a gap and a replay that still agrees", "
   CHECK(summary.different == 0);
 }
 
-TEST_CASE("the file keeps to its size by losing the oldest segments", "[history]") {
+TEST_CASE("the file keeps its size bound by deleting the oldest segments", "[history]") {
   const TempFolder folder;
   HistoryConfig config = history_config(folder / "h.db");
   config.size_MB_max = 0.5;
@@ -220,15 +216,14 @@ TEST_CASE("the file keeps to its size by losing the oldest segments", "[history]
   }
   machine.stop();
   CHECK(largest > 200000);
-  CHECK(largest <= 600000);  // the bound and one commit of this fast machine
+  CHECK(largest <= 600000);  // the bound plus one commit at this rate
   CHECK(std::filesystem::file_size(config.file) <= 600000);
   const HistoryReader reader(config.file);
   CHECK(reader.segments().front().id > 1);
   CHECK(replay_quietly(config.file).different == 0);
 }
 
-TEST_CASE("no wall clock costs history, however long it is wrong; recorded time does",
-          "[history]") {
+TEST_CASE("a wrong wall clock deletes no history; recorded time does", "[history]") {
   using std::chrono::hours;
   using std::chrono::minutes;
   using std::chrono::seconds;
@@ -242,7 +237,7 @@ TEST_CASE("no wall clock costs history, however long it is wrong; recorded time 
   RecordedMachine machine(config, 9, 65536,
                           {[&] { return now; }, [&] { return wall_minus_now + now + stepped; }});
   const auto segments_after = [&](nanoseconds time) {
-    machine.run(1100);  // 11 s are recorded
+    machine.run(1100);  // records 11 s
     now += time;
     machine.writer().work();
     return machine.writer().statistics().segments;
@@ -273,7 +268,7 @@ TEST_CASE("no wall clock costs history, however long it is wrong; recorded time 
   CHECK(replay_quietly(config.file).different == 0);
 }
 
-TEST_CASE("a segment whose length is damaged does not make the others old", "[history]") {
+TEST_CASE("a segment of damaged length does not age the others", "[history]") {
   const TempFolder folder;
   HistoryConfig config = history_config(folder / "h.db");
   for (unsigned seed = 0; seed < 3; ++seed) {

@@ -1,4 +1,4 @@
-// Moments of a history, as a person writes them.
+// Parser and formatter of times in a history.
 #include "daemon/history/format/history_time.hpp"
 
 #include <stdexcept>
@@ -31,7 +31,7 @@ TEST_CASE("times before now are counted back from the wall clock", "[history][ex
   CHECK(parse_history_time("-8", now).seconds.value() == -8.0);
 }
 
-TEST_CASE("what is no moment is refused with what would be one", "[history][export]") {
+TEST_CASE("an invalid time is refused with the valid forms", "[history][export]") {
   for (const char* text : {"8 hours", "ago", " ago", "-h", "-0h", "-8 fortnights", "h ago", "-8hh",
                            "-1e300d", "-nan h", "- 8h ago", "8 hours ago ago"}) {
     INFO(text);

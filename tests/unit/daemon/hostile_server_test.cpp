@@ -1,4 +1,4 @@
-// The client before whatever may listen at a path that should be the daemon's.
+// The client with hostile servers at the daemon's path.
 #include <atomic>
 #include <chrono>
 #include <functional>
@@ -23,7 +23,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Accepts one connection and sends `text` for the first request, again and again if `endless`.
+/// Accepts one connection and answers the first request with `text`, repeatedly if `endless`.
 class HostileServer {
  public:
   HostileServer(const std::filesystem::path& path, std::string text, bool endless = false)
@@ -65,7 +65,7 @@ class HostileServer {
         sent += static_cast<std::size_t>(count);
       }
     } while (endless_);
-    recv(fd, &byte, 1, 0);  // until the client goes
+    recv(fd, &byte, 1, 0);  // until the client disconnects
     close(fd);
   }
 
@@ -81,7 +81,7 @@ std::string nested(std::size_t depth) {
 
 }  // namespace
 
-TEST_CASE("a queue of connections that is full is waited for no longer than asked", "[socket]") {
+TEST_CASE("connecting to a full backlog ends at the time-out", "[socket]") {
   TempFolder folder;
   const int listener = HostileServer::listen_at(folder / "s");
   std::vector<StatusClient> taken;
@@ -93,7 +93,7 @@ TEST_CASE("a queue of connections that is full is waited for no longer than aske
   CHECK_THROWS_AS(StatusClient(folder / "s", milliseconds(200)), ClientError);
   CHECK(Clock::now() - begun < seconds(3));
   CHECK(Clock::now() - begun >= milliseconds(200));
-  // It becomes free while the client waits.
+  // The backlog drains while the client waits.
   std::thread later([&] {
     std::this_thread::sleep_for(milliseconds(100));
     close(accept(listener, nullptr, nullptr));
@@ -103,7 +103,7 @@ TEST_CASE("a queue of connections that is full is waited for no longer than aske
   close(listener);
 }
 
-TEST_CASE("an answer as deep as it likes is refused in words", "[socket]") {
+TEST_CASE("a deeply nested answer is refused with a message", "[socket]") {
   TempFolder folder;
   const std::string answer = R"({"id":1,"result":)" + nested(400000) + "}\n";
   HostileServer server(folder / "s", answer);
@@ -111,9 +111,7 @@ TEST_CASE("an answer as deep as it likes is refused in words", "[socket]") {
   CHECK_THROWS_WITH(client.call("status", json::object()), Contains("at most 16 deep"));
 }
 
-TEST_CASE(
-    "an answer without an end and notifications without an end cost a bounded time and memory",
-    "[socket]") {
+TEST_CASE("an endless answer and endless notifications take bounded time and memory", "[socket]") {
   TempFolder folder;
   const auto fails = [&](const char* name, const std::string& text) {
     HostileServer server(folder / name, text, true);
@@ -127,7 +125,7 @@ TEST_CASE(
   fails("c", "\n");
 }
 
-TEST_CASE("an answer of the wrong types is an error, not an exception of the parser", "[socket]") {
+TEST_CASE("an answer of wrong types is an error, not a parser exception", "[socket]") {
   TempFolder folder;
   const auto asked = [&](const char* name, const std::string& text) {
     HostileServer server(folder / name, text + "\n");

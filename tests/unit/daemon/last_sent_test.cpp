@@ -1,4 +1,4 @@
-// What of the offsets sent last outlives a process, whenever that ends.
+// The last-sent record across the end of a process at any moment.
 #include "daemon/recording/last_sent.hpp"
 
 #include <cmath>
@@ -43,7 +43,7 @@ Offsets left_in(const std::filesystem::path& file, const std::vector<AxisConfig>
 
 }  // namespace
 
-TEST_CASE("the next process finds what was sent last", "[last_sent]") {
+TEST_CASE("the next process finds the offsets sent last", "[last_sent]") {
   const TempFolder folder;
   CHECK(left_in(folder / "sent").empty());
   {
@@ -52,19 +52,19 @@ TEST_CASE("the next process finds what was sent last", "[last_sent]") {
     sent.note(command(-3.5, 99.0, false), 0);
   }
   CHECK(left_in(folder / "sent") == Offsets{{"z", -3.5}, {"x", 7.0}});
-  // Not driven yet, it goes on knowing what the one before knew.
+  // Before it drives the axes, it keeps the previous process' offsets.
   CHECK(left_in(folder / "sent") == Offsets{{"z", -3.5}, {"x", 7.0}});
   {
     LastSent sent(folder / "sent", "cnc", two_axes());
     sent.note(command(-3.75, 0.0, false), 0b10);
   }
-  // The controller had lost what x was sent.
+  // The controller had lost the offset of x.
   const Offsets left = left_in(folder / "sent");
   CHECK(left.at("z") == -3.75);
   CHECK(std::isnan(left.at("x")));
 }
 
-TEST_CASE("what was sent to another controller, axis or sign is not taken", "[last_sent]") {
+TEST_CASE("offsets for another controller, axis or sign are not used", "[last_sent]") {
   const TempFolder folder;
   { LastSent(folder / "sent", "cnc", two_axes()).note(command(1.0, 2.0), 0); }
   CHECK(left_in(folder / "sent", two_axes(), "other").empty());
@@ -75,16 +75,16 @@ TEST_CASE("what was sent to another controller, axis or sign is not taken", "[la
   CHECK(left_in(folder / "sent").size() == 2);
 }
 
-TEST_CASE("what is another's comes never back once an offset was sent", "[last_sent]") {
+TEST_CASE("a foreign record never reappears once an offset was sent", "[last_sent]") {
   const TempFolder folder;
   const auto file = folder / "sent";
   { LastSent(file, "cnc", two_axes()).note(command(1.0, 2.0), 0); }
   { LastSent(file, "cnc", two_axes(-1.0)).note(command(9.0, -9.0), 0); }
-  // The controller has 9.0 by now, whatever was sent before with the other sign.
+  // The controller has 9.0 now; the offset sent with the other sign is obsolete.
   CHECK(left_in(file).empty());
 }
 
-TEST_CASE("a record of another format is said, left until an offset is sent, and then replaced",
+TEST_CASE("a record of another format is reported, and replaced once an offset is sent",
           "[last_sent]") {
   const TempFolder folder;
   const auto file = folder / "sent";
@@ -102,19 +102,19 @@ TEST_CASE("a record of another format is said, left until an offset is sent, and
     CHECK_THAT(sent.problem(), Catch::Contains("is of format 2, this program reads format 1"));
     CHECK(sent.before().empty());
     CHECK(bytes_of(file) == newer);
-    sent.note(OffsetCommand{}, 0b11);  // the start of both axes is not known
+    sent.note(OffsetCommand{}, 0b11);  // the offsets of both axes are lost
     CHECK(bytes_of(file) == newer);
     sent.note(command(7.0, 8.0), 0);
   }
   CHECK(left_in(file) == Offsets{{"z", 7.0}, {"x", 8.0}});
-  // Nothing of it is left for the newer program.
+  // The newer program finds nothing of its record.
   std::string back = bytes_of(file);
   CHECK(back[8] == 1);
   write(file, "something else that is long enough to have a format");
   CHECK_THAT(LastSent(file, "cnc", two_axes()).problem(), Catch::Contains("none of this program"));
 }
 
-TEST_CASE("a process that ends while it records leaves what was before, or after", "[last_sent]") {
+TEST_CASE("a process that ends while recording leaves the old or the new record", "[last_sent]") {
   const TempFolder folder;
   const auto file = folder / "sent";
   std::string before;
@@ -130,7 +130,7 @@ TEST_CASE("a process that ends while it records leaves what was before, or after
   REQUIRE(before.size() == after.size());
   std::mt19937 random(3);
   for (int i = 0; i < 400; ++i) {
-    // Any part of what differs may have been stored.
+    // Any subset of the differing bytes may have been stored.
     std::string torn = before;
     for (std::size_t k = 0; k < torn.size(); ++k)
       if (random() % 2 == 0) torn[k] = after[k];
@@ -144,7 +144,7 @@ TEST_CASE("a process that ends while it records leaves what was before, or after
   }
 }
 
-TEST_CASE("a record that is no ordinary file is refused", "[last_sent]") {
+TEST_CASE("a record that is not a regular file is refused", "[last_sent]") {
   const TempFolder folder;
   std::filesystem::create_directory(folder / "sent");
   CHECK_THROWS(left_in(folder / "sent"));

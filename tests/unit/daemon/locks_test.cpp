@@ -1,4 +1,4 @@
-// What one process may have alone: who is refused, what they are told, and when it is free again.
+// Locks of files and names: refusal, its message, and release.
 #include "daemon/locks/locks.hpp"
 
 #include <algorithm>
@@ -33,7 +33,7 @@ std::string this_process() {
   return "process " + std::to_string(getpid());
 }
 
-/// A process that has made something and then only waits.
+/// A child process that creates something and then waits.
 class Child {
  public:
   explicit Child(const std::function<void()>& take) {
@@ -75,7 +75,7 @@ ModbusControllerConfig at(const std::string& host, int port, int unit) {
 
 }  // namespace
 
-TEST_CASE("a file that is locked is refused with who has it, until it is released", "[locks]") {
+TEST_CASE("a locked file is refused with its holder, until released", "[locks]") {
   const TempFolder folder;
   {
     const FileLock lock(folder / "history.db");
@@ -87,7 +87,7 @@ TEST_CASE("a file that is locked is refused with who has it, until it is release
   const FileLock again(folder / "history.db");
 }
 
-TEST_CASE("a file has one lock, whatever path leads to it", "[locks]") {
+TEST_CASE("a file has one lock, independent of the path", "[locks]") {
   const TempFolder folder;
   std::ofstream(folder / "history.db") << "x";
   std::filesystem::create_symlink(folder.path(), folder / "link");
@@ -98,7 +98,7 @@ TEST_CASE("a file has one lock, whatever path leads to it", "[locks]") {
   const FileLock another(folder / "state.json");
 }
 
-TEST_CASE("a lock ends with its process, in whatever way that ends", "[locks]") {
+TEST_CASE("a lock ends with its process, however that ends", "[locks]") {
   const TempFolder folder;
   const std::string ours = own_name();
   Child child([&] {
@@ -112,18 +112,18 @@ TEST_CASE("a lock ends with its process, in whatever way that ends", "[locks]") 
   const NameLock name(ours);
 }
 
-TEST_CASE("a lock that cannot be made is no lock that is held", "[locks]") {
+TEST_CASE("a lock that cannot be created is not reported as held", "[locks]") {
   const TempFolder folder;
   CHECK_THROWS_AS(FileLock(folder / "missing/history.db"), LockImpossible);
   std::filesystem::create_directory(folder / "history.db.lock");
   CHECK_THROWS_AS(FileLock(folder / "history.db"), LockImpossible);
-  // Nor is a link followed to a file that is not ours to lock.
+  // A link to another file is not followed either.
   std::ofstream(folder / "precious") << "x";
   std::filesystem::create_symlink(folder / "precious", folder / "state.json.lock");
   CHECK_THROWS_AS(FileLock(folder / "state.json"), LockImpossible);
 }
 
-TEST_CASE("a name that is held is refused with who has it", "[locks]") {
+TEST_CASE("a held name is refused with its holder", "[locks]") {
   const std::string long_name = std::string(300, 'n') + own_name();
   for (const std::string& name : {own_name(), long_name}) {
     const NameLock lock(name);
@@ -132,7 +132,7 @@ TEST_CASE("a name that is held is refused with who has it", "[locks]") {
   }
 }
 
-TEST_CASE("a lock answers however often it was asked for", "[locks]") {
+TEST_CASE("a lock answers any number of queries", "[locks]") {
   const std::string name = own_name();
   NameLock lock(name);
   for (int i = 0; i < 50; ++i) {
@@ -141,7 +141,7 @@ TEST_CASE("a lock answers however often it was asked for", "[locks]") {
   }
 }
 
-TEST_CASE("of two that begin at the same moment exactly one gets the name", "[locks]") {
+TEST_CASE("of two processes started at the same moment exactly one gets the name", "[locks]") {
   for (int round = 0; round < 20; ++round) {
     const std::string name = own_name() + " " + std::to_string(round);
     int go[2];
@@ -175,7 +175,7 @@ TEST_CASE("of two that begin at the same moment exactly one gets the name", "[lo
   }
 }
 
-TEST_CASE("the lock of a file is not for those who may only read it", "[locks]") {
+TEST_CASE("a user with read access only cannot lock the file", "[locks]") {
   const TempFolder folder;
   std::ofstream(folder / "state.json.lock") << "of an earlier version";
   const FileLock lock(folder / "state.json");
@@ -184,7 +184,7 @@ TEST_CASE("the lock of a file is not for those who may only read it", "[locks]")
         std::filesystem::perms::none);
 }
 
-TEST_CASE("controllers are the same where the same registers or frames are written", "[locks]") {
+TEST_CASE("controllers with the same registers or frames have the same name", "[locks]") {
   const auto names = [](const ControllerConfig& config) { return controller_names(config); };
   CHECK(names(at("CNC.local", 502, 1)) == names(at("cnc.local", 502, 1)));
   CHECK(names(at("cnc.local", 502, 1)) != names(at("cnc.local", 502, 2)));
@@ -207,7 +207,7 @@ TEST_CASE("controllers are the same where the same registers or frames are writt
   other.interface = "can1";
   CHECK(names(can) != names(other));
 
-  // Whoever only reads is in nobody's way, but for a serial line: that has one master.
+  // A dry run needs no lock, except for a serial line, which has one master.
   CHECK(controller_names(can, true).empty());
   CHECK(controller_names(serial, true) == controller_names(serial));
 

@@ -1,5 +1,5 @@
-// Probings until a candidate is called better, and how often it is called so wrongly: errors of
-// both models that are alike from hour to hour, half in common, with noise of the probe.
+// Probings until a candidate is called better, and the rate of false calls. The errors of both
+// models are autocorrelated, half in common, with noise of the probe.
 // `estimator_tests "[contest]" -s` prints the figures.
 #include <cmath>
 #include <random>
@@ -18,9 +18,9 @@ constexpr std::size_t lives = 1000;
 constexpr std::size_t probings_max = 150;
 
 struct Errors {
-  double ratio{1.0};         ///< RMS of the candidate's errors, of the model's
+  double ratio{1.0};         ///< RMS error of the candidate over that of the model
   double alike{0.5};         ///< correlation of errors an hour apart
-  bool has_outliers{false};  ///< noise of Student's t, three degrees of freedom
+  bool has_outliers{false};  ///< Student's t noise, three degrees of freedom
 };
 
 struct Figures {
@@ -77,17 +77,17 @@ TEST_CASE("a model of half the error is called better after about 30 probings", 
   CHECK(figures.worse_share < 0.01);
 }
 
-TEST_CASE("probings two hours apart say it sooner", "[contest]") {
+TEST_CASE("probings two hours apart decide sooner", "[contest]") {
   CHECK(contests({0.5, 0.5}, 2h).probings <= 26);
 }
 
-TEST_CASE("an equal or a worse model is seldom called better", "[contest]") {
+TEST_CASE("an equal or worse model is seldom called better", "[contest]") {
   const double alike = GENERATE(0.0, 0.5);
   CHECK(contests({1.0, alike, GENERATE(false, true)}).better_share <= 0.05);
   CHECK(contests({1.2, alike}).better_share <= 0.02);
 }
 
-TEST_CASE("the same errors decide nothing, and what is not known is not counted", "[contest]") {
+TEST_CASE("equal errors decide nothing, and unknown ones are not counted", "[contest]") {
   ModelContest contest;
   for (int i = 0; i < 100; ++i) contest.take(1, i * 1h, 2.0, -2.0);
   contest.take(1, 100h, not_a_number, 1.0);
@@ -96,7 +96,7 @@ TEST_CASE("the same errors decide nothing, and what is not known is not counted"
   CHECK(ModelContest::chances(contest.score()).worse == Approx(0.25));
 }
 
-TEST_CASE("many probings at once count no more than one", "[contest]") {
+TEST_CASE("many probings at once count as one", "[contest]") {
   ModelContest once;
   ModelContest often;
   once.take(0, 1h, 3.0, 0.1);

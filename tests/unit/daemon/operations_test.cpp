@@ -1,4 +1,4 @@
-// What an operator is told, beside what is on disk at that moment.
+// Answers to operators, compared with the state on disk.
 #include "daemon/operations.hpp"
 
 #include <optional>
@@ -39,7 +39,7 @@ DaemonConfig machine_config(const std::filesystem::path& folder) {
   return config;
 }
 
-/// A daemon whose cycle steps when the test says so.
+/// A daemon whose cycle is stepped by the test.
 struct Rig {
   explicit Rig(bool reference_lost = false)
       : keeper(config.state_file, {}, true, reference_lost), next(cycle.begin(grid.start)) {
@@ -50,14 +50,14 @@ struct Rig {
     cycle.step(next++);
   }
   [[nodiscard]] LoadedState on_disk() const { return load_state_file(config.state_file, {}); }
-  /// Asks, steps, and takes the answer.
+  /// Sends the command, steps, and returns the answer.
   nlohmann::json give(CommandKind kind) {
     const RpcPending pending = operations.command({kind, 0, 0.0});
     CHECK_FALSE(pending());
     step();
     return answer(pending);
   }
-  /// Once what it changed is on disk.
+  /// Returns once the change is on disk.
   static nlohmann::json answer(const RpcPending& pending) {
     std::optional<nlohmann::json> found;
     while (!(found = pending())) std::this_thread::sleep_for(1ms);
@@ -87,13 +87,13 @@ TEST_CASE("done means on disk", "[daemon]") {
   CHECK(rig.on_disk().state.enabled);
 }
 
-TEST_CASE("a command that cannot be saved is not called done", "[daemon]") {
+TEST_CASE("a command that cannot be saved is not reported as done", "[daemon]") {
   Rig rig;
   std::filesystem::create_directory(rig.config.state_file.string() + ".new");
   CHECK_THROWS_WITH(rig.give(CommandKind::disable), Catch::Contains("carried out, but not saved"));
 }
 
-TEST_CASE("while the reference is lost nothing is switched on before one is taken", "[daemon]") {
+TEST_CASE("while the reference is lost, enable is refused until one is taken", "[daemon]") {
   Rig rig(true);
   CHECK_THROWS_WITH(rig.operations.command({CommandKind::enable, 0, 0.0}),
                     Catch::Contains("thermocomp reference"));
@@ -102,15 +102,15 @@ TEST_CASE("while the reference is lost nothing is switched on before one is take
   CHECK(rig.give(CommandKind::enable) == nlohmann::json{{"done", true}});
 }
 
-TEST_CASE("a reload that cannot be read leaves everything as it is", "[daemon]") {
+TEST_CASE("a reload of an unreadable file changes nothing", "[daemon]") {
   Rig rig;
   CHECK_THROWS_AS(Rig::answer(rig.operations.reload()), ConfigurationError);
-  rig.operations.hang_up();  // the same, for the log
+  rig.operations.hang_up();  // the same, logged
   CHECK_FALSE(rig.operations.is_busy());
   CHECK(rig.give(CommandKind::disable) == nlohmann::json{{"done", true}});
 }
 
-TEST_CASE("nobody has to ask for what was commanded to be saved", "[daemon]") {
+TEST_CASE("a command's change is saved without a further request", "[daemon]") {
   Rig rig;
   static_cast<void>(rig.operations.command({CommandKind::disable, 0, 0.0}));
   rig.step();
@@ -119,14 +119,14 @@ TEST_CASE("nobody has to ask for what was commanded to be saved", "[daemon]") {
   CHECK_FALSE(rig.on_disk().state.enabled);
 }
 
-TEST_CASE("when and by whom the reference was taken is on disk with it", "[daemon]") {
+TEST_CASE("time and origin of the reference are saved with it", "[daemon]") {
   Rig rig;
   rig.operations.save_state(false);
   REQUIRE(rig.keeper.wait(20s));
   const ReferenceRecord first = rig.on_disk().reference;
   CHECK(first.origin == ReferenceOrigin::first_values);
   CHECK(first.is_known());
-  // At the very same temperatures it is a reference of another moment all the same.
+  // A new reference at the same temperatures has a new time.
   rig.give(CommandKind::reference);
   const ReferenceRecord second = rig.on_disk().reference;
   CHECK(second.origin == ReferenceOrigin::command);

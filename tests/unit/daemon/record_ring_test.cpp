@@ -52,7 +52,7 @@ TEST_CASE("every record comes out of the ring once and in order", "[history][rin
   CHECK(ring.pop(batch) == 0);
 }
 
-TEST_CASE("a full ring refuses and keeps what it has", "[history][ring]") {
+TEST_CASE("a full ring refuses and keeps its records", "[history][ring]") {
   RecordRing ring(5);
   REQUIRE(ring.capacity() == 8);
   for (std::uint64_t n = 0; n < 8; ++n) REQUIRE(ring.try_push(numbered(n)));
@@ -65,7 +65,7 @@ TEST_CASE("a full ring refuses and keeps what it has", "[history][ring]") {
   CHECK(ring.try_push(numbered(8)));
 }
 
-TEST_CASE("a chunk gives back every bit of every record", "[history][codec]") {
+TEST_CASE("a chunk reproduces every bit of every record", "[history][codec]") {
   const unsigned seed = GENERATE(range(0u, 50u));
   std::mt19937_64 random(seed);
   std::vector<Record> records;
@@ -75,7 +75,7 @@ TEST_CASE("a chunk gives back every bit of every record", "[history][codec]") {
     record.cycle = random() % 3 == 0 ? random() : 1000 + static_cast<std::uint64_t>(i);
     record.time_ns = static_cast<std::int64_t>(random() % 2 == 0 ? random() : random() % 1000);
     const std::uint64_t bits = random() % 4 == 0 ? random() : std::bit_cast<std::uint64_t>(21.5);
-    record.value = std::bit_cast<double>(bits);  // NaN with payload and -0 among them
+    record.value = std::bit_cast<double>(bits);  // includes NaN with payload and -0
     record.index = static_cast<std::uint32_t>(random() % 3 == 0 ? random() : random() % 20);
     record.kind = static_cast<RecordKind>(random() % record_kinds_count);
     record.detail = static_cast<std::uint8_t>(random());

@@ -1,4 +1,4 @@
-// When a reference may be taken.
+// Conditions for taking a reference.
 #include <catch2/catch.hpp>
 
 #include "daemon/methods/methods.hpp"
@@ -17,7 +17,7 @@ std::vector<InputReport> inputs(double bed_degC, double spindle_degC) {
           {spindle_degC, 20.0, true, false, 0.0, not_a_number}};
 }
 
-/// Two columns and an axis, as main sees them.
+/// Two columns and an axis.
 struct Machine {
   Machine() {
     config.estimator.axes = {{"z", "z_um", 1.0, {}}};
@@ -33,7 +33,7 @@ struct Machine {
     report.inputs = inputs(bed_degC, spindle_degC);
     if (trend.is_due(now)) trend.note(now, columns, report.inputs);
   }
-  /// Half an hour and more, at these rates.
+  /// More than half an hour at these rates.
   void warm(double bed_K_per_h, double spindle_K_per_h, nanoseconds for_time = 40min) {
     for (nanoseconds passed{}; passed < for_time; passed += 1s) {
       now += 1s;
@@ -59,7 +59,7 @@ struct Machine {
 
 }  // namespace
 
-TEST_CASE("nothing speaks against a reference of a machine at rest", "[reference]") {
+TEST_CASE("a reference is allowed at rest", "[reference]") {
   Machine machine;
   CHECK(machine.why().empty());
   machine.warm(0.5, -1.0);
@@ -88,11 +88,11 @@ TEST_CASE("a reference is refused with an offset, sent or applied", "[reference]
   axis.offset_um = 0.0;
   axis.applied_um = 2.0;
   CHECK_THAT(machine.why(), Contains("axis z has an offset of +2.00"));
-  axis.applied_um = not_a_number;  // a controller that does not tell
+  axis.applied_um = not_a_number;  // no read-back
   CHECK(machine.why().empty());
 }
 
-TEST_CASE("in a dry run only what the controller applies by itself counts", "[reference]") {
+TEST_CASE("in a dry run only the controller's own offset counts", "[reference]") {
   Machine machine;
   machine.config.dry_run = true;
   machine.report.axes[0].offset_um = -6.0;
@@ -116,23 +116,23 @@ TEST_CASE("a reference is refused while the machine warms or cools", "[reference
   CHECK_THAT(machine.why(), Contains("bed_degC changes by -9.0 K/h") && Contains("cooling"));
 }
 
-TEST_CASE("the step of a coarse module is no warming", "[reference]") {
+TEST_CASE("a step of a coarse module does not count as warming", "[reference]") {
   Machine machine;
   machine.warm(0.0, 0.0, 60s);
   machine.now += 1s;
-  machine.show(20.1, 20.0);  // 6 K/h over a minute, if it were one
+  machine.show(20.1, 20.0);  // 6 K/h over a minute
   CHECK(machine.why().empty());
   machine.now += 1s;
   machine.show(22.0, 20.0);
   CHECK_THAT(machine.why(), Contains("bed_degC"));
 }
 
-TEST_CASE("a cooler that switches within half an hour is no warming", "[reference]") {
+TEST_CASE("a cooler's limit cycle within half an hour does not count as warming", "[reference]") {
   Machine machine;
   double steepest = 0.0;
   for (int second = 0; second < 7200; ++second) {
     machine.now += 1s;
-    // 28 min, +-0.3 K: up to 4 K/h for minutes, nowhere to in half an hour
+    // 28 min, +-0.3 K: up to 4 K/h for minutes, no trend over half an hour
     machine.show(20.0, 20.0 + 0.3 * std::sin(2.0 * 3.14159265 * second / 1680.0));
     if (second < 1800) continue;
     const auto change = machine.trend.change(1, machine.now, machine.report.inputs[1].temp_degC);
@@ -141,7 +141,7 @@ TEST_CASE("a cooler that switches within half an hour is no warming", "[referenc
   CHECK(steepest < TemperatureTrend::even_rate_K_per_h_max);
 }
 
-TEST_CASE("what is not known does not speak against a reference", "[reference]") {
+TEST_CASE("unknown quantities do not prevent a reference", "[reference]") {
   Machine machine;
   CHECK(watched_s(machine.view()) == 0.0);
   machine.warm(0.0, 30.0, 2s);
@@ -150,7 +150,7 @@ TEST_CASE("what is not known does not speak against a reference", "[reference]")
   REQUIRE_FALSE(machine.why().empty());
   machine.report.inputs[1].temp_degC = not_a_number;
   CHECK(machine.why().empty());
-  // Other columns begin anew.
+  // Other columns reset the trend.
   machine.now += 10s;
   machine.trend.note(machine.now, {"a_degC", "b_degC"}, inputs(20.0, 90.0));
   CHECK(std::isnan(machine.trend.change(0, machine.now, 20.0).rate_K_per_h));

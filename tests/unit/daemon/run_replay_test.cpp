@@ -13,7 +13,7 @@ using namespace thermocomp::testing;
 
 namespace {
 
-/// Smoothing off, bound and slew ample: the offset is the model's negative.
+/// Without smoothing, with ample bound and slew limit: the offset is the negative displacement.
 DaemonConfig plain_config() {
   ReplaySetup setup = machine_setup(2.0);
   for (SensorConfig& sensor : setup.estimator.sensors) {
@@ -30,7 +30,7 @@ DaemonConfig plain_config() {
   return config;
 }
 
-/// Rows 15 s apart; the rows of one temperature stay, so that the offset has settled at their end.
+/// Rows 15 s apart, with each temperature held until the offset has settled.
 std::string warming_run(const char* columns) {
   std::ostringstream text;
   text << "time_s," << columns << "\n";
@@ -51,7 +51,7 @@ RunFile replayed(const DaemonConfig& config, const RunFile& run, RunReplaySummar
 
 }  // namespace
 
-TEST_CASE("without smoothing and limits the offset is the model's negative", "[run_replay]") {
+TEST_CASE("without smoothing and limits the offset is the negative displacement", "[run_replay]") {
   const char* columns =
       GENERATE("bed_degC,column_degC,spindle_degC", "bed_in_degC,column_in_degC,spindle_in_degC");
   const RunFile run = parse_run(warming_run(columns), "run");
@@ -69,7 +69,7 @@ TEST_CASE("without smoothing and limits the offset is the model's negative", "[r
   }
 }
 
-TEST_CASE("a finer step of the same run comes to the same offsets", "[run_replay]") {
+TEST_CASE("a finer step of the same run gives the same offsets", "[run_replay]") {
   const std::string text = warming_run("bed_degC,column_degC,spindle_degC");
   const std::string dense = text + "585.02,22.25,21,22\n";  // two rows 20 ms apart
   RunReplaySummary coarse;
@@ -96,7 +96,7 @@ TEST_CASE("every missing column is named at once", "[run_replay]") {
   }
 }
 
-TEST_CASE("a run that would take for ever is refused", "[run_replay]") {
+TEST_CASE("a run with too many steps is refused", "[run_replay]") {
   const RunFile run = parse_run(
       "time_s,bed_degC,column_degC,spindle_degC\n0,20,20,20\n0.01,20,20,20\n1e12,20,20,20\n", "r");
   std::ostringstream out;

@@ -1,4 +1,4 @@
-// Answers that take their time: who waits, who does not, and in which order answers come.
+// Delayed answers: which clients wait, and the order of answers.
 #include <catch2/catch.hpp>
 
 #include "socket_fixture.hpp"
@@ -22,7 +22,7 @@ void wait_until_asked(const RunningServer& server) {
 
 }  // namespace
 
-TEST_CASE("while one waits for a slow answer everybody else is served", "[socket]") {
+TEST_CASE("while one client waits for a slow answer the others are served", "[socket]") {
   const TempFolder folder;
   RunningServer server(folder / "s");
   RawClient waiting(folder / "s");
@@ -37,7 +37,7 @@ TEST_CASE("while one waits for a slow answer everybody else is served", "[socket
   CHECK(json::parse(waiting.line()) == json{{"jsonrpc", "2.0"}, {"id", 1}, {"result", "late"}});
 }
 
-TEST_CASE("what a client sends while it waits is answered afterwards, in order", "[socket]") {
+TEST_CASE("requests sent during a slow answer are answered afterwards, in order", "[socket]") {
   const TempFolder folder;
   RunningServer server(folder / "s");
   RawClient client(folder / "s");
@@ -53,7 +53,7 @@ TEST_CASE("what a client sends while it waits is answered afterwards, in order",
   CHECK(client.line().empty());
 }
 
-TEST_CASE("a client that goes away while it waits is forgotten", "[socket]") {
+TEST_CASE("a client that disconnects during a slow answer is dropped", "[socket]") {
   const TempFolder folder;
   RunningServer server(folder / "s");
   {
@@ -70,7 +70,7 @@ TEST_CASE("a client that goes away while it waits is forgotten", "[socket]") {
   CHECK(server.statistics().clients == 1);
 }
 
-TEST_CASE("who waits for an answer is not idle", "[socket]") {
+TEST_CASE("a client that waits for an answer is not idle", "[socket]") {
   const TempFolder folder;
   SocketLimits limits;
   limits.idle_max = limits.partial_line_max = milliseconds(200);

@@ -1,4 +1,4 @@
-/// A status server on a thread and a client that sends whatever a test wants.
+/// A status server on a thread, and a client for arbitrary requests.
 #pragma once
 
 #include <atomic>
@@ -24,7 +24,7 @@ using nlohmann::json;
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-/// A server with a method of each class, on a thread of its own.
+/// A server with a method of each access class, on its own thread.
 class RunningServer {
  public:
   explicit RunningServer(const std::filesystem::path& path, const SocketLimits& limits = {})
@@ -44,7 +44,7 @@ class RunningServer {
     });
     server_->add_method("fails", AccessClass::read,
                         [](const json&) -> json { throw RpcError(rpc::refused, "not now"); });
-    // Takes until it is let go, and then fails where it was told to.
+    // Pending until released; then fails if requested.
     server_->add_slow_method("slow", AccessClass::operate, [this](const json& params) {
       return [this, fails = params.contains("fails")]() -> std::optional<json> {
         asked_.fetch_add(1);
@@ -82,8 +82,8 @@ class RunningServer {
   SocketConfig config_;
   std::unique_ptr<StatusServer> server_;
   std::atomic<bool> stopping_{false};
-  std::atomic<bool> let_go_{false};  ///< the results of `slow` are there
-  std::atomic<int> asked_{0};        ///< whether they are
+  std::atomic<bool> let_go_{false};  ///< results of `slow` are complete
+  std::atomic<int> asked_{0};        ///< number of queries for results
   std::thread thread_;
 };
 
@@ -110,7 +110,7 @@ class RawClient {
     }
   }
   void end_sending() const { shutdown(fd_, SHUT_WR); }
-  /// The next line, or "" when the connection ended or nothing came in 10 s.
+  /// The next line, or "" when the connection ended or after 10 s.
   std::string line() {
     for (;;) {
       const std::size_t end = input_.find('\n');

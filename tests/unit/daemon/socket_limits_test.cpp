@@ -12,7 +12,8 @@
 using namespace thermocomp;
 using namespace thermocomp::testing;
 
-TEST_CASE("clients that did not come whole, do not ask, or do not read are cut off", "[socket]") {
+TEST_CASE("clients with incomplete requests, without requests, or not reading are cut off",
+          "[socket]") {
   const TempFolder folder;
   SocketLimits limits;
   limits.partial_line_max = limits.unread_max = milliseconds(300);
@@ -39,14 +40,14 @@ TEST_CASE("clients that did not come whole, do not ask, or do not read are cut o
       std::this_thread::sleep_for(milliseconds(20));
     }
   }
-  // The peer sees its end before the server's thread has told its counts.
+  // The peer may see its end before the server's counters change.
   for (int i = 0; i < 500 && server.statistics().cut_off == 0; ++i) {
     std::this_thread::sleep_for(milliseconds(20));
   }
   CHECK(server.statistics().cut_off == 1);
 }
 
-TEST_CASE("a subscriber that does not read costs no memory and is told what it missed",
+TEST_CASE("a subscriber that does not read takes no memory and is sent the number missed",
           "[socket]") {
   const TempFolder folder;
   const RunningServer server(folder / "s");
@@ -67,7 +68,7 @@ TEST_CASE("a subscriber that does not read costs no memory and is told what it m
   CHECK(told["params"]["notifications"].get<int>() >= 3);
 }
 
-TEST_CASE("a flood of one client is delayed, not refused, and others are answered meanwhile",
+TEST_CASE("a flood of requests is delayed, not refused, and other clients are answered",
           "[socket]") {
   const TempFolder folder;
   SocketLimits limits;
@@ -85,12 +86,12 @@ TEST_CASE("a flood of one client is delayed, not refused, and others are answere
   for (; answers < 100 && hog.line().find("compensating") != std::string::npos; ++answers) {
   }
   CHECK(answers == 100);
-  // (100 - 20) / 50 a second: never sooner, whatever the machine does.
+  // Lower bound on any machine: (100 - 20) / 50 per second.
   CHECK(std::chrono::steady_clock::now() - begin >= milliseconds(1590));
   CHECK(server.statistics().delayed > 0);
 }
 
-TEST_CASE("all clients together have a rate, too", "[socket]") {
+TEST_CASE("all clients together have a rate limit", "[socket]") {
   const TempFolder folder;
   SocketLimits limits;
   limits.all_requests_per_s = 50.0;
@@ -110,7 +111,7 @@ TEST_CASE("all clients together have a rate, too", "[socket]") {
   CHECK(std::chrono::steady_clock::now() - begin >= milliseconds(1590));
 }
 
-TEST_CASE("one turn of the server is short however much there is to do", "[socket]") {
+TEST_CASE("a turn of the server is short, independent of the load", "[socket]") {
   const TempFolder folder;
   const SocketConfig config{folder / "s", "no-such-1", "no-such-2", "no-such-3"};
   StatusServer server(config);
@@ -129,7 +130,7 @@ TEST_CASE("one turn of the server is short however much there is to do", "[socke
   }
   for (int turn = 0; turn < 100 && calls < 15; ++turn) {
     const int before = calls;
-    // What is left keeps the descriptor readable: a poll on it must not sleep.
+    // Remaining work keeps the descriptor readable: poll() must not sleep.
     pollfd entry{server.fd(), POLLIN, 0};
     REQUIRE(poll(&entry, 1, 10000) == 1);
     server.handle(milliseconds(0));
@@ -138,7 +139,7 @@ TEST_CASE("one turn of the server is short however much there is to do", "[socke
   CHECK(calls == 15);
 }
 
-TEST_CASE("a connection does not take a number that select() could wait for", "[socket]") {
+TEST_CASE("a connection does not take a descriptor below FD_SETSIZE", "[socket]") {
   const TempFolder folder;
   const RunningServer server(folder / "s");
   const auto low_numbers = [] {
@@ -156,7 +157,7 @@ TEST_CASE("a connection does not take a number that select() could wait for", "[
   CHECK(low_numbers() - before == 10);  // ours
 }
 
-TEST_CASE("a thousand clients and more are served", "[socket]") {
+TEST_CASE("more than a thousand clients are served", "[socket]") {
   const TempFolder folder;
   const RunningServer server(folder / "s");
   std::vector<std::unique_ptr<RawClient>> clients;
@@ -169,15 +170,17 @@ TEST_CASE("a thousand clients and more are served", "[socket]") {
   for (const auto& client : clients)
     served += client->line().find("compensating") != std::string::npos ? 1 : 0;
   CHECK(served == 1100);
-  // It counts at the end of a turn, which may come after its answers.
+  // Counters change at the end of a turn, possibly after its answers.
   for (int wait = 0; wait < 500 && server.statistics().clients != 1100; ++wait)
     std::this_thread::sleep_for(milliseconds(20));
   CHECK(server.statistics().clients == 1100);
   CHECK(server.statistics().buffered_bytes < 4u << 20);
 }
 
-TEST_CASE("when all places are taken, the longest idle makes room, and operators have some left",
-          "[socket][permission]") {
+TEST_CASE(
+    "when all places are taken, the longest idle client is replaced, and operators have reserved "
+    "places",
+    "[socket][permission]") {
   if (geteuid() != 0) {
     WARN("skipped: only root can take another user");
     return;
@@ -187,7 +190,7 @@ TEST_CASE("when all places are taken, the longest idle makes room, and operators
   SocketLimits limits;
   limits.clients_max = 8;
   limits.operator_places = 2;
-  // Every user is in the group of readers here; only root may change something.
+  // Every user is in the read group here; only root may operate.
   const SocketConfig config{folder / "s", "nogroup", "root", "root"};
   SECTION("a reader finds no place while all are fresh, root does") {
     limits.replaceable_after = std::chrono::hours(1);
@@ -202,7 +205,7 @@ TEST_CASE("when all places are taken, the longest idle makes room, and operators
       clients[0]->send(status_request);
       const bool is_served = clients[0]->line().find("good") != std::string::npos;
       const bool is_refused = clients[9]->line().find("clients already") != std::string::npos;
-      clients[0]->line();  // until the parent has looked
+      clients[0]->line();  // until the parent has checked
       _exit(is_served && is_refused ? 0 : 1);
     }
     for (int i = 0; i < 2000 && server.statistics().refused < 4; ++i)
@@ -234,7 +237,7 @@ TEST_CASE("when all places are taken, the longest idle makes room, and operators
   }
 }
 
-TEST_CASE("all clients together hold bounded memory: who holds most goes", "[socket]") {
+TEST_CASE("memory of all clients is bounded: the client that holds most is closed", "[socket]") {
   const TempFolder folder;
   SocketLimits limits;
   limits.buffered_bytes_max = 200000;
@@ -253,7 +256,7 @@ TEST_CASE("all clients together hold bounded memory: who holds most goes", "[soc
   CHECK(polite.call("status", {})["mode"] == "compensating");
 }
 
-TEST_CASE("what was sent before hanging up is done", "[socket]") {
+TEST_CASE("requests sent before hanging up are served", "[socket]") {
   const TempFolder folder;
   const SocketConfig config{folder / "s", "no-such-1", "no-such-2", "no-such-3"};
   StatusServer server(config);
@@ -270,15 +273,14 @@ TEST_CASE("what was sent before hanging up is done", "[socket]") {
   CHECK(server.statistics().clients == 0);
 }
 
-TEST_CASE("supplementary groups of the peer count, as the kernel tells them",
-          "[socket][permission]") {
+TEST_CASE("supplementary groups of the peer count", "[socket][permission]") {
   if (geteuid() != 0) {
     WARN("skipped: only root can take another user");
     return;
   }
   const TempFolder folder;
   std::filesystem::permissions(folder.path(), std::filesystem::perms::all);
-  // Groups of every Debian system stand for those of the package.
+  // Groups of every Debian system replace those of the package.
   StatusServer server(SocketConfig{folder / "s", "users", "disk", "dialout"});
   server.add_method("status", AccessClass::read, [](const json&) { return json(true); });
   server.add_method("enable", AccessClass::operate, [](const json&) { return json(true); });

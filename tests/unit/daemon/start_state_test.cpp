@@ -1,4 +1,4 @@
-// With which state the daemon starts where its state file is gone or damaged.
+// The start state with a missing or damaged state file.
 #include "daemon/start_state.hpp"
 
 #include <cmath>
@@ -23,7 +23,7 @@ DaemonConfig in_folder(const TempFolder& folder) {
   return config;
 }
 
-/// The state that the machine had when the history ended.
+/// The machine's state at the end of the history.
 PersistentState record(const std::filesystem::path& file, unsigned seed, bool reloads) {
   RecordedMachine machine(history_config(file), seed);
   machine.start();
@@ -50,7 +50,7 @@ void damage_newest_segment(const std::filesystem::path& file) {
 
 }  // namespace
 
-TEST_CASE("the history ends with the state that the machine had", "[history]") {
+TEST_CASE("the history ends with the machine's state", "[history]") {
   const unsigned seed = GENERATE(range(0u, 8u));
   const TempFolder folder;
   const PersistentState state = record(folder / "h.db", seed, seed % 2 == 1);
@@ -62,7 +62,7 @@ TEST_CASE("the history ends with the state that the machine had", "[history]") {
   CHECK(recorded.state->offset_um == state.offset_um);
 }
 
-TEST_CASE("where the newest segment is damaged an older one is reported as such", "[history]") {
+TEST_CASE("if the newest segment is damaged, an older one is reported as such", "[history]") {
   const TempFolder folder;
   static_cast<void>(record(folder / "h.db", 1, true));
   damage_newest_segment(folder / "h.db");
@@ -72,7 +72,7 @@ TEST_CASE("where the newest segment is damaged an older one is reported as such"
   CHECK(recorded.problem.find("segment") == 0);
 }
 
-TEST_CASE("what was once a history is no first start, what never was is one", "[history]") {
+TEST_CASE("a damaged history is not a first start, a missing one is", "[history]") {
   const TempFolder folder;
   CHECK_FALSE(last_recorded_state(folder / "h.db", parse_test_setup).has_run);
   { const std::ofstream empty(folder / "h.db"); }
@@ -83,7 +83,7 @@ TEST_CASE("what was once a history is no first start, what never was is one", "[
   CHECK_FALSE(recorded.state);
 }
 
-TEST_CASE("without state file and history it is the first start", "[state]") {
+TEST_CASE("no state file and no history is the first start", "[state]") {
   const TempFolder folder;
   DaemonConfig config = in_folder(folder);
   config.estimator.compensation.enabled_at_first_start = GENERATE(true, false);
@@ -93,11 +93,11 @@ TEST_CASE("without state file and history it is the first start", "[state]") {
   CHECK_FALSE(start.reference_lost);
 }
 
-TEST_CASE("a first start is switched off unless the configuration says otherwise", "[state]") {
+TEST_CASE("a first start is disabled unless configured otherwise", "[state]") {
   const TempFolder folder;
   const DaemonConfig config = in_folder(folder);
   CHECK_FALSE(find_start_state(config).state.enabled);
-  // What an operator said goes before what the configuration says.
+  // An operator's command overrides the configuration.
   PersistentState said;
   said.enabled = true;
   REQUIRE(
@@ -107,7 +107,7 @@ TEST_CASE("a first start is switched off unless the configuration says otherwise
   CHECK(start.reference.wall_s == 12.0);
 }
 
-TEST_CASE("an unusable state file without a history keeps the machine off", "[state]") {
+TEST_CASE("an unusable state file without a history keeps the compensation off", "[state]") {
   const TempFolder folder;
   const DaemonConfig config = in_folder(folder);
   std::ofstream(config.state_file) << "{";
@@ -117,14 +117,14 @@ TEST_CASE("an unusable state file without a history keeps the machine off", "[st
   CHECK_FALSE(start.is_on_disk);
   REQUIRE(start.warnings.size() == 1);
   CHECK(start.warnings[0].find("cannot be used") != std::string::npos);
-  // And so does the file that is then written.
+  // So does the file written afterwards.
   REQUIRE(save_state_file(config.state_file, start.state, start.reference_lost).empty());
   start = find_start_state(config);
   CHECK(start.reference_lost);
   CHECK_FALSE(start.state.enabled);
 }
 
-TEST_CASE("offsets of a file are judged by this configuration", "[state]") {
+TEST_CASE("offsets of a file are checked against this configuration", "[state]") {
   const TempFolder folder;
   DaemonConfig config = in_folder(folder);
   BridgeControllerConfig bridge;

@@ -31,7 +31,7 @@ PersistentState sample_state() {
 
 }  // namespace
 
-TEST_CASE("a state comes back bit for bit", "[state]") {
+TEST_CASE("a saved state is loaded bit for bit", "[state]") {
   const TempFolder folder;
   const PersistentState state = sample_state();
   REQUIRE(save_state_file(folder / "state.json", state).empty());
@@ -53,7 +53,7 @@ TEST_CASE("a state comes back bit for bit", "[state]") {
   CHECK(loaded.state.correction == state.correction);
 }
 
-TEST_CASE("no state file is the first start and no warning", "[state]") {
+TEST_CASE("a missing state file is the first start, without a warning", "[state]") {
   const TempFolder folder;
   const LoadedState loaded = load_state_file(folder / "state.json", sample_state());
   CHECK_FALSE(loaded.found);
@@ -61,7 +61,7 @@ TEST_CASE("no state file is the first start and no warning", "[state]") {
   CHECK_FALSE(loaded.state.enabled);
 }
 
-TEST_CASE("an unusable state file is moved aside and said", "[state]") {
+TEST_CASE("an unusable state file is moved aside and reported", "[state]") {
   const std::string head = R"({"program":"thermocomp",)";
   const std::string without_correction =
       R"(,"model_reference_degC":{},"reference_signals":{},"offset_um":{},"temp_degC":{},)"
@@ -91,7 +91,7 @@ TEST_CASE("an unusable state file is moved aside and said", "[state]") {
   CHECK(std::filesystem::exists(file.string() + ".unusable"));
 }
 
-TEST_CASE("the state of a newer version is kept under a name that nothing else gets", "[state]") {
+TEST_CASE("the state of a newer version is kept under a name of its own", "[state]") {
   const TempFolder folder;
   const std::filesystem::path file = folder / "state.json";
   const std::string newer = R"({"program":"thermocomp","format":2,"moved":"elsewhere"})";
@@ -111,14 +111,13 @@ TEST_CASE("a state that cannot be written is an error and leaves the old file", 
   const TempFolder folder;
   const std::filesystem::path file = folder / "state.json";
   REQUIRE(save_state_file(file, sample_state()).empty());
-  std::filesystem::create_directory(file.string() + ".new");  // where the new one would be made
+  std::filesystem::create_directory(file.string() + ".new");  // blocks the new file
   CHECK_FALSE(save_state_file(file, PersistentState{}).empty());
   CHECK(load_state_file(file, {}).state.offset_um == sample_state().offset_um);
   CHECK_FALSE(save_state_file(folder / "missing/state.json", sample_state()).empty());
 }
 
-TEST_CASE("when the reference was taken comes back, and costs nothing where it cannot be read",
-          "[state]") {
+TEST_CASE("the reference's origin is loaded, and an unreadable one is ignored", "[state]") {
   const TempFolder folder;
   const auto file = folder / "state.json";
   REQUIRE(save_state_file(file, sample_state(), false, {1772350211.5, ReferenceOrigin::command})

@@ -1,4 +1,4 @@
-// When the state is written, and what is known of it when it cannot be.
+// StateKeeper: times of writing, and reports of failures.
 #include <atomic>
 #include <thread>
 #include <unistd.h>
@@ -19,7 +19,7 @@ std::atomic<bool> disk_stands{false};
 
 }  // namespace
 
-/// In the place of the C library's.
+/// Replaces the C library's.
 extern "C" int fsync(int file) {
   while (disk_stands) std::this_thread::sleep_for(1ms);
   return static_cast<int>(syscall(SYS_fsync, file));
@@ -67,7 +67,7 @@ TEST_CASE("offsets alone are written every ten seconds, a switch at once", "[sta
   CHECK(kept.on_disk().state.offset_um.at("z") == 4.0);
 }
 
-TEST_CASE("a state that came from elsewhere is written even if nothing changes", "[state]") {
+TEST_CASE("a state not from the file is written even if nothing changes", "[state]") {
   Kept kept;
   StateKeeper keeper(kept.file, with_offset(1.0), false, false);
   keeper.save(with_offset(1.0), kept.now);
@@ -75,7 +75,7 @@ TEST_CASE("a state that came from elsewhere is written even if nothing changes",
   CHECK(kept.on_disk().found);
 }
 
-TEST_CASE("what could not be written is tried again until it is", "[state]") {
+TEST_CASE("a failed write is retried until it succeeds", "[state]") {
   Kept kept;
   const std::filesystem::path in_the_way = kept.file.string() + ".new";
   std::filesystem::create_directory(in_the_way);
@@ -95,7 +95,7 @@ TEST_CASE("what could not be written is tried again until it is", "[state]") {
   CHECK_FALSE(kept.on_disk().state.enabled);
 }
 
-TEST_CASE("a disk that stands is waited for by nobody, and gets the newest state only", "[state]") {
+TEST_CASE("a hanging disk blocks nobody and then gets the newest state only", "[state]") {
   Kept kept;
   disk_stands = true;
   StateKeeper keeper(kept.file, with_offset(1.0), true, false);
@@ -117,7 +117,7 @@ TEST_CASE("a disk that stands is waited for by nobody, and gets the newest state
   CHECK(kept.on_disk().state.offset_um.at("z") == 50.0);
 }
 
-TEST_CASE("what is on disk is reported with the state that is there", "[state]") {
+TEST_CASE("the state on disk is reported with its serial", "[state]") {
   Kept kept;
   StateKeeper keeper(kept.file, with_offset(1.0), true, false);
   CHECK(keeper.saving(keeper.serial()) == StateKeeper::Saving::on_disk);
@@ -134,7 +134,7 @@ TEST_CASE("what is on disk is reported with the state that is there", "[state]")
   CHECK(keeper.on_disk().state.offset_um.at("z") == 2.0);
 }
 
-TEST_CASE("a keeper ends though its disk stands", "[state]") {
+TEST_CASE("a keeper ends while its disk hangs", "[state]") {
   Kept kept;
   disk_stands = true;
   const auto begun = StateKeeper::Clock::now();
@@ -146,7 +146,7 @@ TEST_CASE("a keeper ends though its disk stands", "[state]") {
   disk_stands = false;
 }
 
-TEST_CASE("a lost reference stays lost over restarts until one is taken", "[state]") {
+TEST_CASE("a lost reference stays lost across restarts until one is taken", "[state]") {
   Kept kept;
   {
     StateKeeper keeper(kept.file, with_offset(1.0), false, true);

@@ -16,7 +16,7 @@
 using namespace thermocomp;
 using namespace thermocomp::testing;
 
-TEST_CASE("a call is answered, and NaN is null", "[socket]") {
+TEST_CASE("a call is answered, with NaN as null", "[socket]") {
   const TempFolder folder;
   const RunningServer server(folder / "s");
   StatusClient client(folder / "s");
@@ -34,7 +34,7 @@ TEST_CASE("a call is answered, and NaN is null", "[socket]") {
   }
 }
 
-TEST_CASE("each kind of bad request has its error, and the next request works", "[socket]") {
+TEST_CASE("each kind of invalid request has its error, and the next request works", "[socket]") {
   const TempFolder folder;
   const RunningServer server(folder / "s");
   RawClient client(folder / "s");
@@ -93,7 +93,7 @@ TEST_CASE("a line that is too long ends the connection with an error", "[socket]
   CHECK_NOTHROW(other.call("status", {}));
 }
 
-TEST_CASE("a request in pieces and one without an open input are answered", "[socket]") {
+TEST_CASE("a request in pieces and one with its input closed are answered", "[socket]") {
   const TempFolder folder;
   const RunningServer server(folder / "s");
   RawClient client(folder / "s");
@@ -105,7 +105,7 @@ TEST_CASE("a request in pieces and one without an open input are answered", "[so
   CHECK(client.line().empty());
 }
 
-TEST_CASE("a subscription sends what was asked for until the client leaves", "[socket]") {
+TEST_CASE("a subscription sends its methods until the client disconnects", "[socket]") {
   const TempFolder folder;
   const RunningServer server(folder / "s");
   StatusClient client(folder / "s");
@@ -135,7 +135,7 @@ TEST_CASE("another user without the groups may do nothing", "[socket][permission
       RawClient client(folder / "s");
       client.send(std::string("{\"jsonrpc\":\"2.0\",\"id\":1,\"method\":\"") + method + "\"}\n");
       if (client.error_code() != rpc::not_permitted) ++failures;
-      if (!client.line().empty()) ++failures;  // one answer, and the place is free again
+      if (!client.line().empty()) ++failures;  // one answer frees the place
     }
     _exit(failures);
   }
@@ -144,8 +144,8 @@ TEST_CASE("another user without the groups may do nothing", "[socket][permission
   CHECK(WEXITSTATUS(status) == 0);
 }
 
-TEST_CASE("each group may do what is its own", "[socket][permission]") {
-  // Groups of every Debian system stand for those of the package.
+TEST_CASE("each group has its own permissions", "[socket][permission]") {
+  // Groups of every Debian system replace those of the package.
   const SocketConfig config{"/s", "users", "disk", "dialout", "audio"};
   const auto gid = [](const char* name) { return getgrnam(name)->gr_gid; };
   const auto access = [&](uid_t user, std::vector<gid_t> groups) {
@@ -171,7 +171,7 @@ TEST_CASE("each group may do what is its own", "[socket][permission]") {
   CHECK(developer == PeerAccess{true, true, true, true});
 }
 
-TEST_CASE("a socket path is taken over only from the dead", "[socket]") {
+TEST_CASE("a socket path is taken over only from a dead daemon", "[socket]") {
   const TempFolder folder;
   const std::filesystem::path path = folder / "s";
   SECTION("a second daemon is refused") {
@@ -225,7 +225,7 @@ TEST_CASE("of daemons started at once exactly one has the socket", "[socket]") {
   CHECK(listening == 1);
 }
 
-TEST_CASE("a request rig answers bytes without any socket", "[socket]") {
+TEST_CASE("the dispatcher answers bytes without a socket", "[socket]") {
   RpcDispatcher rig(SocketConfig{});
   rig.add_method("status", AccessClass::read, [](const json&) { return json("good"); });
   const PeerAccess reader{true, false, false};

@@ -9,7 +9,7 @@ namespace {
 
 using std::chrono::minutes;
 
-/// d(minutes) once a minute for so many of them.
+/// d(t) sampled once per minute.
 template <class Course>
 RemainingDrift after(int count, const Course& course_um, double bound_um = 1.0) {
   WarmUp warm;
@@ -17,12 +17,12 @@ RemainingDrift after(int count, const Course& course_um, double bound_um = 1.0) 
   return warm.remaining().front();
 }
 
-TEST_CASE("an exponential approach is told from its course", "[warm_up]") {
-  // 30 um with 40 min, which is none of the taus: after two hours 30 exp(-3) = 1.49 um are to come.
+TEST_CASE("the remainder of an exponential approach is estimated from its course", "[warm_up]") {
+  // 30 um with 40 min, which is none of the taus: after two hours 30 exp(-3) = 1.49 um remain.
   const RemainingDrift hours = after(120, [](int i) { return 30.0 * (1.0 - std::exp(-i / 40.0)); });
   CHECK(hours.um == Approx(1.49).margin(1.1));
   // Two bodies at once, 20 um with 10 min and 10 um with 90 min: after an hour 10 exp(-2/3) = 5.13
-  // um and 0.05 um; 1 um is to come after another 147 min.
+  // um and 0.05 um remain; 1 um after another 147 min.
   const RemainingDrift both = after(60, [](int i) {
     return 20.0 * (1.0 - std::exp(-i / 10.0)) + 10.0 * (1.0 - std::exp(-i / 90.0));
   });
@@ -33,11 +33,12 @@ TEST_CASE("an exponential approach is told from its course", "[warm_up]") {
   CHECK(late.minutes == 0.0);
 }
 
-TEST_CASE("what cannot be told is not known, and a straight rise is not nearly done", "[warm_up]") {
+TEST_CASE("an indeterminate remainder is unknown, and a linear rise is not close to its end",
+          "[warm_up]") {
   const auto rise = [](int i) { return 0.2 * i; };
   CHECK(std::isnan(after(10, rise).um));
   CHECK(after(60, rise).um > 12.0);
-  // A load that changed ten minutes ago: no stretch is of one approach.
+  // The load changed ten minutes ago: no stretch has a single approach.
   const RemainingDrift changed =
       after(100, [](int i) { return i < 90 ? 10.0 : 10.0 + 2.0 * (i - 90); });
   CHECK(std::isnan(changed.um));
@@ -56,7 +57,7 @@ ThermalModel model_with_claim() {
   return model;
 }
 
-TEST_CASE("a probing is due by what the model may be off by since the last one", "[warm_up]") {
+TEST_CASE("a probing is due by the model's error since the last one", "[warm_up]") {
   const ThermalModel model = model_with_claim();
   SinceProbing since;
   std::vector<AxisReport> axes(1);
@@ -64,7 +65,7 @@ TEST_CASE("a probing is due by what the model may be off by since the last one",
   since.note(axes, "a");
   axes[0].displacement_um = 25.0;
   since.note(axes, "a");
-  // 5 / 20 of the 20 um since the start: left out 4, and 3 not shown by four runs.
+  // 5 / 20 of the 20 um since the start; 5 = hypot(4 left out, 3 for the number of runs).
   CHECK(since.error_um(0, axes[0], model, "z_um", false) == Approx(5.0));
   axes[0].probings = 1;
   since.note(axes, "a");
@@ -72,7 +73,7 @@ TEST_CASE("a probing is due by what the model may be off by since the last one",
   axes[0].displacement_um = 15.0;
   CHECK(since.error_um(0, axes[0], model, "z_um", false) == Approx(2.5));
   since.note(axes, "a");
-  axes[0].displacement_um = 5.0;  // the same temperatures by another model
+  axes[0].displacement_um = 5.0;  // another model at the same temperatures
   since.note(axes, "b");
   CHECK(since.error_um(0, axes[0], model, "z_um", false) == Approx(2.5));
   axes[0].displacement_um = -5.0;
