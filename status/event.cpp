@@ -15,7 +15,7 @@ namespace {
 
 struct SubjectName {
   std::string_view name;
-  std::string_view before;  ///< the name of what it is
+  std::string_view before;  ///< precedes the name
   std::string_view after;
 };
 constexpr std::array<std::string_view, 5> kinds{"fault", "recovery", "mode", "command", "daemon"};
@@ -49,7 +49,7 @@ std::string daemon_text(const Event& event) {
   return event.detail.empty() ? event.code : event.code + ": " + event.detail;
 }
 
-/// Of a fault, without its subject.
+/// Text of a fault, without its subject.
 std::string fault_what(const Event& event) {
   switch (event.subject.kind) {
     case SubjectKind::suspected_sensor:
@@ -69,7 +69,7 @@ std::string fault_what(const Event& event) {
   }
 }
 
-/// The same in the words of the status.
+/// The meaning as in the status.
 std::string meaning_of(const Event& event) {
   const auto reason = reason_named(event.code);
   if (reason && event.subject.kind == SubjectKind::reason)
@@ -93,7 +93,7 @@ std::string user_text(const Event& event) {
          (entry != nullptr ? std::string(entry->pw_name) : "user " + std::to_string(event.user));
 }
 
-/// Below a minute with a tenth: short outages are what events are read for.
+/// To 0.1 s below a minute, for short outages.
 std::string lasted(double seconds) {
   return seconds < 60.0 ? fixed(seconds, 1) + " s" : duration_text(seconds);
 }
@@ -161,7 +161,7 @@ std::string event_text(const Event& event) {
 
 std::string events_text(const std::vector<Event>& events) {
   std::string text;
-  std::string of_daemon;  // code of the last of its own events
+  std::string of_daemon;  // code of the daemon's last own event
   for (const Event& event : events) {
     text += local_time(event.wall_s) + "  " + padded(std::string(to_string(event.kind)), 8) + "  " +
             event_text(event);

@@ -1,4 +1,4 @@
-/// What happened: one record each, and its text for people.
+/// Events of the daemon, and their texts.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ namespace thermocomp {
 
 enum class EventKind : std::uint8_t { fault, recovery, mode, command, daemon };
 
-/// What an event is about; `nothing` where its kind is enough.
+/// Subject of an event; `nothing` if its kind suffices.
 enum class SubjectKind : std::uint8_t {
   nothing,
   reason,
@@ -22,20 +22,20 @@ enum class SubjectKind : std::uint8_t {
   suspected_sensor,
   input,  ///< a temperature column of the model
   axis,
-  estimate,  ///< of an axis, from inputs that are estimated themselves
+  estimate,  ///< of an axis, from estimated inputs
   bus,
-  bus_errors,  ///< of a CAN interface that is connected
+  bus_errors,  ///< of a connected CAN interface
   device,
   controller,
   controller_errors,
   controller_writes,
   history,
-  log  ///< of the daemon itself
+  log  ///< the daemon's log
 };
 
 struct Subject {
   SubjectKind kind{SubjectKind::nothing};
-  std::string name;  ///< of an event of kind `mode`: the mode before, empty for the first one
+  std::string name;  ///< kind `mode`: the previous mode, empty for the first one
 
   Subject() = default;
   Subject(SubjectKind of_kind, std::string named) : kind(of_kind), name(std::move(named)) {}
@@ -43,7 +43,7 @@ struct Subject {
   auto operator<=>(const Subject&) const = default;
 };
 
-/// Of the probings, what each model alone left.
+/// RMS error of each model alone over the probings.
 struct ContestRms {
   double model{std::numeric_limits<double>::quiet_NaN()};
   double candidate{std::numeric_limits<double>::quiet_NaN()};
@@ -55,10 +55,10 @@ struct ContestRms {
   }
 };
 
-/// The model that runs beside the one in use.
+/// The candidate model.
 struct CandidateStatus {
   std::string file{};
-  std::string problem{};  ///< why it does not run; empty: it does
+  std::string problem{};  ///< why it does not run; empty if it does
   std::uint64_t probings{0};
   std::map<std::string, ContestRms> rms_um{};  ///< by axis
   double better_probability{std::numeric_limits<double>::quiet_NaN()};
@@ -76,45 +76,44 @@ struct CandidateStatus {
 };
 
 struct Event {
-  std::uint64_t number{0};  ///< counts up from 1 in a run of the daemon
+  std::uint64_t number{0};  ///< counted from 1 in each run of the daemon
   double wall_s{0.0};       ///< since 1970
   EventKind kind{EventKind::daemon};
   Subject subject{};
-  /// Name of the reason, fault, mode, command or CAN state; else one word that programs compare:
-  /// "suspected", "mismatch_latched", "not_connected", "not_written", "estimated", "lost",
-  /// "uncertain", "not_taken"; of the daemon "started", "stopping", "history".
+  /// Name of the reason, fault, mode, command or CAN state, or a fixed word: "suspected",
+  /// "mismatch_latched", "not_connected", "not_written", "estimated", "lost", "uncertain",
+  /// "not_taken"; of the daemon "started", "stopping", "history".
   std::string code{};
-  std::string detail{};  ///< in the words of a device, driver or signal; may be empty
+  std::string detail{};  ///< text of a device, driver or signal; may be empty
   /// suspected: error of the sensor [K]; commands `measured` and `prove`: [um]; NaN: none
   double value{std::numeric_limits<double>::quiet_NaN()};
-  /// recovery: how long the fault lasted; mode: how long the one before it did [s]. NaN: neither
+  /// recovery: duration of the fault [s]; mode: duration of the previous one [s]; else NaN
   double duration_s{std::numeric_limits<double>::quiet_NaN()};
-  bool comes_and_goes{false};  ///< fault: one that returned soon after its end
-  std::int64_t user{-1};       ///< command: who gave it, by the kernel; -1: nobody, or SIGHUP
-  /// command `measured`: the score of a model that ran beside, this probing included
+  bool comes_and_goes{false};  ///< fault: intermittent, returned soon after its end
+  std::int64_t user{-1};       ///< command: user ID from the kernel; -1: none, or SIGHUP
+  /// command `measured`: the candidate's score, including this probing
   std::optional<CandidateStatus> candidate{};
 };
 
-/// An event of a history, with the run of the daemon that it belongs to.
+/// An event in a history, with its run of the daemon.
 struct RecordedEvent : Event {
-  std::int64_t run{0};  ///< one number for each start of the daemon; set by the history
+  std::int64_t run{0};  ///< number of the daemon's start; set by the history
 };
 
 [[nodiscard]] std::string_view to_string(EventKind kind) noexcept;
 [[nodiscard]] std::string_view to_string(SubjectKind kind) noexcept;
-/// An unknown name is `daemon`.
+/// `daemon` for an unknown name.
 [[nodiscard]] EventKind event_kind_named(std::string_view name) noexcept;
-/// An unknown name is `nothing`.
+/// `nothing` for an unknown name.
 [[nodiscard]] SubjectKind subject_kind_named(std::string_view name) noexcept;
 
-/// "sensor bed_front", "reason at_bound", "bus cabinet, errors"; of a mode the one before.
+/// "sensor bed_front", "reason at_bound", "bus cabinet, errors"; for a mode the previous one.
 [[nodiscard]] std::string subject_text(const Subject& subject);
-/// Without its subject: "stale", "measured z 1.5 um", "off by +2.0 K against its neighbours".
+/// Text without subject: "stale", "measured z 1.5 um", "off by +2.0 K against its neighbours".
 [[nodiscard]] std::string what_text(const Event& event);
-/// A line for people, without time and kind: "sensor bed_front: not renewed in time: over, lasted
-/// 28.1 s".
+/// A line without time and kind: "sensor bed_front: not renewed in time: over, lasted 28.1 s".
 [[nodiscard]] std::string event_text(const Event& event);
-/// One line an event: local time, kind, text.
+/// One line per event: local time, kind, text.
 /// @param events  oldest first
 [[nodiscard]] std::string events_text(const std::vector<Event>& events);
 

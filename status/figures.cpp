@@ -17,7 +17,7 @@ std::string formatted(double value, int digits, int width, const char* format) {
     return std::string(blanks, ' ') + "-";
   }
   std::array<char, 400> text{};
-  // Clang and GCC cannot see that the format comes from the two callers below.
+  // Clang and GCC cannot see the formats of the two callers below.
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wformat-nonliteral"
   std::snprintf(text.data(), text.size(), format, width, digits, value);

@@ -1,8 +1,8 @@
-/// What the daemon says of itself, as plain structures: the answers of the status socket.
+/// The answers of the status socket as plain structures.
 ///
-/// A field is a member and, in `fields`, its key in JSON; daemon/status fills it, each view shows
-/// it. Lengths are in the axis' unit where the name has none. NaN: not known (null in JSON).
-/// docs/socket.md shows the JSON.
+/// `fields` gives each member its key in JSON; daemon/status fills it, each view shows it. Lengths
+/// without a unit in their name are in the axis' unit. NaN: unknown (null in JSON). docs/socket.md
+/// shows the JSON.
 #pragma once
 
 #include <cstdint>
@@ -17,12 +17,12 @@
 
 namespace thermocomp {
 
-/// A read-back that nothing sent explains.
+/// A read-back that is explained by no sent offset.
 struct LatchedMismatch {
   double sent_um{not_a_number};
   double read_um{not_a_number};
-  std::string likely{};   ///< in words
-  bool releasing{false};  ///< released, the read-backs are looked at
+  std::string likely{};   ///< text
+  bool releasing{false};  ///< released; read-backs are being checked
 
   template <class Self, class Visitor>
   static void fields(Self& self, Visitor& visit) {
@@ -37,7 +37,7 @@ struct GainStatus {
   std::vector<std::string> inputs{};
   double gain{not_a_number};
   double sd{not_a_number};
-  std::optional<double> used{};  ///< these three: the model has a recorded course
+  std::optional<double> used{};  ///< this and the next two: if the model has a recorded course
   std::optional<double> recorded{};
   std::optional<double> recorded_sd{};
 
@@ -82,22 +82,22 @@ struct AxisStatus {
   double displacement{not_a_number};
   double target{not_a_number};
   double offset{not_a_number};      ///< sent
-  double offset_max{not_a_number};  ///< bound of its size
-  double applied{not_a_number};     ///< read back
-  double measured{not_a_number};    ///< by the last command `measured`
+  double offset_max{not_a_number};  ///< bound of |offset|
+  double applied{not_a_number};     ///< read-back
+  double measured{not_a_number};    ///< last command `measured`
   bool synced{false};
   bool driven{false};
-  bool disagrees{false};  ///< the read-back differs from what is sent
+  bool disagrees{false};  ///< the read-back differs from the sent offset
   std::optional<LatchedMismatch> latched{};
   bool at_bound{false};
   bool proving{false};
-  double offset_sd{not_a_number};  ///< standard deviation from estimated blocks
+  double offset_sd{not_a_number};  ///< standard deviation due to estimated blocks
   double offset_sd_max{not_a_number};
-  /// Where the offset sent last is known from: "read_back", "registers", "record", "corridor",
-  /// "released" (an operator has set it to zero), "unknown".
+  /// Source of the last sent offset at start: "read_back", "registers", "record", "corridor",
+  /// "released" (set to zero by an operator), "unknown".
   std::string start{"unknown"};
-  std::optional<std::string> axis{};  ///< of a node of a travel: the axis' own name
-  std::optional<double> at_mm{};      ///< ... and the node's position
+  std::optional<std::string> axis{};  ///< of a node: the axis' own name
+  std::optional<double> at_mm{};      ///< of a node: its position
   std::optional<double> held{};       ///< update = each_cycle: displacement at the held state
   std::optional<CorrectionStatus> correction{};
 
@@ -151,11 +151,11 @@ struct InputStatus {
   }
 };
 
-/// The error of a sensor, by its neighbours.
+/// Error of a sensor, estimated from its neighbours.
 struct SensorError {
   double size_K{not_a_number};
   double since{not_a_number};  ///< wall clock, s since 1970
-  bool weighed_down{false};    ///< its blocks do without it
+  bool weighed_down{false};    ///< not used in its blocks
 
   template <class Self, class Visitor>
   static void fields(Self& self, Visitor& visit) {
@@ -176,7 +176,7 @@ struct SuspectedSensor {
   }
 };
 
-/// The unconfirmed change of a sensor.
+/// Unconfirmed change of a sensor.
 struct Jump {
   double size_K{not_a_number};
   double since{not_a_number};  ///< wall clock, s since 1970
@@ -238,9 +238,9 @@ struct UnitStatus {
   std::uint64_t bad_frames{0};
   double round_trip_ms{not_a_number};
   std::string last_error{};
-  std::vector<std::string> sensors{};  ///< that it reads
-  std::vector<std::string> blocks{};   ///< that these belong to
-  double silent_s{not_a_number};       ///< age of its newest reading
+  std::vector<std::string> sensors{};  ///< read by this unit
+  std::vector<std::string> blocks{};   ///< of these sensors
+  double silent_s{not_a_number};       ///< age of the newest reading
 
   template <class Self, class Visitor>
   static void fields(Self& self, Visitor& visit) {
@@ -266,8 +266,8 @@ struct BusStatus {
   std::uint64_t connects{0};
   std::string last_error{};
   std::vector<UnitStatus> units{};
-  std::optional<std::string> state{};  ///< from here on: of a CAN interface
-  std::optional<double> state_s{};     ///< how long it has been in that state
+  std::optional<std::string> state{};  ///< this and the following: CAN interface only
+  std::optional<double> state_s{};     ///< time in that state
   std::optional<std::uint64_t> error_frames{};
   std::optional<std::uint64_t> bus_offs{};
   std::optional<std::uint64_t> restarts{};
@@ -290,12 +290,12 @@ struct BusStatus {
   }
 };
 
-/// How writing offsets to the controller goes.
+/// Writes of offsets to the controller.
 struct WriteStatus {
   std::uint64_t refused{0};     ///< writes that the controller answered with an exception
-  std::uint64_t unanswered{0};  ///< writes that nothing answered
-  std::uint64_t late{0};        ///< writes that came later than their period
-  std::optional<std::uint64_t> function{};  ///< these three: of the newest write that failed
+  std::uint64_t unanswered{0};  ///< writes without an answer
+  std::uint64_t late{0};        ///< writes later than their period
+  std::optional<std::uint64_t> function{};  ///< this and the next two: newest failed write
   std::optional<std::uint64_t> address{};
   std::optional<std::uint64_t> exception{};
   double last_confirmed_s{not_a_number};  ///< time since the newest confirmed write; NaN: none
@@ -325,8 +325,9 @@ struct ControllerStatus {
   std::string last_error{};
   WriteStatus write{};
   std::map<std::string, double> signals{};
-  std::optional<std::map<std::string, double>> shown{};  ///< dry run: what it applies by itself
-  std::optional<std::string> state{};                    ///< from here on: of a CAN interface
+  std::optional<std::map<std::string, double>>
+      shown{};                         ///< dry run: offset applied by the controller itself
+  std::optional<std::string> state{};  ///< this and the following: CAN interface only
   std::optional<double> state_s{};
   std::optional<std::uint64_t> bus_offs{};
 
@@ -359,8 +360,9 @@ struct HistoryStatus {
   double last_commit_age_s{not_a_number};
   std::uint64_t lost_records{0};
   std::uint64_t errors{0};
-  std::uint64_t deleted_segments{0};  ///< for room or age, since the start
-  std::uint64_t files_replaced{0};    ///< times that a file was removed or replaced by another
+  std::uint64_t deleted_segments{0};  ///< deleted for size or age, since the start
+  std::uint64_t files_replaced{
+      0};  ///< times that a file was removed or replaced by another program
   std::string last_error{};
 
   template <class Self, class Visitor>
@@ -438,11 +440,11 @@ struct ModelStatus {
   std::string checksum{};
   std::uint64_t inputs{0};
   std::uint64_t outputs{0};
-  bool moves{true};               ///< some coefficient is not zero: `init` writes zeros
-  bool compared{true};            ///< with measured displacement, by what its file says
-  std::optional<bool> outside{};  ///< of what it was made from
+  bool moves{true};               ///< some coefficient is not zero; `init` writes zeros
+  bool compared{true};            ///< with measured displacement, according to its file
+  std::optional<bool> outside{};  ///< of its domain
   double outside_share_24h{not_a_number};
-  std::map<std::string, double> claimed_sd_um{};  ///< by axis, these two
+  std::map<std::string, double> claimed_sd_um{};  ///< by axis; also the next
   std::map<std::string, double> probed_rms_um{};
 
   template <class Self, class Visitor>
@@ -460,10 +462,10 @@ struct ModelStatus {
   }
 };
 
-/// What an axis is still to move while the machine goes on as it does.
+/// Displacement still to come if the load stays constant.
 struct WarmStatus {
   double remaining_um{not_a_number};
-  double minutes{not_a_number};  ///< until less than compensation.warm_um is to come
+  double minutes{not_a_number};  ///< until less than compensation.warm_um remains
 
   template <class Self, class Visitor>
   static void fields(Self& self, Visitor& visit) {
@@ -472,10 +474,10 @@ struct WarmStatus {
   }
 };
 
-/// Whether it is time to probe.
+/// Axes whose model error makes a probing due.
 struct ProbeDueStatus {
   std::map<std::string, bool> axes{};
-  double because_um{not_a_number};  ///< what the model may be off by, of the worst axis
+  double because_um{not_a_number};  ///< largest error of the model
 
   template <class Self, class Visitor>
   static void fields(Self& self, Visitor& visit) {
@@ -486,7 +488,7 @@ struct ProbeDueStatus {
 
 struct ReferenceStatus {
   std::optional<std::string> by{};  ///< "model_file", "operator", "first_values", "reload"
-  double wall_s{not_a_number};      ///< when it was taken, s since 1970
+  double wall_s{not_a_number};      ///< time when it was taken, s since 1970
   bool lost{false};
   std::map<std::string, double> temps_degC{};
 
@@ -501,10 +503,10 @@ struct ReferenceStatus {
 
 /// The answer of `status`.
 struct Status {
-  Mode mode{Mode::starting};  ///< "dry_run" in JSON where it is `compensating` in a dry run
+  Mode mode{Mode::starting};  ///< "dry_run" in JSON for `compensating` in a dry run
   bool dry_run{false};
   double mode_since_s{not_a_number};
-  double compensating_s{not_a_number};  ///< for so long every axis has been driven too
+  double compensating_s{not_a_number};  ///< time for which every axis has been driven too
   bool enabled{false};
   std::uint32_t reasons{0};  ///< a set of Reason
   std::uint64_t cycle_ends{0};
@@ -514,7 +516,7 @@ struct Status {
   ModelStatus model{};
   std::optional<CandidateStatus> candidate{};
   std::vector<AxisStatus> axes{};
-  std::optional<ProbeDueStatus> probe_due{};  ///< none: the model does not say how good it is
+  std::optional<ProbeDueStatus> probe_due{};  ///< none: the model has no data on its error
   std::map<std::string, WarmStatus> warm{};   ///< by axis
   std::vector<InputStatus> inputs{};
   ReferenceStatus reference{};
@@ -525,7 +527,7 @@ struct Status {
   ControllerStatus controller{};
   HistoryStatus history{};
   SocketStatus socket{};
-  std::vector<Event> ended{};  ///< outages that ended in the last minutes, newest first
+  std::vector<Event> ended{};  ///< outages ended in the last minutes, newest first
   std::vector<std::string> warnings{};
 
   template <class Self, class Visitor>

@@ -46,12 +46,12 @@ struct Writer {
   void operator()(const char* key, const T& value) {
     object[key] = value_of(value);
   }
-  /// Left out where it is nullopt.
+  /// Omitted if nullopt.
   template <class T>
   void if_any(const char* key, const std::optional<T>& value) {
     if (value) object[key] = value_of(*value);
   }
-  /// Names of axes as keys of the object itself.
+  /// Writes axis names as keys of the object itself.
   void members(const char* /*but*/, const std::map<std::string, bool>& values) {
     for (const auto& [name, value] : values) object[name] = value;
   }
@@ -100,7 +100,7 @@ json value_of(const Event& event) {
                 {"comes_and_goes", event.comes_and_goes},
                 {"duration_s", value_of(event.duration_s)},
                 {"user", event.user < 0 ? json(nullptr) : json(event.user)},
-                // For people:
+                // Text:
                 {"subject", subject_text(event.subject)},
                 {"what", what_text(event)}};
   if (event.candidate) value["candidate"] = value_of(*event.candidate);
@@ -122,7 +122,7 @@ template <class T>
 requires std::integral<T>
 void take(const json& value, T& out) {
   const double number = value.is_number() ? value.get<double>() : -1.0;
-  // Not the largest value itself: as double it is rounded up.
+  // Below the largest value, which rounds up as a double.
   if (!(number >= 0.0 && number < 9.2e18)) return;
   out = value.is_number_float() ? static_cast<T>(number) : value.get<T>();
 }
@@ -247,7 +247,7 @@ template json json_of(const SensorsAnswer&);
 template json json_of(const OffsetsAnswer&);
 template json json_of(const EventsAnswer&);
 template json json_of(const CycleStatus&);
-// Parts that the page of the gateway shows:
+// Parts shown by the gateway's page:
 template json json_of(const std::vector<AxisStatus>&);
 template json json_of(const std::vector<InputStatus>&);
 template json json_of(const std::vector<BusStatus>&);
@@ -256,7 +256,7 @@ template json json_of(const ControllerStatus&);
 template json json_of(const HistoryStatus&);
 template json json_of(const ModelStatus&);
 template json json_of(const ReferenceStatus&);
-// Of a history:
+// For a history:
 template json json_of(const Event&);
 template json json_of(const std::vector<RecordedEvent>&);
 

@@ -1,4 +1,4 @@
-/// The structures of status/status.hpp as JSON, both ways.
+/// Conversion of the structures of status/status.hpp to and from JSON.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -7,12 +7,12 @@
 
 namespace thermocomp {
 
-/// Of any structure with `fields`, of an Event, and of vectors of them.
+/// For any structure with `fields`, Event, and vectors of them.
 template <class Part>
 [[nodiscard]] nlohmann::json json_of(const Part& part);
 
-/// Reads without trusting the shape: what is absent or of another type stays as the structure
-/// begins. A text is one line. A reason that is not known becomes a warning.
+/// Tolerates any shape: missing members and those of another type keep the structure's defaults. A
+/// text is reduced to one line. An unknown reason becomes a warning.
 template <class Part>
 [[nodiscard]] Part part_from(const nlohmann::json& value);
 

@@ -12,7 +12,7 @@ namespace thermocomp {
 
 namespace {
 
-/// The operator's switch outlives the dry run: left on, the first offsets go out unwatched.
+/// The switch is kept after a dry run: left on, the first offsets would be sent unattended.
 constexpr std::string_view dry_run_remedy =
     "switched on, the offsets are shown; switch it off before the dry run ends";
 constexpr std::string_view moves_nothing =
@@ -30,7 +30,7 @@ std::vector<std::string> axes_not_driven(const Status& status) {
   return names;
 }
 
-/// Collects what is wrong, one entry a cause.
+/// Collects faults, one entry per cause.
 class Causes {
  public:
   Causes(const Status& status, const SensorsAnswer* sensors)
@@ -61,7 +61,7 @@ class Causes {
     list_.push_back({what, std::string(remedy), std::string(command), subject, detail});
   }
 
-  /// Whether entries of sensors, modules or axes say more than the reason does.
+  /// Whether entries of sensors, modules or axes are more specific than the reason.
   [[nodiscard]] bool is_named_by_its_cause(Reason reason) const {
     const auto any_axis = [this](const auto& is_so) {
       return std::any_of(status_.axes.begin(), status_.axes.end(), is_so);
@@ -87,7 +87,7 @@ class Causes {
     }
   }
 
-  /// At a start no value has lasted long enough to count.
+  /// At start, no value has lasted long enough to count.
   [[nodiscard]] bool only_settles() const {
     return status_.mode == Mode::starting && status_.sensors_bad.empty();
   }
@@ -105,7 +105,7 @@ class Causes {
     }
   }
 
-  /// ": 4 sensors, inputs bed, table": what is lost with these sensors, which it explains.
+  /// ": 4 sensors, inputs bed, table": the losses explained by these sensors.
   std::string lost_with(const std::vector<std::string>& sensors,
                         const std::vector<std::string>& blocks) {
     if (sensors.empty()) return {};
@@ -114,7 +114,7 @@ class Causes {
            input_text(lost_inputs(blocks));
   }
 
-  /// Each is named by one cause.
+  /// Each input is listed by one cause only.
   std::vector<std::string> lost_inputs(const std::vector<std::string>& blocks) {
     std::vector<std::string> lost;
     for (const InputStatus& input : status_.inputs)
@@ -150,7 +150,7 @@ class Causes {
         add_silent(unit, is_network(bus.kind), subject);
   }
 
-  /// Its readings all count: it has just fallen silent, or its first answer is not counted yet.
+  /// All its readings are still valid: newly silent, or the first answer does not count yet.
   [[nodiscard]] bool is_good_still(const UnitStatus& unit) const {
     const auto is_good = [this](const std::string& sensor) {
       const std::vector<std::string>& bad = status_.sensors_bad;
@@ -173,7 +173,7 @@ class Causes {
         "thermocomp scan", subject);
   }
 
-  /// @param state_s  how long the CAN interface has been in `state`
+  /// @param state_s  time of the CAN interface in `state`
   void add_can(const std::string& name, const std::optional<std::string>& state,
                std::optional<double> state_s, const Subject& subject) {
     const std::string lasts = " for " + duration_text(state_s.value_or(not_a_number));
@@ -184,7 +184,7 @@ class Causes {
       add(name + ": error " + *state + lasts, can_remedy, "", subject);
   }
 
-  /// Those that no silent module explains.
+  /// Adds bad sensors that no silent module explains.
   void add_bad_sensors() {
     if (sensors_ == nullptr) {
       std::vector<std::string> blocks;
@@ -247,12 +247,12 @@ class Causes {
 
   const Status& status_;
   const SensorsAnswer* sensors_;
-  std::vector<std::string> unexplained_;  ///< bad sensors that have no entry yet
-  std::set<std::string> named_inputs_;    ///< lost ones that an entry names
+  std::vector<std::string> unexplained_;  ///< bad sensors without an entry
+  std::set<std::string> named_inputs_;    ///< lost inputs listed in an entry
   std::vector<Trouble> list_;
 };
 
-/// What is wrong while the machine is compensated all the same.
+/// Adds degradations that do not stop the compensation.
 void add_degradations(const Status& status, std::vector<std::string>& why) {
   for (const AxisStatus& axis : status.axes) {
     if (axis.at_bound) why.push_back("axis " + axis.name + " is at its bound");

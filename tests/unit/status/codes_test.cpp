@@ -1,24 +1,25 @@
-// The table of modes, reasons and faults is whole.
+// Completeness of the table of modes, reasons and faults.
 #include "status/codes.hpp"
 
 #include <catch2/catch.hpp>
 
 using namespace thermocomp;
 
-TEST_CASE("every reason has a meaning, a remedy and a name that leads back to it", "[status]") {
+TEST_CASE("every reason has a meaning, a remedy and a name that maps back to it", "[status]") {
   for (std::size_t bit = 0; bit < reasons_count; ++bit) {
     const auto reason = static_cast<Reason>(1u << bit);
     const CodeText text = code_text(reason);
     INFO(text.name);
     CHECK(text.meaning != text.name);
     CHECK_FALSE(text.remedy.empty());
-    CHECK(text.remedy.find("thermocomp ") == std::string_view::npos);  // a page has no terminal
+    CHECK(text.remedy.find("thermocomp ") ==
+          std::string_view::npos);  // remedies are also shown on pages
     CHECK(reason_named(text.name) == reason);
   }
   CHECK_FALSE(reason_named("no such reason"));
 }
 
-TEST_CASE("every fault has a meaning and a name that leads back to it", "[status]") {
+TEST_CASE("every fault has a meaning and a name that maps back to it", "[status]") {
   for (std::size_t i = 0; i < faults_count; ++i) {
     const auto fault = static_cast<Fault>(i);
     const CodeText text = code_text(fault);

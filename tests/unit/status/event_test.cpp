@@ -1,4 +1,4 @@
-// Events as lines for a person, and the exit status of `status`.
+// Texts of events, and the exit status of `status`.
 #include "status/event.hpp"
 
 #include <catch2/catch.hpp>
@@ -18,7 +18,7 @@ Status compensating() {
 
 }  // namespace
 
-TEST_CASE("each kind of event has its words", "[status][events]") {
+TEST_CASE("each kind of event has its text", "[status][events]") {
   Event fault{
       .kind = EventKind::fault, .subject = {SubjectKind::sensor, "bed"}, .code = "no_answer"};
   CHECK(event_text(fault) == "sensor bed: the unit does not answer");
@@ -55,7 +55,7 @@ TEST_CASE("each kind of event has its words", "[status][events]") {
   CHECK(events_text({}) == "nothing has happened\n");
 }
 
-TEST_CASE("a run that nobody stopped is named at the start of the next", "[status][events]") {
+TEST_CASE("a run that was not stopped is reported at the start of the next", "[status][events]") {
   const Event started{.code = "started", .detail = "1"};
   const Event stopping{.code = "stopping", .detail = "SIGTERM"};
   const Event mode{.kind = EventKind::mode, .code = "holding"};
@@ -67,12 +67,12 @@ TEST_CASE("a run that nobody stopped is named at the start of the next", "[statu
   CHECK_THAT(stopped, Catch::Contains("stopping: SIGTERM"));
 }
 
-TEST_CASE("an event's text commands no terminal", "[status][events]") {
+TEST_CASE("an event's text has no terminal control codes", "[status][events]") {
   CHECK(event_text({.code = "a\033[31mb"}).find('\033') == std::string::npos);
   CHECK_NOTHROW(events_text({{.wall_s = 1e300, .user = -7}}));
 }
 
-TEST_CASE("status says why it exits with 1, with --strict also for what is degraded", "[status]") {
+TEST_CASE("status reports why it exits with 1, with --strict also degradations", "[status]") {
   CHECK(why_not(compensating(), true).empty());
   Status holding = compensating();
   holding.mode = Mode::holding;

@@ -1,4 +1,4 @@
-// The status as JSON and back: over random values, and from what nobody should send.
+// The status to JSON and back: random values and invalid JSON.
 #include "status/status_json.hpp"
 
 #include <random>
@@ -72,7 +72,7 @@ class Filler {
   void fill(std::optional<T>& value) {
     if (below(3) == 0) return;
     fill(value.emplace());
-    // What is NaN is null in JSON, and null is what is not there.
+    // NaN becomes null, and null is read as missing.
     if constexpr (std::is_same_v<T, double>)
       if (std::isnan(*value)) value = 1.0;
   }
@@ -102,7 +102,7 @@ void check_round_trip() {
   }
 }
 
-/// Stands for a value of any type.
+/// Converts to any type.
 struct Anything {
   template <class T>
   operator T() const;  // NOLINT: only named, never called
@@ -113,7 +113,7 @@ constexpr bool takes(std::index_sequence<I...> /*count*/) {
     T{(static_cast<void>(I), Anything{})...};
   };
 }
-/// How many members an aggregate has.
+/// Number of members of an aggregate.
 template <class T, std::size_t count = 0>
 constexpr std::size_t members() {
   if constexpr (takes<T>(std::make_index_sequence<count + 1>()))
@@ -156,13 +156,13 @@ std::size_t keys_of() {
 
 }  // namespace
 
-TEST_CASE("every answer survives JSON and back, whatever its values", "[status][json]") {
+TEST_CASE("every answer survives the conversion to JSON and back", "[status][json]") {
   check_round_trip<Status>();
   check_round_trip<SensorsAnswer>();
   check_round_trip<EventsAnswer>();
 }
 
-TEST_CASE("every member of a structure has its key, and no key is given twice", "[status][json]") {
+TEST_CASE("every member of a structure has a unique key", "[status][json]") {
   CHECK(members<LatchedMismatch>() == keys_of<LatchedMismatch>());
   CHECK(members<GainStatus>() == keys_of<GainStatus>());
   CHECK(members<CorrectionStatus>() == keys_of<CorrectionStatus>());
@@ -185,7 +185,7 @@ TEST_CASE("every member of a structure has its key, and no key is given twice", 
   CHECK(members<OffsetsAnswer>() == keys_of<OffsetsAnswer>());
 }
 
-TEST_CASE("what is not known is null, what does not apply is left out", "[status][json]") {
+TEST_CASE("unknown values are null, inapplicable ones are omitted", "[status][json]") {
   const json axis = json_of(std::vector<AxisStatus>{AxisStatus{}})[0];
   CHECK(axis["offset"].is_null());
   CHECK(axis["mismatch"].is_null());
@@ -194,7 +194,7 @@ TEST_CASE("what is not known is null, what does not apply is left out", "[status
   CHECK(json_of(Status{})["model"]["outside"].is_null());
 }
 
-TEST_CASE("an answer of an unexpected shape is read as far as it goes", "[status][json]") {
+TEST_CASE("an answer of unexpected shape is read as far as possible", "[status][json]") {
   for (const char* text :
        {"{}", "[]", "null", "7", R"({"axes": 5, "cycle": [], "mode": 3, "reasons": [1, null]})",
         R"({"axes": [1, null, {"name": 5, "mismatch": 7}], "buses": "none", "uptime_s": "x"})"}) {
@@ -212,12 +212,12 @@ TEST_CASE("an answer of an unexpected shape is read as far as it goes", "[status
   CHECK(numbers.socket.clients == 1);
 }
 
-TEST_CASE("a text of the daemon is one line", "[status][json]") {
+TEST_CASE("a text is reduced to one line", "[status][json]") {
   const auto status = part_from<Status>(json{{"warnings", {"a\n\x1b[31mb"}}});
   CHECK(status.warnings == std::vector<std::string>{"a  [31mb"});
 }
 
-TEST_CASE("a reason of a later daemon is shown as a warning", "[status][json]") {
+TEST_CASE("an unknown reason is shown as a warning", "[status][json]") {
   const auto status =
       part_from<Status>(json::parse(R"({"reasons": ["at_bound", "too_loud"], "warnings": ["w"]})"));
   CHECK(status.reasons == static_cast<std::uint32_t>(Reason::at_bound));
