@@ -1,6 +1,5 @@
-/// A body in three dimensions as a page that needs nothing else: its surface coloured by
-/// temperature or displacement, its sensors, axes and scale. Drawn by Debian's libjs-three, which
-/// the page holds.
+/// A self-contained page of a body in three dimensions: surface coloured by temperature or
+/// displacement, sensors, axes and scale. Drawn by Debian's libjs-three, included in the page.
 #pragma once
 
 #include <array>
@@ -10,20 +9,20 @@
 
 namespace thermocomp {
 
-/// Temperature and displacement of every node of the surface at a moment.
+/// Temperature rise and displacement of every surface node at one time.
 struct BodyState {
-  std::string group;               ///< states of one group are shown in their order: a load case
-  std::string name;                ///< of the group's states where they differ by more than time
-  double time_s{0.0};              ///< NaN: the state has no time
-  std::string input;               ///< of the model, where that is 1 K warm and all else as it was
+  std::string group;               ///< states of one group (a load case) are shown in sequence
+  std::string name;                ///< within the group, if states differ by more than time
+  double time_s{0.0};              ///< NaN: no time
+  std::string input;               ///< model input of a state in which it alone is 1 K warm
   std::vector<double> rise_K;      ///< shape (nodes)
   std::vector<double> moved_um;    ///< shape (3 nodes)
-  std::vector<double> outputs_um;  ///< tool against work, one an output of the picture
+  std::vector<double> outputs_um;  ///< tool against work, one per output of the picture
 };
 
 struct BodyPoint {
   std::string name;
-  bool is_sensor{false};  ///< else a point that an output is taken at
+  bool is_sensor{false};  ///< else the point of an output
   std::array<double, 3> at_mm{};
 };
 
@@ -31,15 +30,15 @@ struct BodyPicture {
   std::string title;
   std::string note;              ///< a sentence under the title; empty: none
   std::vector<double> nodes_mm;  ///< shape (3 nodes)
-  /// Numbers of nodes, counterclockwise as seen from outside; shape (3 triangles).
+  /// Node indices, counterclockwise seen from outside; shape (3 triangles).
   std::vector<std::uint32_t> triangles;
   std::vector<std::string> outputs;
   std::vector<BodyState> states;
   std::vector<BodyPoint> points;
 };
 
-/// Numbers are written with four digits that count.
-/// @throws std::runtime_error  libjs-three is not installed
+/// Numbers have four significant digits.
+/// @throws std::runtime_error  if libjs-three is not installed
 [[nodiscard]] std::string body_page(const BodyPicture& picture);
 
 }  // namespace thermocomp

@@ -1,6 +1,6 @@
-// A body in three dimensions: its surface coloured by temperature or displacement and moved as it
-// moves, enlarged; sensors as numbered dots, the points that the outputs are taken at, axes and scale.
-// Behind a gateway the state is the machine's own, from its temperatures. Drawn by three.js.
+// A body in three dimensions: its surface, coloured by temperature or displacement, with magnified
+// displacement; sensors as numbered dots, output points, axes and scale. Behind a gateway also the
+// machine's present state, computed from its temperatures. Drawn by three.js.
 'use strict';
 
 const body = JSON.parse(document.getElementById('body').textContent);
@@ -18,11 +18,11 @@ for (const state of body.states) {
   state.moved_um = new Float32Array(state.moved_um);
 }
 
-// ------------------------------------------------------------------ what can be shown
+// ------------------------------------------------------------------ states and quantities
 
 const livePeriod_ms = 2000;
-const smoothEdges_max = 50000;  // triangles; of more the edges are not smoothed
-const shownOfSize = 0.08;  // the greatest displacement of a group, enlarged, as a share of the size
+const smoothEdges_max = 50000;  // triangles; edges of larger bodies are not smoothed
+const shownOfSize = 0.08;  // largest magnified displacement of a group, relative to the size
 const colours = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]];
 const quantities = {
   rise: {name: 'temperature', unit: 'K', of: (state, i) => state.rise_K[i]},
@@ -52,8 +52,8 @@ const renderer = new THREE.WebGLRenderer({antialias: body.triangles.length < 3 *
 view.append(renderer.domElement);
 const scene = new THREE.Scene();
 const camera = new THREE.PerspectiveCamera(35, 1, 1, 1e6);
-// Every triangle has corners of its own, so that it has one light, which is computed where it moves:
-// so few operations a pixel that 200,000 triangles can be turned without a graphics card.
+// Triangles do not share vertices: each has one brightness, computed when it moves. This leaves so few
+// operations per pixel that 200,000 triangles can be rotated without a graphics card.
 const triangles = new Uint32Array(body.triangles);
 const geometry = new THREE.BufferGeometry();
 const positions = new THREE.BufferAttribute(new Float32Array(3 * triangles.length), 3);
@@ -111,7 +111,7 @@ function nearestNode(at) {
   return nearest;
 }
 
-// A point moves as the surface beside it does.
+// A point moves with the surface beside it.
 function addPoints() {
   const list = place('points');
   let number = 0;
@@ -126,7 +126,7 @@ function addPoints() {
   }
 }
 
-// Labels of what the body hides are faint. Not in each frame: every triangle is looked at.
+// Dims labels hidden by the body. Not in every frame, since every triangle is tested.
 const ray = new THREE.Raycaster();
 function dimHidden() {
   for (const shownLabel of labels) {
@@ -166,9 +166,9 @@ function resize() {
   render();
 }
 
-// ------------------------------------------------------------------ a state
+// ------------------------------------------------------------------ drawing of a state
 
-// The range of the colours and the enlargement are those of the whole group: what moves in time shows.
+// Colour range and magnification are common to the group, so that its states can be compared.
 function measureGroup() {
   let largest = 0;
   range = [Infinity, -Infinity];
@@ -183,14 +183,14 @@ function measureGroup() {
   if (range[0] === range[1]) range[1] = range[0] + 1;
   factor = largest > 0 ? shownOfSize * size_mm / (1e-3 * largest) : 0;
   factor = factor > 0 ? Number(factor.toPrecision(1)) : 0;
-  // What is nothing beside the range is rounding.
+  // Values far below the range are rounding errors.
   const text = value => Math.abs(value) < 1e-3 * (range[1] - range[0]) ? '0' : value.toPrecision(3);
   place('low').textContent = text(range[0]) + ' ' + quantity.unit;
   place('high').textContent = text(range[1]) + ' ' + quantity.unit;
   place('factor').textContent = factor > 0 ? 'displacement drawn \u00d7 ' + factor.toLocaleString('en') : 'nothing moves';
 }
 
-// 0.6 to 1: of a lamp above, to the right and in front.
+// Brightness, 0.6 to 1, by a lamp above, to the right and in front.
 const lamp = [0.35, -0.55, 0.75].map(each => each / Math.hypot(0.35, 0.55, 0.75));
 function lightOn(points, first) {
   const [a, b, c] = [0, 1, 2].map(corner => 3 * triangles[first + corner]);
@@ -241,14 +241,14 @@ function choose() {
   shown = groups.get(place('group').value);
   const time = place('time');
   time.max = shown.length - 1;
-  if (shown !== before) time.value = time.max;  // the end: there it is warmest
+  if (shown !== before) time.value = time.max;  // the end, where it is warmest
   place('times').hidden = shown.length < 2;
   measureGroup();
   drawChosen();
 }
 
-// What moves is linear in the temperatures of the model's inputs, so the machine's own state is the sum
-// of the shapes with one input 1 K warm, each times that input's rise since the reference.
+// Displacement is linear in the inputs' temperatures: the machine's state is the sum of the shapes with
+// one input 1 K warm, each times that input's rise since the reference.
 function sumOf(inputs) {
   const state = {name: 'now', time_s: null, rise_K: new Float32Array(count), moved_um: new Float32Array(3 * count),
                  outputs_um: body.outputs.map(() => 0)};
@@ -256,7 +256,7 @@ function sumOf(inputs) {
   for (const shape of oneWarm) {
     const input = inputs.find(each => each.name === shape.input);
     const rise_K = input ? input.temp_degC - input.reference_degC : NaN;
-    // An input without a good sensor keeps its last temperature, which is not that of now.
+    // An input without a good sensor has an old temperature.
     if (!input || !(input.good || input.estimated) || input.temp_degC === null || input.reference_degC === null ||
         !isFinite(rise_K)) {
       lost.push(shape.input);
@@ -268,7 +268,7 @@ function sumOf(inputs) {
   }
   if (lost.length) {
     state.name = 'now, without ' + lost.join(', ') + ' (not known)';
-    state.outputs_um = [];  // a part of the sum says nothing of the tool
+    state.outputs_um = [];  // undefined with a partial sum
   }
   return state;
 }

@@ -82,7 +82,7 @@ std::string figure_text(double value) {
   const int digits = size >= 99.95 ? 0 : size >= 9.995 ? 1 : 2;
   char text[48];
   std::snprintf(text, sizeof text, "%.*f", digits, value);
-  // A rounded zero has no sign.
+  // No sign for a value rounded to zero.
   const std::string result(text);
   return result.find_first_not_of("-0.") == std::string::npos ? std::string("0.00") : result;
 }

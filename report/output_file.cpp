@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What an interrupt has to take away; a plain array, because a signal handler reads it.
+// The file that an interrupt must remove; a plain array for the signal handler.
 char temporary_name[4096];
 constexpr int interrupts[] = {SIGINT, SIGTERM, SIGHUP};
 
@@ -56,7 +56,7 @@ OutputFile::OutputFile(const std::string& destination)
   if (fs::is_symlink(destination_, error)) destination_ = fs::weakly_canonical(destination_, error);
   const fs::file_status status = fs::status(destination_, error);
   if (fs::is_directory(status)) throw cannot_write(name_, EISDIR);
-  // A rename would put a plain file in the place of /dev/null or of a pipe.
+  // Written directly: a rename would replace /dev/null or a pipe by a regular file.
   if (fs::exists(status) && !fs::is_regular_file(status)) {
     refuse_what_hangs();
     file_.open(destination_);
@@ -66,7 +66,7 @@ OutputFile::OutputFile(const std::string& destination)
   open_temporary();
 }
 
-/// To open a pipe that nobody reads waits for ever; a serial port or a disk is no place for a file.
+/// Refuses a pipe without a reader, on which open() would block, and devices such as serial ports.
 void OutputFile::refuse_what_hangs() const {
   const int descriptor = ::open(destination_.c_str(), O_WRONLY | O_NONBLOCK | O_CLOEXEC | O_NOCTTY);
   if (descriptor < 0) {

@@ -1,4 +1,4 @@
-/// The file that `-o` names: complete or not there at all.
+/// The output file of `-o`: written completely or not at all.
 #pragma once
 
 #include <filesystem>
@@ -8,10 +8,9 @@
 
 namespace thermocomp::cli {
 
-/// Writes beside the destination and renames on commit(); without commit() nothing is left, also
-/// when the program is interrupted. `-` is standard output; a pipe that is read, the terminal and
-/// /dev/null are written directly, other devices refused.
-/// One at a time in a program.
+/// Writes beside the destination and renames in commit(); without commit() nothing is left, also
+/// after an interrupt. `-` is standard output. A pipe with a reader, the terminal and /dev/null are
+/// written directly; other devices are refused. One at a time per program.
 class OutputFile {
  public:
   explicit OutputFile(const std::string& destination);  ///< @throws Failure
@@ -20,15 +19,15 @@ class OutputFile {
   OutputFile& operator=(const OutputFile&) = delete;
 
   [[nodiscard]] std::ostream& stream() noexcept { return *stream_; }
-  /// @throws Failure when not everything could be written
+  /// @throws Failure on a write error
   void commit();
 
  private:
   void refuse_what_hangs() const;
   void open_temporary();
 
-  std::string name_;                   ///< as given, for messages
-  std::filesystem::path destination_;  ///< with links resolved
+  std::string name_;                   ///< for messages
+  std::filesystem::path destination_;  ///< links resolved
   std::filesystem::path temporary_;    ///< empty: written directly
   std::ofstream file_;
   std::ostream* stream_;

@@ -1,4 +1,4 @@
-/// The run files of one command: whatever form they have, and what was understood is reported once.
+/// Loads the run files of a command, in any form, and reports once how they were read.
 #pragma once
 
 #include <string>
@@ -15,12 +15,12 @@ inline constexpr const char* columns_help =
 
 class RunLoader {
  public:
-  /// @param columns  file of `--columns`; empty: none
+  /// @param columns  file of `--columns`; may be empty
   /// @throws ConfigurationError
   explicit RunLoader(const std::string& columns);
 
-  /// Reads RUN.csv[@T0:T1]. How a file that is not in our own form was read is reported on stderr,
-  /// a line each; of further files that are alike only that they are.
+  /// Reads RUN.csv[@T0:T1]. Reports on stderr how a file in a foreign form was read, one line per
+  /// item; for further files of the same form only that they are.
   /// @throws ConfigurationError
   [[nodiscard]] RunFile load(const std::string& argument);
   [[nodiscard]] std::vector<RunFile> load(const std::vector<std::string>& arguments);

@@ -14,7 +14,7 @@ constexpr double width = 860.0;
 constexpr double left = 52.0;
 constexpr double right = 10.0;
 constexpr double title_height = 24.0;
-/// Of a title above its panel: the highest tick's label ends below it.
+/// Distance of a title from its panel, above the label of the highest tick.
 constexpr double title_up = 11.0;
 constexpr double axis_height = 32.0;
 constexpr double gap = 8.0;
@@ -24,7 +24,7 @@ constexpr double bar_height = 20.0;
 constexpr double bar_left = 120.0;
 constexpr double share_written_min = 0.06;
 constexpr double cell_size = 18.0;
-/// Of all lines of a panel together, and of one.
+/// Limits for all lines of a panel and for one line.
 constexpr std::size_t panel_points_max = 8000;
 constexpr std::size_t points_max = 2000;
 constexpr std::size_t dots_max = 300;
@@ -48,7 +48,7 @@ Range range_of(const std::vector<Values>& columns) {
     }
   }
   if (!(range.low <= range.high)) return {};
-  // Rounding of a constant is no course.
+  // Rounding errors of a constant are not magnified.
   const double size = std::max(std::abs(range.low), std::abs(range.high));
   if (!(range.high - range.low > rounding_share * size)) return {range.low - 1.0, range.high + 1.0};
   return range;
@@ -66,7 +66,7 @@ std::string coordinate(double value) {
   return text;
 }
 
-/// "1.5 2.5": a place in the drawing.
+/// "1.5 2.5": coordinates.
 std::string place(double x, double y) {
   return coordinate(x) + " " + coordinate(y);
 }
@@ -82,7 +82,7 @@ std::string way(char direction, double length) {
   return std::string(1, direction).append(coordinate(length));
 }
 
-/// About, of the font that labels are in.
+/// Approximate width in the labels' font.
 double text_width(const std::string& text) {
   return 6.6 * static_cast<double>(text.size());
 }
@@ -93,7 +93,7 @@ std::string straight(double x, double y, const std::string& along, const char* k
   return svg.append("\"/>");
 }
 
-/// @param name  what a reader gets who does not see it
+/// @param name  text alternative
 std::string begin(double whole_width, double height, const std::string& name) {
   return std::string("<svg viewBox=\"0 0 ")
       .append(place(whole_width, height))
@@ -102,7 +102,7 @@ std::string begin(double whole_width, double height, const std::string& name) {
       .append("\">");
 }
 
-/// A frame in which values stand.
+/// The frame of a panel.
 struct Box {
   double x;
   double y;
@@ -150,7 +150,7 @@ std::string named_axis(const Box& box, const Range& x, const std::vector<TimeTic
   return svg;
 }
 
-/// Of a line: a gap that is longer is not bridged.
+/// Longest gap of a line that is bridged.
 double gap_max(const Range& x, Values time, Values values) {
   std::vector<double> steps;
   double last = std::nan("");
@@ -164,7 +164,7 @@ double gap_max(const Range& x, Values time, Values values) {
   return std::max(10.0 * median(std::move(steps)), seen_share * (x.high - x.low));
 }
 
-/// The rows of the lowest and the highest finite value from `begin` to `end`, in their order.
+/// Rows of the minimum and the maximum finite value from `begin` to `end`, in order.
 std::vector<std::size_t> extreme_rows(Values values, std::size_t begin, std::size_t end) {
   std::size_t low = end;
   std::size_t high = end;
@@ -215,13 +215,13 @@ std::string span_svg(const PlotSpan& span, const Box& box, const Range& x, bool 
   return named ? svg + label(from + 3, box.y + 12, span.label, "class=\"note\"") : svg;
 }
 
-/// Light where alike. Below a ten thousandth everything is the lightest.
+/// Colour of a heat map's square; values below 1e-4 are the lightest.
 std::string shade(double value) {
   const double share = std::clamp(1.0 + std::log10(std::max(value, 1e-4)) / 4.0, 0.0, 1.0);
   return "hsl(215,60%," + number(std::round(96.0 - 76.0 * share)) + "%)";
 }
 
-/// @param body  between the tags
+/// @param body  inner markup
 std::string square(double x, double y, double side, const std::string& attributes,
                    const std::string& body = "") {
   std::string svg = "<rect x=\"" + coordinate(x);

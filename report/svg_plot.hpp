@@ -1,4 +1,4 @@
-/// Pictures as SVG, for a page that needs nothing else or for a file of their own.
+/// Plots as SVG, for a self-contained page or a file.
 #pragma once
 
 #include <span>
@@ -7,49 +7,47 @@
 
 namespace thermocomp {
 
-/// Text inside SVG, HTML and VTU files: `text` with &, <, > and " as references, for elements and
-/// for attributes in double quotes.
+/// Escapes &, <, > and " for elements and double-quoted attributes of SVG, HTML and VTU files.
 [[nodiscard]] std::string xml_text(const std::string& text);
 
-/// The rules of a page's style sheet for lines, grid and labels.
+/// CSS rules for lines, grid and labels.
 extern const char* const svg_style;
 
-/// A picture with its size, in pixels of a page of usual width.
+/// A picture with its size in pixels, for a page of usual width.
 struct Drawing {
   double width{0.0};
   double height{0.0};
   std::string body;
-  std::string name;                       ///< for who does not see it
+  std::string name;                       ///< text alternative
   [[nodiscard]] std::string svg() const;  ///< the element <svg>, for a page with svg_style
 };
 
-/// A file of pictures, one above the other.
+/// A file with pictures one above the other.
 [[nodiscard]] std::string svg_file(const std::vector<Drawing>& drawings);
 
 struct PlotLine {
   std::string label;  ///< empty: not in the legend
   std::string colour;
-  /// As many as there are times. NaN is left out; a gap that is much longer than the others of the
-  /// line is not bridged.
+  /// One per time. NaN is skipped; a gap much longer than the others of the line is not bridged.
   std::span<const double> values;
-  bool as_dots{false};  ///< single values, not joined by a line
+  bool as_dots{false};  ///< dots without a line
   bool dashed{false};
 };
 
-/// A stretch of time behind all panels, shaded and named at its top.
+/// A shaded time span behind all panels, with its label at the top.
 struct PlotSpan {
   std::string label;
   double from_s{0.0};
   double to_s{0.0};
 };
 
-/// A named moment on the axis of time, with a line through all panels.
+/// A labelled time on the axis, with a line through all panels.
 struct TimeTick {
   double at_s{0.0};
   std::string label;
 };
 
-/// Lines over the axis that all panels share.
+/// A panel of lines; all panels share the horizontal axis.
 struct PlotPanel {
   std::string title;
   std::string unit;
@@ -57,23 +55,22 @@ struct PlotPanel {
   double height{150.0};
 };
 
-/// Panels one above the other over time (in h, min or s), with ticks, grid and units. Of long
-/// columns the lowest and the highest value of each stretch are drawn, as many as a screen shows
-/// when the picture is made wider.
-/// @param ticks  in order; take the place of numbers. A label stands to the right of its line where
-///               there is room before the next one
+/// Panels one above the other over time (in h, min or s), with ticks, grid and units. Long columns
+/// are reduced to the minimum and maximum of each interval, fine enough for a widened picture.
+/// @param ticks  in order; replace the numbers. A label is to the right of its line if there is
+///               room before the next one
 [[nodiscard]] std::string panels_plot(std::span<const double> time_s,
                                       const std::vector<PlotPanel>& panels,
                                       std::vector<PlotSpan> spans = {},
                                       std::vector<TimeTick> ticks = {});
 
-/// The same over any axis.
-/// @param x_title  with its unit
+/// The same over any quantity.
+/// @param x_title  including its unit
 [[nodiscard]] Drawing curves_drawing(std::span<const double> x, const std::string& x_title,
                                      const std::vector<PlotPanel>& panels);
 
-/// Squares from light (0) to dark (1) on a logarithmic scale, a name before each row and below each
-/// column, and a frame around each run of `group_sizes`.
+/// Squares from light (0) to dark (1) on a logarithmic scale, with names of rows and columns, and a
+/// frame around each group.
 struct HeatMap {
   std::string title;
   std::vector<std::string> names;
@@ -82,7 +79,7 @@ struct HeatMap {
 };
 [[nodiscard]] Drawing heat_map_drawing(const HeatMap& map);
 
-/// Dots of y over x.
+/// Scatter plot of y over x.
 struct PlotDots {
   std::string title;
   std::span<const double> x;
@@ -97,14 +94,14 @@ struct BarPart {
   double share{0.0};  ///< of the whole bar
 };
 
-/// Bars with a name before each, and one legend for all; every bar has the same labels.
+/// A bar with its name; all bars have the same labels and one legend.
 struct NamedBar {
   std::string name;
   std::vector<BarPart> parts;
 };
 [[nodiscard]] std::string bars_plot(const std::vector<NamedBar>& bars);
 
-/// About `wanted` round numbers (1, 2 or 5 times a power of ten apart) within the range.
+/// About `wanted` round ticks (steps of 1, 2 or 5 times a power of ten) within the range.
 [[nodiscard]] std::vector<double> round_ticks(double low, double high, int wanted);
 
 }  // namespace thermocomp

@@ -1,4 +1,4 @@
-/// What a person in front of a terminal gets and a pipe does not: colours, a line of progress.
+/// Output for terminals, not for pipes: colours and a progress line.
 #pragma once
 
 #include <chrono>
@@ -11,20 +11,20 @@ namespace thermocomp::cli {
 [[nodiscard]] bool stderr_is_terminal() noexcept;
 
 enum class Colour { none, green, yellow, red, bold };
-/// @return `text` between the terminal's codes of `colour`; plain when `on` is false
+/// @return `text` in the terminal's `colour`; plain if `on` is false
 [[nodiscard]] std::string coloured(std::string_view text, Colour colour, bool on);
 
-/// `text` from the first column on, in the place of what the line shows.
+/// `text` from the first column on, replacing the line.
 [[nodiscard]] std::string rewritten_line(std::string_view text);
 
-/// One line on stderr, overwritten, for work of more than 2 s; nothing where stderr is no terminal.
+/// A progress line on stderr for work of more than 2 s; nothing if stderr is not a terminal.
 class Progress {
  public:
   explicit Progress(std::string what);
-  ~Progress();  ///< takes the line away
+  ~Progress();  ///< removes the line
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
-  /// @param fraction  of the work done, 0..1; outside: not known
+  /// @param fraction  of the work, 0..1; outside: unknown
   void update(double fraction);
 
  private:
@@ -35,7 +35,7 @@ class Progress {
   bool visible_{false};
 };
 
-/// For long work in steps: what begins, with the time since the start, a line each on stderr.
+/// Progress of long work in steps: one line per step on stderr, with the time since the start.
 class ProgressLines {
  public:
   void say(std::string_view what) const;
