@@ -14,9 +14,9 @@ namespace {
 constexpr std::uint32_t extended_flag = 0x80000000u;
 constexpr std::uint32_t standard_id_max = 0x7FF;
 constexpr std::uint32_t extended_id_max = 0x1FFFFFFF;
-constexpr std::uint64_t message_bytes_max = 1785;  // of a J1939 transport; the longest in use
+constexpr std::uint64_t message_bytes_max = 1785;  // of a J1939 transport, the longest in use
 constexpr std::size_t classic_bytes_max = 8;
-constexpr std::size_t signals_max = 4096;  // of a message
+constexpr std::size_t signals_max = 4096;  // per message
 constexpr std::size_t flaws_max = 1000;
 constexpr std::string_view no_message = "VECTOR__INDEPENDENT_SIG_MSG";
 constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
@@ -24,7 +24,7 @@ constexpr std::string_view frame_format = "VFrameFormat";
 constexpr std::string_view long_signal = "SystemSignalLongSymbol";
 constexpr std::string_view long_message = "SystemMessageLongSymbol";
 
-/// Statements whose content is of no use here; each ends with a semicolon.
+/// Skipped statements; each ends with a semicolon.
 constexpr std::array<std::string_view, 25> passed_over{
     "VAL_TABLE_",    "BO_TX_BU_",        "EV_",         "ENVVAR_DATA_",
     "EV_DATA_",      "SGTYPE_",          "SGTYPE_VAL_", "SIG_GROUP_",
@@ -43,18 +43,18 @@ bool is_keyword(std::string_view word) {
   return word == "BA_DEF_DEF_" || in(passed_over) || in(understood);
 }
 
-/// How a signal is multiplexed, by its own line.
+/// Multiplexing of a signal, from its own line.
 struct Multiplexing {
   bool selects{false};                ///< M
-  std::optional<std::uint64_t> page;  ///< of mN
+  std::optional<std::uint64_t> page;  ///< number n of mN
 };
 
 struct Draft {
   DbcMessage message;
-  std::vector<Multiplexing> multiplexing;  ///< one a signal
+  std::vector<Multiplexing> multiplexing;  ///< one per signal
 };
 
-/// Something that is said of a message or signal elsewhere in the file.
+/// A statement about a message or signal defined elsewhere in the file.
 struct Remark {
   int line{0};
   std::uint32_t message{0};
@@ -69,27 +69,27 @@ struct PageRemark : Remark {
 };
 struct FormatRemark : Remark {
   std::uint64_t index{0};
-  std::string format;  ///< instead of the index
+  std::string format;  ///< if not empty, replaces the index
 };
 struct NameRemark : Remark {
   std::string name;
 };
 
-/// What a J1939 group is known by: page and format, and the group extension of a broadcast. Neither
-/// priority nor sender; nor whom it is for.
+/// The bits of an identifier that define a J1939 group: page, format and, for a broadcast, group
+/// extension; without priority, sender and destination.
 std::uint32_t group_mask(std::uint32_t id) {
   constexpr std::uint32_t first_broadcast = 0xF0;
   return ((id >> 16) & 0xFFu) < first_broadcast ? 0x03FF0000u : 0x03FFFF00u;
 }
 
-/// The place that a flaw concerns.
+/// Message and signal that a flaw concerns.
 struct About {
   std::string message;
   std::string signal;
 };
 using Keys = std::vector<std::string_view>;
 
-/// "m3", "M", "m3M"; nothing else.
+/// Parses "m3", "M", "m3M".
 std::optional<Multiplexing> multiplexing_of(std::string_view word) {
   Multiplexing result;
   if (word.starts_with('m')) {
@@ -111,7 +111,7 @@ std::optional<Multiplexing> multiplexing_of(std::string_view word) {
   return result;
 }
 
-/// Byte behind the signal's last, counted from the frame's first.
+/// First byte after the signal, counted from the frame's start.
 std::uint64_t end_byte(const CanSignal& place) {
   const int first = place.byte_order == ByteOrder::little_endian
                         ? place.start_bit
@@ -151,7 +151,7 @@ class DbcReader {
  private:
   void flaw(int line, std::string key, std::string value, std::string rule, About about,
             Keys keys = {}) {
-    if (value.empty()) std::swap(key, value);  // about a name as a whole
+    if (value.empty()) std::swap(key, value);  // the attribute of a name as a whole
     flawed_.emplace(about.message, about.signal);
     file_.flaws.push_back({{name_, line, std::move(key), std::move(value), std::move(rule)},
                            std::move(about.message),
@@ -159,7 +159,7 @@ class DbcReader {
                            std::move(keys)});
   }
 
-  /// To the first keyword that begins a line after that of the broken statement.
+  /// Skips to the next keyword at the start of a line after the broken statement.
   void to_next_statement(int line) {
     while (!scan_.at_end() &&
            !(scan_.line() != line && scan_.begins_line() && is_keyword(scan_.next_word()))) {
@@ -203,7 +203,7 @@ class DbcReader {
 
   void read_new_symbols() {
     scan_.expect(':');
-    // The list has keywords in it; the section behind it is the first word with a colon.
+    // The list contains keywords; the next section is the first word with a colon.
     while (scan_.next_word() != "BS_" && scan_.next_word() != "BU_") scan_.word("BS_");
   }
 
@@ -234,7 +234,7 @@ class DbcReader {
         const Keys keys = message.id > extended_id_max ? Keys{"id"} : Keys{"extended_id", "id"};
         flaw(line, message.name, std::to_string(id),
              "must be a number of 11 bits, or one of 29 bits with bit 31 set", about_, keys);
-        message.extended = true;  // it cannot be one of 11 bits
+        message.extended = true;  // too large for 11 bits
       }
       if (!names_.insert(message.name).second) {
         flaw(line, message.name, "", "is the name of two messages", about_, {"id"});
@@ -279,8 +279,8 @@ class DbcReader {
     draft.multiplexing.push_back(multiplexing);
   }
 
-  /// `start|length@order sign (factor,offset) [min|max]`
-  /// @return whether the factor can be one
+  /// Parses `start|length@order sign (factor,offset) [min|max]`.
+  /// @return whether the factor is valid
   bool read_place(CanSignal& place) {
     place.start_bit = static_cast<int>(scan_.integer("a start bit", 8 * message_bytes_max));
     scan_.expect('|');
@@ -296,7 +296,7 @@ class DbcReader {
     place.offset = scan_.real("an offset");
     scan_.expect(')');
     scan_.expect('[');
-    scan_.skip_behind(']');  // minimum and maximum are of no use here
+    scan_.skip_behind(']');  // minimum and maximum are not used
     return place.scale != 0.0;
   }
 
@@ -328,7 +328,7 @@ class DbcReader {
     }
   }
 
-  // -------------------------------------------------------------- what is said elsewhere
+  // -------------------------------------------------------------- attributes and references
 
   Remark read_remark(int line) {
     Remark remark;
@@ -424,7 +424,7 @@ class DbcReader {
     scan_.expect(';');
   }
 
-  // -------------------------------------------------------------- put together
+  // -------------------------------------------------------------- resolution of references
 
   void resolve() {
     resolve_formats();
@@ -454,7 +454,7 @@ class DbcReader {
     }
   }
 
-  /// The draft that a remark is about; nullptr after a flaw.
+  /// The draft that a remark refers to; nullptr after a flaw.
   Draft* draft_of(const Remark& remark) {
     const auto found = by_id_.find(remark.message);
     if (found != by_id_.end()) return &drafts_[found->second];
@@ -463,7 +463,7 @@ class DbcReader {
     return nullptr;
   }
 
-  /// The draft and the index of its signal that a remark is about; a flaw where there is none.
+  /// The draft and the signal's index that a remark refers to; nullptr after a flaw.
   std::pair<Draft*, std::size_t> find(const Remark& remark) {
     Draft* draft = draft_of(remark);
     if (draft == nullptr) return {nullptr, 0};
@@ -482,7 +482,7 @@ class DbcReader {
     return static_cast<std::size_t>(found - signals.begin());
   }
 
-  /// The name of the remark's format; usual ones where the file lists none; none: not listed.
+  /// Name of the remark's format, by default as in common files; none: not listed.
   [[nodiscard]] std::optional<std::string> format_of(const FormatRemark& remark) const {
     if (!remark.format.empty()) return remark.format;
     if (!formats_.empty()) {
@@ -555,7 +555,7 @@ class DbcReader {
     place.is_float = true;
   }
 
-  /// By which signal of its message a signal is selected, and when.
+  /// The multiplexor that selects a signal, and its numbers.
   struct Choice {
     std::size_t selector{0};
     std::vector<CanSelector::Pages> pages;
@@ -597,7 +597,7 @@ class DbcReader {
     return choice;
   }
 
-  /// A signal is there when its multiplexor selects it and is itself there.
+  /// Adds the multiplexor of a signal, that multiplexor's own one, and so on.
   void collect_selectors(Draft& draft, const std::vector<std::optional<Choice>>& choices,
                          std::size_t index) {
     constexpr std::size_t depth_max = 16;
@@ -625,13 +625,13 @@ class DbcReader {
   std::string name_;
   DbcFile file_;
   std::vector<Draft> drafts_;
-  std::map<std::uint32_t, std::size_t> by_id_;  ///< as in the file, bit 31 included
+  std::map<std::uint32_t, std::size_t> by_id_;  ///< as in the file, including bit 31
   std::set<std::string> names_;
-  std::set<std::string> signal_names_;  ///< of the message that is being read
+  std::set<std::string> signal_names_;  ///< of the present message
   bool in_message_{false};
-  bool in_broken_message_{false};  ///< its BO_ has a flaw; so its signals belong nowhere
-  About about_;                    ///< of the statement that is being read, as far as it is known
-  std::set<std::pair<std::string, std::string>> flawed_;  ///< message and signal of the flaws
+  bool in_broken_message_{false};  ///< its BO_ has a flaw: its signals are dropped
+  About about_;                    ///< of the present statement, as far as known
+  std::set<std::pair<std::string, std::string>> flawed_;  ///< message and signal with a flaw
   std::vector<FloatRemark> floats_;
   std::vector<PageRemark> pages_;
   std::vector<FormatRemark> format_remarks_;
@@ -641,7 +641,7 @@ class DbcReader {
   std::optional<FormatRemark> default_format_;
 };
 
-/// By name, else by long name.
+/// Finds by name, else by long name.
 template <class Entries>
 auto* find_by_name(Entries& entries, std::string_view name) noexcept {
   auto found = std::find_if(entries.begin(), entries.end(),

@@ -13,7 +13,7 @@ bool is_digit(char c) {
   return c >= '0' && c <= '9';
 }
 
-/// "CM_ ...", " SG_ ...": no line of a comment, but what a quote too many or too few runs into.
+/// "CM_ ...", " SG_ ...": not part of a string but a statement reached through an unbalanced quote.
 bool begins_statement(std::string_view text) {
   text.remove_prefix(std::min(text.find_first_not_of(' '), text.size()));
   const std::size_t end = text.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZ_");

@@ -1,4 +1,4 @@
-/// The words, numbers and strings of a DBC file, one after another.
+/// Tokenizer of DBC files: words, numbers and strings.
 #pragma once
 
 #include <cstddef>
@@ -8,46 +8,45 @@
 
 namespace thermocomp {
 
-/// Bytes with everything but printable ASCII replaced, for messages.
+/// Replaces all bytes but printable ASCII, for messages.
 [[nodiscard]] std::string printable(std::string_view bytes);
 
-/// Ends the reading of one statement.
+/// Syntax error; the rest of the statement is skipped.
 struct DbcSyntaxError {
   int line{0};
   std::string found;
   std::string rule;
 };
 
-/// White space before what is asked for is skipped; a DbcSyntaxError is thrown where it is not
-/// found.
+/// Skips white space before each token; throws DbcSyntaxError if the token is not found.
 class DbcScanner {
  public:
   explicit DbcScanner(std::string_view text) : text_(text) {}
 
   [[nodiscard]] bool at_end();
-  /// Line of what comes next.
+  /// Line of the next token.
   [[nodiscard]] int line();
   [[nodiscard]] bool accept(char symbol);
   void expect(char symbol);
-  /// A C identifier, or nothing.
+  /// A C identifier; may be empty.
   [[nodiscard]] std::string_view next_word();
   std::string_view word(std::string_view what);
-  /// Reads a name as the files of all makers have it: also "2_Gateway", "Gateway-Load"; or nothing.
+  /// A name as found in practice, such as "2_Gateway", "Gateway-Load"; may be empty.
   [[nodiscard]] std::string_view next_name();
   std::string_view name(std::string_view what);
   [[nodiscard]] bool next_is(char symbol);
   double real(std::string_view what);
   std::uint64_t integer(std::string_view what, std::uint64_t max);
-  /// A string without its quotes; `\"` inside it is a quote.
+  /// A string without its quotes; `\"` is a quote in it.
   std::string text(std::string_view what);
-  /// Everything of this line up to and with the symbol.
+  /// Skips this line up to and including the symbol.
   void skip_behind(char symbol);
-  /// Everything up to and with the semicolon that ends the statement.
+  /// Skips up to and including the semicolon that ends the statement.
   void skip_statement();
-  /// Whether what comes next is the first on its line.
+  /// Whether the next token is the first on its line.
   [[nodiscard]] bool begins_line();
   void skip_line() noexcept;
-  /// @throws DbcSyntaxError about what comes next
+  /// @throws DbcSyntaxError at the next token
   [[noreturn]] void fail(std::string_view rule);
 
  private:

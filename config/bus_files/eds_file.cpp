@@ -14,7 +14,7 @@ constexpr std::size_t flaws_max = 1000;
 constexpr std::size_t shown_max = 60;  // characters of a value in a flaw
 constexpr std::uint64_t object_variable = 0x7;
 constexpr std::uint64_t object_domain = 0x2;
-constexpr std::uint64_t sub_max = 0xFE;  // sub-index FF tells the structure
+constexpr std::uint64_t sub_max = 0xFE;  // sub-index FF describes the structure
 
 std::string_view trimmed(std::string_view text) {
   const auto blank = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };
@@ -37,7 +37,7 @@ std::string printed(std::string_view text) {
   return result;
 }
 
-/// As C writes numbers: 0x hexadecimal, 0 octal, else decimal.
+/// C syntax: 0x hexadecimal, 0 octal, else decimal.
 std::optional<std::uint64_t> number(std::string_view text) {
   int base = 10;
   if (text.size() > 2 && text[0] == '0' && (text[1] == 'x' || text[1] == 'X')) {
@@ -52,7 +52,7 @@ std::optional<std::uint64_t> number(std::string_view text) {
   return value;
 }
 
-/// The data types of CiA 301 that are numbers.
+/// The numeric data types of CiA 301.
 std::optional<ObjectType> type_of(std::uint64_t code) {
   switch (code) {
     case 0x01:
@@ -93,7 +93,7 @@ struct Entry {
 struct Section {
   std::string name;  ///< as written
   int line{0};
-  std::map<std::string, Entry> entries;  ///< by the key in small letters
+  std::map<std::string, Entry> entries;  ///< by key in lower case
 };
 
 class EdsReader {
@@ -176,7 +176,7 @@ class EdsReader {
     if (!is_new) flaw(line, key, value, "stands twice in its section");
   }
 
-  /// The object that a section's name means; nullopt: it is about something else.
+  /// The object of a section name; nullopt: another section.
   static std::optional<Key> address_of(const std::string& key) {
     constexpr std::size_t index_digits = 4;
     const auto hexadecimal = [](std::string_view digits) -> std::optional<unsigned> {
@@ -228,7 +228,7 @@ class EdsReader {
       if (const auto compact = number_of(section, "CompactSubObj", 0)) {
         add_compact(*address, section, own, *compact);
       }
-      return;  // an array or a record: its parts hold the values
+      return;  // an array or record: its sub-objects have the values
     }
     const bool has_whole = is_sub && !own.empty() && parent != sections_.end();
     add(section, *address, has_whole ? text_of(parent->second, "ParameterName") + "/" + own : own);
@@ -238,13 +238,13 @@ class EdsReader {
     const auto type = number_of(section, "DataType", 0);
     EdsObject object{{address.first, address.second}, name, std::nullopt};
     if (type) object.type = type_of(*type);
-    // 1018sub1 and 1018sub01 are one address.
+    // 1018sub1 and 1018sub01 are the same address.
     if (!objects_.try_emplace(address, std::move(object)).second) {
       flaw(section.line, "", section.name, "is an object that stands there already");
     }
   }
 
-  /// CompactSubObj: equal sub-objects 1 to count, described once.
+  /// CompactSubObj: identical sub-objects 1 to count, described once.
   void add_compact(Key address, const Section& section, const std::string& name,
                    std::uint64_t count) {
     if (count > sub_max) {
@@ -265,11 +265,11 @@ class EdsReader {
   }
 
   std::string name_;
-  std::map<std::string, Section> sections_;  ///< by the name in small letters
-  Section nowhere_;                          ///< takes the entries of a refused section
+  std::map<std::string, Section> sections_;  ///< by name in lower case
+  Section nowhere_;                          ///< collects entries of a refused section
   std::map<Key, EdsObject> objects_;
   std::vector<EdsFlaw> flaws_;
-  std::optional<Key> about_;  ///< the object that is being read
+  std::optional<Key> about_;  ///< the present object
 };
 
 }  // namespace

@@ -1,10 +1,9 @@
 /// Electronic data sheets (CiA 306): names and types of the objects of a CANopen device.
 ///
-/// An EDS file is an INI file whose comments begin a line with ';'. Libraries for INI files read
-/// ';' inside a line, '#', quotes or indented lines otherwise than data sheets mean them, cut long
-/// lines or do not give the line of an entry; so the form is read here, strictly: a line that is
-/// neither a section, an entry, a comment nor empty is a flaw of its section, as is a section or
-/// entry that stands there twice; the first one counts.
+/// An EDS file is an INI file with comment lines that begin with ';'. INI libraries treat ';'
+/// inside a line, '#', quotes and indented lines differently, cut long lines or do not report the
+/// line of an entry; hence this strict parser: a line that is not a section, entry, comment or
+/// empty is a flaw of its section, as is a repeated section or entry; the first one counts.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +17,7 @@
 
 namespace thermocomp {
 
-/// A number in an object dictionary.
+/// Numeric type in an object dictionary.
 struct ObjectType {
   int length_bits{16};
   bool is_signed{true};
@@ -28,30 +27,30 @@ struct ObjectType {
 
 struct EdsObject {
   ObjectAddress address;
-  /// ParameterName; of a sub-object that of its object, a '/', and its own. What is not printable
-  /// ASCII is replaced by '?'.
+  /// ParameterName; for a sub-object that of its object, a '/', and its own. Unprintable characters
+  /// are replaced by '?'.
   std::string name;
   std::optional<ObjectType> type;  ///< none: not a number (text, domain)
 };
 
-/// Something wrong in the file.
+/// An error in the file.
 struct EdsFlaw {
   Problem problem;
-  std::optional<ObjectAddress> object;  ///< none: of no object
-  bool in_use{false};                   ///< a configuration takes the object's type from here
+  std::optional<ObjectAddress> object;  ///< none: not at an object
+  bool in_use{false};                   ///< the configuration uses the object's type
 };
 
 struct EdsFile {
-  std::vector<EdsObject> objects;  ///< those that hold a value, by address
+  std::vector<EdsObject> objects;  ///< objects with a value, by address
   std::vector<EdsFlaw> flaws;
 
   [[nodiscard]] const EdsObject* find(const ObjectAddress& address) const noexcept;
-  /// By the whole name, or by the part behind the '/'. More than one: the name is ambiguous.
+  /// By full name, or by the part after the '/'. More than one: the name is ambiguous.
   [[nodiscard]] std::vector<const EdsObject*> find(std::string_view name) const;
   [[nodiscard]] std::vector<std::string> names() const;
 };
 
-/// @param name  stands for the file in flaws
+/// @param name  file name in flaws
 [[nodiscard]] EdsFile read_eds_text(std::string_view text, const std::string& name);
 
 }  // namespace thermocomp

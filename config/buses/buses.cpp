@@ -10,7 +10,7 @@
 namespace thermocomp::sections {
 namespace {
 
-/// nullptr, and the problem reported, where the table has none that there is.
+/// nullptr, with a problem, for a missing or unknown kind.
 const BusKind* read_kind(const TomlTable& table) {
   Names<const BusKind*> names;
   for (const BusKind& kind : bus_kinds()) names.emplace_back(kind.name, &kind);
@@ -20,16 +20,16 @@ const BusKind* read_kind(const TomlTable& table) {
 }
 
 struct Bus {
-  const BusKind* kind{nullptr};         ///< nullptr: not known
-  std::shared_ptr<BusSection> section;  ///< nullptr: of no known kind
+  const BusKind* kind{nullptr};         ///< nullptr: unknown
+  std::shared_ptr<BusSection> section;  ///< nullptr: unknown kind
   TomlTable table;
   std::size_t devices{0};
   bool used{false};
 };
 
 struct Device {
-  std::shared_ptr<BusSection> section;  ///< nullptr: not known what it is like
-  std::size_t index{0};                 ///< in its bus
+  std::shared_ptr<BusSection> section;  ///< nullptr: the device is not known
+  std::size_t index{0};                 ///< within its bus
   TomlTable table;
   bool used{false};
   const Preset* preset{nullptr};
@@ -69,7 +69,7 @@ class BusReader {
   }
 
  private:
-  /// Without files a device with a preset is left out; a bus of such devices only is none.
+  /// Without files, devices with a preset are left out, and so are buses of such devices only.
   std::vector<BusConfig> take() {
     std::vector<BusConfig> buses;
     for (const std::shared_ptr<BusSection>& section : sections_)
@@ -100,7 +100,7 @@ class BusReader {
       misnamed_bus_ = true;
       if (!bus_name.empty()) own.problem("bus", "must name a bus: " + known(buses_));
     } else if (own.has("preset") && device.preset == nullptr) {
-      bus->second.used = true;  // what the device is like is not known
+      bus->second.used = true;  // used by a device that is not known
     } else {
       bus->second.used = true;
       place_on(bus->second, device, name);
@@ -141,10 +141,10 @@ class BusReader {
   TomlTable root_;
   Presets& presets_;
   BusFiles& files_;
-  std::vector<std::shared_ptr<BusSection>> sections_;  ///< in the order of the file
+  std::vector<std::shared_ptr<BusSection>> sections_;  ///< in file order
   std::map<std::string, Bus> buses_;
   std::map<std::string, Device> devices_;
-  /// A reference to a name that does not exist: whom nobody names may be the one that was meant.
+  /// After a reference to an unknown name, an unused bus or device is not reported.
   bool misnamed_bus_{false};
   bool misnamed_device_{false};
 };

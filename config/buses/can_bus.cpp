@@ -5,7 +5,7 @@
 namespace thermocomp::sections {
 namespace {
 
-/// Where the value stands, as one text.
+/// The place of the value as text.
 std::string place_of(const std::string& interface, const CanSignal& signal) {
   std::string place = interface;
   const auto add = [&place](auto number) { place.append(" ").append(std::to_string(number)); };
@@ -25,7 +25,7 @@ class CanSection final : public BusSection {
   CanSection(const TomlTable& table, const std::string& name, BusFiles& files) : files_(files) {
     bus_.name = name;
     bus_.interface = read_interface(table);
-    // Looking for an interface costs nothing, and a bus that is back shall be read within 2 s.
+    // Polling for an interface is cheap, and a restored bus must be read within 2 s.
     bus_.reconnect_s = table.number("reconnect_s", Range::between(0.01, 1), bus_.reconnect_s);
     refuse_all(table,
                {"host", "port", "device", "baud", "parity", "data_bits", "stop_bits", "rs485",

@@ -26,18 +26,18 @@ const Names<ObjectType>& type_names() {
   return names;
 }
 
-/// What CiA 301 keeps for other services cannot be a TPDO.
+/// CiA 301 reserves the other identifiers for other services.
 bool can_be_tpdo(std::uint32_t cob_id) {
   return (cob_id > 0x100 && cob_id < 0x580) || (cob_id >= 0x680 && cob_id < 0x6E0);
 }
 
 struct Place {
   std::optional<ObjectAddress> object;
-  std::optional<ObjectType> type;  ///< of the data sheet
-  bool unknown{false};             ///< a name, and no data sheet says of what; reported
+  std::optional<ObjectType> type;  ///< from the data sheet
+  bool unknown{false};             ///< the name or its type cannot be resolved; reported
 };
 
-/// Names as they may be written: whole ones, and parts behind the '/'.
+/// Valid names: full ones, and parts after the '/'.
 std::vector<std::string> short_and_long_names(const EdsFile& eds) {
   std::vector<std::string> names = eds.names();
   for (std::size_t i = 0, count = names.size(); i < count; ++i) {
@@ -47,8 +47,8 @@ std::vector<std::string> short_and_long_names(const EdsFile& eds) {
   return names;
 }
 
-/// Marks the flaws of an object whose type the configuration does not give; without an object
-/// those of no object.
+/// Marks the flaws of an object whose type is not configured as used; without an object those
+/// outside of objects.
 void mark_flaws(EdsFile& eds, const TomlTable& table, std::optional<ObjectAddress> object) {
   for (EdsFlaw& flaw : eds.flaws) {
     if (flaw.object != object || (object && table.has("type"))) continue;
@@ -95,7 +95,7 @@ ObjectAddress read_address(const TomlTable& table) {
           table.integer<std::uint8_t>("sub", 0, 0xFE, 0)};
 }
 
-/// `object`, or `index` and `sub`.
+/// Reads `object`, or `index` and `sub`.
 Place read_object(const TomlTable& table, const CanopenDevice& known, const EdsFiles& eds_files) {
   if (table.has("object")) return by_name(table, known, eds_files);
   Place place;
@@ -113,7 +113,7 @@ std::uint32_t default_cob_id(int pdo, int node) {
   return static_cast<std::uint32_t>(0x80 + 0x100 * pdo + node);
 }
 
-/// `cob_id`, or `pdo` with the identifiers that nodes have by default; 0 where neither stands.
+/// Reads `cob_id`, or `pdo` with the node's default identifiers; 0 if both are missing.
 std::uint32_t read_cob_id(const TomlTable& own, const TomlTable& base, int node) {
   const bool has_own = own.has("cob_id") || own.has("pdo");
   const TomlTable& table = has_own ? own : base;
@@ -182,7 +182,7 @@ std::vector<std::uint16_t> read_emergency_codes(const TomlTable& own, const Toml
   return codes;
 }
 
-/// In the TPDO of the value, or an object of its own that is asked for after the value.
+/// The status is in the value's TPDO, or an object of its own that is requested after the value.
 void read_status(const TomlTable& sensor, const TomlTable& device, CanopenChannel& channel) {
   const TomlTable& source = sensor.has("status") ? sensor : device;
   if (!source.has("status")) return;
@@ -203,7 +203,7 @@ void read_status(const TomlTable& sensor, const TomlTable& device, CanopenChanne
   channel.status = std::move(status);
 }
 
-/// Where in the TPDO, or when the object is asked for.
+/// Reads the source: object with a period of requests, object of a mapping, or place in a TPDO.
 void read_way(const TomlTable& sensor, const TomlTable& device, const CanopenDevice& known,
               const Place& place, CanopenChannel& channel) {
   const bool polled = sensor.has("poll_s") || (device.has("poll_s") && !sensor.has("start_bit"));

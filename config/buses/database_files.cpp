@@ -33,7 +33,7 @@ namespace {
 constexpr std::uint64_t fd_bytes_max = 64;
 constexpr std::uint64_t classic_bytes_max = 8;
 
-/// What a name that is not known may be; where none is nearest, what there is.
+/// Suggests the nearest known name, else lists known names.
 std::string did_you_mean(std::string_view name, const std::vector<std::string>& known) {
   constexpr std::size_t listed_max = 8;
   const std::string near = nearest_name(name, known);
@@ -46,9 +46,9 @@ std::string did_you_mean(std::string_view name, const std::vector<std::string>& 
   return text + (known.size() > listed_max ? "\" and others" : "\"");
 }
 
-/// Marks the flaws of a message or signal that is named; without a signal all of the message's,
-/// without a message those of which nobody knows where they belong.
-/// @return whether there are any that the keys given do not replace
+/// Marks the flaws of a named message or signal as used; without a signal all of the message's,
+/// without a message those outside of messages.
+/// @return whether some are not overridden by configured keys
 bool mark_flaws(DbcFile& file, std::string_view message, std::optional<std::string_view> signal,
                 const TomlTable& own, const TomlTable& base) {
   bool found = false;
@@ -71,13 +71,13 @@ bool mark_flaws(DbcFile& file, std::string_view message, std::optional<std::stri
   return found;
 }
 
-/// Makes the signal one in degC by the unit of its numbers.
+/// Converts the signal to degC, by its unit.
 void to_degC(const TomlTable& own, const TomlTable& base, const std::string& in_file,
              CanSignal& place) {
   const TomlTable& source = own.has("unit") ? own : base;
   const bool is_given = source.has("unit");
   const std::string text = is_given ? source.text("unit") : in_file;
-  if (text.find_first_not_of(' ') == std::string::npos) return;  // none: degC
+  if (text.find_first_not_of(' ') == std::string::npos) return;  // no unit: degC
   const SpelledUnit* unit = spelled_unit(text);
   if (unit == nullptr || unit->dimension != "temperature") {
     (is_given ? source : own)
@@ -91,7 +91,7 @@ void to_degC(const TomlTable& own, const TomlTable& base, const std::string& in_
   place.offset = place.offset * unit->factor + unit->offset;
 }
 
-/// The message that a sensor or its device names; nullptr after a problem.
+/// The message named by a sensor or its device; nullptr after a problem.
 const DbcMessage* find_message(const TomlTable& own, const TomlTable& base, DbcFile& file) {
   const TomlTable& source = own.has("message") ? own : base;
   const std::string name = source.text("message", "");
@@ -145,8 +145,8 @@ std::optional<CanField> counter_of(const TomlTable& own, const TomlTable& base,
   return CanField{signal->place.start_bit, signal->place.length_bits, signal->place.byte_order};
 }
 
-/// Codes with which J1939 says "error" and "not available". Of longer numbers the former is beyond
-/// all temperatures.
+/// Adds the codes by which J1939 signals "error" and "not available". In longer numbers "error" is
+/// beyond all temperatures.
 void add_group_codes(CanSignal& signal) {
   const int bits = signal.length_bits;
   if (signal.is_signed || signal.is_float || (bits != 8 && bits != 16 && bits != 32)) return;

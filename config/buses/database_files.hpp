@@ -1,4 +1,4 @@
-/// The files of objects (EDS) and messages (DBC) that buses and devices of a configuration name.
+/// EDS and DBC files named by buses and devices of a configuration.
 #pragma once
 
 #include <filesystem>
@@ -14,7 +14,7 @@
 
 namespace thermocomp::sections {
 
-/// Problems of those flaws of bus files that are in use, or of those that are not.
+/// Problems from flaws of bus files, either in use or not.
 template <class Files>
 std::vector<Problem> flaws_of(const Files& files, bool in_use) {
   std::vector<Problem> problems;
@@ -27,18 +27,17 @@ std::vector<Problem> flaws_of(const Files& files, bool in_use) {
   return problems;
 }
 
-/// The electronic data sheets that the devices of a configuration name.
+/// The electronic data sheets of a configuration's devices.
 class EdsFiles {
  public:
-  /// @param folder  where relative paths begin; none: no file is opened, and objects by name are
-  /// left out
+  /// @param folder  base of relative paths; none: opens no file and leaves out objects given by
+  /// name
   explicit EdsFiles(std::optional<std::filesystem::path> folder) : folder_(std::move(folder)) {}
 
-  /// The file of the key `eds` of a device; nullptr: it names none, or none that can be read.
+  /// The file of a device's key `eds`; nullptr: not configured, or unreadable.
   [[nodiscard]] std::shared_ptr<EdsFile> read(const TomlTable& device);
   [[nodiscard]] bool opens_files() const noexcept { return folder_.has_value(); }
-  /// The flaws inside the files.
-  /// @param in_use  at objects whose name or type a configuration takes from there; else elsewhere
+  /// @param in_use  flaws at objects whose name or type the configuration uses; else the others
   [[nodiscard]] std::vector<Problem> flaws(bool in_use) const { return flaws_of(read_, in_use); }
 
  private:
@@ -46,25 +45,22 @@ class EdsFiles {
   std::map<std::filesystem::path, std::shared_ptr<EdsFile>> read_;
 };
 
-/// What a bus says of its messages.
+/// A bus' definitions of messages.
 struct CanDatabase {
   bool named{false};  ///< the bus names a file
-  /// Its content; none where it cannot be read, or where no files are opened. What is named of it
-  /// is marked at its flaws.
+  /// Null if unreadable or if no files are opened. Flaws at used messages are marked.
   std::shared_ptr<DbcFile> file;
 };
 
 /// The DBC files of a configuration.
 class DbcFiles {
  public:
-  /// @param folder  where relative paths begin; none: no file is opened, and signals by name are
-  /// taken as they are given
+  /// @param folder  base of relative paths; none: opens no file and accepts signal names unchecked
   explicit DbcFiles(std::optional<std::filesystem::path> folder) : folder_(std::move(folder)) {}
 
-  /// The file of the key `dbc` of a bus.
+  /// The file of a bus' key `dbc`.
   [[nodiscard]] CanDatabase read(const TomlTable& bus);
-  /// The flaws inside the files.
-  /// @param in_use  where a sensor stands on it; else elsewhere
+  /// @param in_use  flaws at signals that a sensor uses; else the others
   [[nodiscard]] std::vector<Problem> flaws(bool in_use) const { return flaws_of(read_, in_use); }
 
  private:
@@ -72,8 +68,8 @@ class DbcFiles {
   std::map<std::filesystem::path, std::shared_ptr<DbcFile>> read_;
 };
 
-/// A sensor's value: by the name of its signal where it has the key `signal`, else by its place.
-/// What `own` leaves out is as in `base`; what both leave out of a named signal is as in the file.
+/// A sensor's value: with the key `signal` by its name, else by its place. Missing keys are taken
+/// from `base`, for a named signal then from the file.
 [[nodiscard]] CanChannel read_can_channel(const TomlTable& own, const TomlTable& base,
                                           const CanDatabase& database);
 

@@ -23,7 +23,7 @@ const Names<Fault>& fault_names() {
   return names;
 }
 
-/// A NAME has 64 bits, of which TOML's integers hold 63: it is written as a text.
+/// A NAME has 64 bits, but TOML's integers 63: it is written as text.
 std::optional<std::uint64_t> read_name(const TomlTable& table, const char* key) {
   constexpr std::size_t digits_max = 16;
   if (!table.has(key)) return std::nullopt;
@@ -39,7 +39,7 @@ std::optional<std::uint64_t> read_name(const TomlTable& table, const char* key) 
   return std::nullopt;
 }
 
-/// A whole number that may stand in `own` or in `base`. Both are checked.
+/// An integer in `own` or else `base`. Both are checked.
 int whole(const TomlTable& own, const TomlTable& base, std::string_view key, int low, int high) {
   const bool in_base = base.has(key);
   if (!own.has(key) && !in_base) own.problem(key, "must be given");
@@ -85,7 +85,7 @@ J1939NodeConfig read_j1939_device(const TomlTable& table, const std::string& nam
       table.problem("j1939_name", "is that of the device " + other.name + " already");
     }
   }
-  // So that what is built from it is whole; the problem has been reported.
+  // Reported already; completes the node for what is built from it.
   if (!node.address && !node.name_claimed) node.address = 0;
   return node;
 }

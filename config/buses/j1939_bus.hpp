@@ -1,4 +1,4 @@
-/// The parts of the daemon's file that describe a J1939 bus, its devices and their parameters.
+/// Sections of the daemon's file for a J1939 bus, its devices and parameters.
 #pragma once
 
 #include <string>
@@ -9,10 +9,10 @@
 namespace thermocomp::sections {
 
 [[nodiscard]] J1939BusConfig read_j1939_bus(const TomlTable& table, const std::string& name);
-/// @param bus  with the devices before it: an address belongs to one
+/// @param bus  with the previous devices: addresses must be unique
 [[nodiscard]] J1939NodeConfig read_j1939_device(const TomlTable& table, const std::string& name,
                                                 const J1939BusConfig& bus);
-/// What `sensor` leaves out is as in `device`.
+/// Keys missing in `sensor` are taken from `device`.
 [[nodiscard]] J1939Channel read_j1939_channel(const TomlTable& sensor, const TomlTable& device);
 
 }  // namespace thermocomp::sections

@@ -57,7 +57,7 @@ class ModbusSection final : public BusSection {
   [[nodiscard]] BusConfig take() override { return std::move(bus_); }
 
  private:
-  /// A value is read in one request, or it could be half old and half new.
+  /// A value must be read in one request, or its halves could be of different times.
   static void check_request(const TomlTable& sensor, const ModbusChannel& channel,
                             const ModbusDeviceConfig& device) {
     const auto count = static_cast<int>(words_of(channel.table, channel.encoding));

@@ -16,7 +16,7 @@ bool is_preset_name(const std::string& name) {
   return !name.empty() && name.find_first_not_of(allowed) == std::string::npos;
 }
 
-/// The presets of all folders, for a message.
+/// Names of the presets in all folders, for a message.
 std::vector<std::string> names_in(const std::vector<fs::path>& folders) {
   std::set<std::string> names;
   for (const fs::path& folder : folders) {
@@ -44,7 +44,7 @@ std::string unknown_rule(const std::string& name, const std::vector<fs::path>& f
   return rule + ")";
 }
 
-/// What is there for people only; it must be there.
+/// Reads the required keys that are for people only.
 void read_source(const TomlTable& root) {
   static_cast<void>(root.integer("format", 1, 1));
   static_cast<void>(root.text("maker"));
@@ -88,7 +88,7 @@ std::string list_keys(const Entries& entries) {
   return text;
 }
 
-/// The table of the thermocouple that `table` names, if it names one that the preset knows.
+/// The preset's table for the thermocouple type that `table` names, if any.
 const TomlTable* thermocouple_of(const TomlTable& table, const Preset& preset) {
   if (!table.has("thermocouple")) return nullptr;
   if (preset.thermocouples.empty()) {

@@ -23,34 +23,34 @@
 namespace thermocomp {
 namespace {
 
-/// The files that a configuration names: none that the daemon writes may be another of them, by
-/// whatever path or link.
+/// The files named by a configuration: none that the daemon writes may be the same as another one,
+/// whatever the path or link.
 enum class FileUse {
   read,
-  written,  ///< a regular file, or none yet
-  socket    ///< a socket, or none yet
+  written,  ///< a regular file, or missing
+  socket    ///< a socket, or missing
 };
 
 struct NamedFile {
   TomlTable table;
-  std::string key;  ///< of `table`: where the file is named. Empty: it is the configuration itself
+  std::string key;  ///< key in `table` that names the file; empty: the configuration itself
   std::filesystem::path path;
   FileUse use{FileUse::read};
-  /// Further files that are made beside it, by what is added to its name.
+  /// Endings of further files created beside it.
   std::vector<std::string> endings{};
 };
 
-/// Adds a problem of the key for each link that leads only to itself, each path that is not a
-/// regular file, and each pair of names of one file that is written under at least one of them.
-/// Paths are compared with all links followed, files that exist by device and inode too.
+/// Adds a problem for each loop of links, each path that is not a regular file, and each pair of
+/// names of the same file if one of them is written. Paths are compared with links resolved,
+/// existing files also by device and inode.
 void check_named_files(const std::vector<NamedFile>& files);
 
 namespace fs = std::filesystem;
 
-constexpr int links_max = 40;  // as the kernel follows
+constexpr int links_max = 40;  // the kernel's limit
 
-/// The path with every link followed, also one to a file that is not there yet.
-/// @return empty, and `why`, when that cannot be done
+/// The path with links resolved, also that to a missing file.
+/// @return empty, with `why`, on failure
 fs::path followed(fs::path path, std::string& why) {
   std::error_code error;
   for (int links = 0; fs::is_symlink(fs::symlink_status(path, error)); ++links) {
@@ -68,10 +68,10 @@ fs::path followed(fs::path path, std::string& why) {
   return {};
 }
 
-/// One file on the disk, by one of its names.
+/// A file on disk, by one of its names.
 struct Place {
   const NamedFile* named;
-  fs::path path;  ///< links followed
+  fs::path path;  ///< links resolved
   std::optional<std::pair<dev_t, ino_t>> inode;
 };
 
@@ -86,7 +86,7 @@ std::string name_of(const NamedFile& file) {
 }
 
 void check_kind(const NamedFile& file, const struct stat& status) {
-  // A state file that cannot be used is moved aside by the daemon, whatever it is.
+  // The daemon moves an unusable state file aside, of any type.
   if (file.use == FileUse::written && file.key != "state_file" && !S_ISREG(status.st_mode)) {
     file.table.problem(file.key, file.path.string(), "must be a regular file, or not be there");
   }
@@ -96,7 +96,7 @@ void check_kind(const NamedFile& file, const struct stat& status) {
 }
 
 void add_places(const NamedFile& file, std::vector<Place>& places) {
-  if (file.path.empty()) return;  // a problem already
+  if (file.path.empty()) return;  // reported already
   std::string why;
   const fs::path path = followed(file.path, why);
   if (!why.empty()) {
@@ -132,7 +132,7 @@ void check_named_files(const std::vector<NamedFile>& files) {
   }
 }
 
-/// A path of the file; a relative one starts at the file's folder.
+/// A path in the file; relative to the file's folder.
 fs::path read_path(const TomlTable& table, std::string_view key, const fs::path& otherwise,
                    const fs::path& folder) {
   const fs::path path = table.text(key, otherwise.string());
@@ -186,8 +186,8 @@ void check_controller_period(const TomlTable& compensation, const DaemonConfig& 
                        "must be more than the controller's period_s");
 }
 
-/// Everything but the model's content.
-/// @return the tables that are looked at once more beside the model
+/// Everything but the content of the model file.
+/// @return the tables to be checked against the model
 sections::BindingTables read_daemon(const TomlTable& root, const fs::path& folder,
                                     sections::Presets& presets, sections::BusFiles& bus_files,
                                     DaemonConfig& config) {
@@ -217,15 +217,14 @@ sections::BindingTables read_daemon(const TomlTable& root, const fs::path& folde
   config.controller = std::move(controller.config);
   config.estimator.signals = std::move(controller.signals);
   config.dry_run = controller.dry_run;
-  // A dry run stands in for what would be applied
-  // (drivers/controllers/kinds/make_controller.hpp).
+  // A dry run simulates the applied offsets (drivers/controllers/kinds/make_controller.hpp).
   config.estimator.controller_reads_back = controller.reads_back || controller.dry_run;
   const TomlTable compensation = root.table_or_empty("compensation");
   config.estimator.compensation =
       sections::read_compensation(compensation, config.estimator.signals);
   check_controller_period(compensation, config, controller.period_s);
   config.estimator.correction = sections::read_correction(root.table_or_empty("correction"));
-  // With no offset at the machine what remains there is all of it.
+  // Without an offset at the machine, a measured remainder is the total displacement.
   if (config.dry_run) config.estimator.correction.measured = MeasuredMeaning::total;
   return tables;
 }
@@ -252,12 +251,12 @@ void check_files(const TomlTable& root, const DaemonConfig& config, const fs::pa
 
 struct ModelSource {
   std::string name;
-  std::optional<std::string> text;  ///< none: a problem already
+  std::optional<std::string> text;  ///< none: reported already
 };
 
 enum class Files { opened, only_named };
 
-/// The line on which a key of the file's own table stands; 0: none.
+/// The line of a key of the file's top table; 0: not found.
 int line_of(const std::string& text, const std::string& key) {
   std::istringstream lines(text);
   std::string line;
@@ -266,8 +265,7 @@ int line_of(const std::string& text, const std::string& key) {
   return 0;
 }
 
-/// Numbers that are no temperatures of this machine; the sensors that say so are the
-/// configuration's.
+/// Reports reference values that this machine's configured sensors cannot measure.
 void add_reference_problems(const ModelSource& source, const DaemonConfig& config,
                             std::vector<Problem>& problems) {
   const std::vector<double>& reference_degC = config.model.reference_degC;
@@ -283,7 +281,7 @@ void add_reference_problems(const ModelSource& source, const DaemonConfig& confi
   }
 }
 
-/// Oddities of a configuration that holds, and flaws of its bus files that it does not stand on.
+/// Warnings about a valid configuration, and flaws of bus files in entries that it does not use.
 std::vector<std::string> remarks_of(const sections::BusFiles& files, const std::string& name) {
   constexpr std::size_t shown_max = 20;
   std::vector<Problem> all = files.remarks;
@@ -299,8 +297,8 @@ std::vector<std::string> remarks_of(const sections::BusFiles& files, const std::
   return lines;
 }
 
-/// With the blocks that the candidate has a use for, and a correction that is never taught: it
-/// only remembers, for parts that are measured later.
+/// The candidate's configuration: blocks that its model uses, and a correction that is never
+/// updated and only keeps history for parts measured later.
 EstimatorConfig beside(EstimatorConfig config, const ThermalModel& model) {
   const std::vector<std::string> columns = model.temperature_columns();
   std::erase_if(config.blocks, [&](const BlockConfig& block) {

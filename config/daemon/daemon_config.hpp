@@ -1,4 +1,4 @@
-/// The whole configuration of thermocompd, as loaded and validated from one TOML file.
+/// The configuration of thermocompd, loaded from a TOML file and validated.
 #pragma once
 
 #include <filesystem>
@@ -17,10 +17,11 @@ namespace thermocomp {
 enum class RealTimeRule { require, warn };
 
 struct LoopConfig {
-  double rate_hz{100.0};                       ///< 1..1000
-  int priority{60};                            ///< SCHED_FIFO priority, 1..98
-  int cpu{-1};                                 ///< -1: any
-  RealTimeRule real_time{RealTimeRule::warn};  ///< where FIFO or memory locking is not allowed
+  double rate_hz{100.0};  ///< 1..1000
+  int priority{60};       ///< SCHED_FIFO priority, 1..98
+  int cpu{-1};            ///< -1: any
+  RealTimeRule real_time{
+      RealTimeRule::warn};  ///< behaviour if FIFO or memory locking is not permitted
   bool operator==(const LoopConfig&) const = default;
 };
 
@@ -30,8 +31,8 @@ struct HistoryConfig {
   double size_MB_max{512.0};
   double age_days_max{90.0};
   double commit_s{5.0};          ///< 0.1..10
-  double offsets_period_s{1.0};  ///< offsets are noted this often, for people and for proof
-  double segment_h{6.0};         ///< a state snapshot this often: where a replay can start
+  double offsets_period_s{1.0};  ///< period of recording offsets
+  double segment_h{6.0};         ///< period of state snapshots, the start points of a replay
   bool operator==(const HistoryConfig&) const = default;
 };
 
@@ -40,15 +41,15 @@ struct SocketConfig {
   std::string read_group{"thermocomp"};
   std::string operator_group{"thermocomp-operator"};
   std::string bridge_group{"thermocomp-bridge"};
-  std::string model_group{"thermocomp-model"};  ///< may change which model runs
+  std::string model_group{"thermocomp-model"};  ///< may change the model
   bool operator==(const SocketConfig&) const = default;
 };
 
-/// `[model] candidate`: runs beside the model, is scored and never sent. One that cannot run keeps
-/// nothing from working.
+/// `[model] candidate`: runs beside the model, is scored, never sent. A candidate that cannot run
+/// does not affect the rest.
 struct CandidateModel {
   std::filesystem::path file;
-  std::string problem;  ///< why it does not run; empty: it does, and the rest is there
+  std::string problem;  ///< why it does not run; empty: it does, and the other members are valid
   std::string checksum;
   EstimatorConfig estimator;
   ThermalModel model;
@@ -61,42 +62,39 @@ struct DaemonConfig {
   std::string log_level{"info"};
   LoopConfig loop;
   EstimatorConfig estimator;
-  std::vector<BusConfig> buses;  ///< by kind, those of one kind as in the file
+  std::vector<BusConfig> buses;  ///< by kind, within a kind in file order
   ControllerConfig controller;
-  bool dry_run{false};  ///< the controller is read and nothing is written to it
+  bool dry_run{false};  ///< the controller is read, but not written
   HistoryConfig history;
   SocketConfig socket;
-  /// The texts as read, kept with the history so that a replay needs nothing else.
+  /// The texts as read, stored in the history to make a replay self-contained.
   std::string text;
   std::string model_text;
   std::string model_checksum;  ///< SHA-256 of the model file, hexadecimal
-  /// What is odd but forbids nothing, a line each: flaws of bus files that nothing here stands on.
+  /// Warnings, one line each: such as flaws of bus files in unused entries.
   std::vector<std::string> remarks;
   ThermalModel model;
   std::optional<CandidateModel> candidate;
 };
 
-/// Reads the daemon's file and the model file that it names. Paths in it may be relative to the
-/// folder of the file.
+/// Reads the daemon's file and its model file. Paths in it may be relative to the file's folder.
 /// @throws ConfigurationError with every problem of both files
 [[nodiscard]] DaemonConfig load_daemon_config(const std::filesystem::path& path);
 
-/// The same from texts, as the history keeps them. The names stand for the files in problems; no
-/// file is opened, so that devices with a preset and CANopen objects by name are left out of
-/// the buses.
+/// The same from texts, as stored in the history; the names are those in problems. Opens no file:
+/// devices with a preset and CANopen objects given by name are left out of the buses.
 /// @throws ConfigurationError
 [[nodiscard]] DaemonConfig parse_daemon_config(const std::string& config_text,
                                                const std::string& config_name,
                                                const std::string& model_text,
                                                const std::string& model_name);
 
-/// Differences between the two that a running daemon cannot take over; empty: a reload will do.
-/// A reload takes over model, blocks, screening, smoothing, limiter, compensation and log_level.
+/// Differences that need a restart; empty: a reload suffices. A reload covers model, blocks,
+/// screening, smoothing, limiter, compensation and log_level.
 [[nodiscard]] std::vector<std::string> restart_needed(const DaemonConfig& running,
                                                       const DaemonConfig& next);
 
-/// The model that runs beside in place of the one named; an empty path: none. What is wrong with it
-/// is its `problem`.
+/// Replaces the candidate; an empty path: none. Errors are its `problem`.
 void set_candidate(DaemonConfig& config, const std::filesystem::path& file);
 
 }  // namespace thermocomp

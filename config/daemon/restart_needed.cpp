@@ -15,7 +15,7 @@ std::vector<std::string> names_of(const Entries& entries) {
   return names;
 }
 
-/// Buses that are new, gone or different, by name.
+/// Names of added, removed and changed buses.
 void compare_buses(const std::vector<BusConfig>& running, const std::vector<BusConfig>& next,
                    std::vector<std::string>& changed) {
   const auto missing_in = [](const std::vector<BusConfig>& buses, const BusConfig& bus) {
@@ -51,7 +51,7 @@ std::vector<std::string> restart_needed(const DaemonConfig& running, const Daemo
   compare_buses(running.buses, next.buses, changed);
   compare(names_of(running.estimator.axes) == names_of(next.estimator.axes),
           "names, count or order of the axes");
-  // What the controller applies and shows would change its meaning at once.
+  // The meaning of applied and displayed values would change during the reload.
   compare(same_signs(running.estimator.axes, next.estimator.axes), "sign of an axis");
   compare(running.controller == next.controller, "controller, or registers of the axes");
   compare(running.dry_run == next.dry_run, "dry_run of the controller");

@@ -23,7 +23,7 @@ constexpr std::uintmax_t key_bytes_max = 4096;
 using Key = std::unique_ptr<EVP_PKEY, decltype(&EVP_PKEY_free)>;
 using Context = std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)>;
 
-/// Never asks for a passphrase: a program that does runs unwatched.
+/// Never asks for a passphrase: signing programs run unattended.
 int no_passphrase(char* /*text*/, int /*size*/, int /*writes*/, void* /*user*/) {
   return -1;
 }
@@ -47,7 +47,7 @@ const unsigned char* bytes_of(const std::string& text) {
   return reinterpret_cast<const unsigned char*>(text.data());
 }
 
-/// @return empty where it is not 128 hexadecimal digits
+/// @return empty unless it has 128 hexadecimal digits
 std::vector<unsigned char> bytes_from(const std::string& digits) {
   std::vector<unsigned char> bytes;
   if (digits.size() != 2 * signature_bytes) return bytes;

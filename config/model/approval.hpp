@@ -1,5 +1,4 @@
-/// Signatures (Ed25519, RFC 8032) by which a person approves a model for a machine, wherever the
-/// words travel in between.
+/// Signatures (Ed25519, RFC 8032) by which a person approves a model for a machine.
 #pragma once
 
 #include <cstdint>
@@ -8,8 +7,7 @@
 
 namespace thermocomp {
 
-/// What is signed: neither another machine, nor another model, nor an earlier release, nor the
-/// contrary can be made of it.
+/// The signed data: valid for one machine, model, release and order only.
 struct ReleaseOrder {
   std::string machine;
   std::uint64_t release{0};
@@ -23,9 +21,8 @@ struct ReleaseOrder {
 /// @return 128 hexadecimal digits. @throws ConfigurationError naming the file
 [[nodiscard]] std::string sign_order(const ReleaseOrder& order, const std::filesystem::path& key);
 
-/// Whose key signed it, by the files NAME.pem of a folder with public keys (openssl pkey -pubout).
-/// @return NAME; empty: none of them did. @throws ConfigurationError: a key or the folder cannot be
-/// read
+/// Finds the signer among the public keys NAME.pem in a folder (openssl pkey -pubout).
+/// @return NAME; empty: none. @throws ConfigurationError if a key or the folder is unreadable
 [[nodiscard]] std::string signer_of(const ReleaseOrder& order, const std::string& signature,
                                     const std::filesystem::path& folder);
 

@@ -20,11 +20,11 @@ using Rows = std::vector<std::vector<double>>;
 
 constexpr std::size_t inputs_max = 512;
 constexpr std::size_t outputs_max = 64;
-/// What a model may cost the daemon: memory, the time in which it is built, and every step of the
-/// cycle (model_operations()).
+/// Limits on the cost of a model: memory, time to build it, and time per cycle
+/// (model_operations()).
 constexpr std::size_t terms_max = 2000;
 constexpr double operations_max = 1e6;
-/// What rounding may do to a covariance that was computed and written down.
+/// Tolerated rounding errors of a covariance in decimal form.
 constexpr double covariance_tolerance = 1e-9;
 
 bool contains(const std::vector<std::string>& names, const std::string& name) {
@@ -37,7 +37,7 @@ std::string listed(const std::vector<std::string>& names) {
   return text;
 }
 
-/// @return whether it is a list of usable names (duplicates are a problem, but names)
+/// @return whether it is a list of valid names (duplicates are a problem, but valid)
 bool read_names(const TomlTable& root, std::string_view key, std::size_t count_max,
                 bool (*right_unit)(std::string_view), std::string_view unit_rule,
                 std::vector<std::string>& names) {
@@ -52,7 +52,7 @@ bool read_names(const TomlTable& root, std::string_view key, std::size_t count_m
   }
   std::set<std::string> seen;
   for (const std::string& name : names) {
-    if (name.empty()) continue;  // a problem already
+    if (name.empty()) continue;  // reported already
     if (!is_column_name(name)) root.problem(key, name, column_name_rule);
     if (!right_unit(name)) root.problem(key, name, unit_rule);
     if (!seen.insert(name).second) root.problem(key, name, "is named twice");
@@ -133,7 +133,7 @@ void check_two_subjects(const TomlTable& table, TermSubject kind, const SubjectC
   }
 }
 
-/// What acts, then the place that its effect depends on: their order says which is which.
+/// Requires the acting column, then the temperature on which its effect depends.
 void check_column_and_temperature(const TomlTable& table, const SubjectColumns& columns) {
   const auto temperature = [](const std::string& name) {
     return is_column_name(name) && is_temperature(name);
@@ -149,7 +149,7 @@ void check_column_and_temperature(const TomlTable& table, const SubjectColumns& 
 
 void check_subject(const TomlTable& table, const TermKind& kind, const std::string& subject,
                    const ThermalModel& model) {
-  if (subject.empty()) return;  // a problem already
+  if (subject.empty()) return;  // reported already
   if (kind.subject == TermSubject::two_model_temperatures ||
       kind.subject == TermSubject::temperature_and_position) {
     check_two_subjects(table, kind.subject, subject_columns(subject), model);
@@ -213,7 +213,7 @@ void read_bank_subjects(const TomlTable& table, LagBankSpec& bank) {
                   "must be at most " + std::to_string(bank_subjects_max));
   }
   for (const std::string& name : bank.subjects) {
-    if (name.empty()) continue;  // a problem already
+    if (name.empty()) continue;  // reported already
     if (!is_column_name(name)) table.problem("subjects", name, column_name_rule);
     if (!is_temperature(name) && !is_operating(name)) {
       table.problem("subjects", name, "must be a temperature, an operating signal or a position");
@@ -274,7 +274,7 @@ TermSpec read_bank(const TomlTable& table, const ThermalModel& model) {
   read_bank_subjects(table, term.bank);
   read_bank_taus(table, term.bank);
   if (term.bank.subjects.empty() || term.bank.taus_s.empty()) {
-    table.ignore_rest();  // no shape can be judged
+    table.ignore_rest();  // shapes cannot be checked
     return term;
   }
   read_bank_gains(table, model, term.bank);
@@ -391,7 +391,7 @@ bool read_model(const TomlDocument& document, ThermalModel& model) {
       read_names(root, "outputs", outputs_max, is_output,
                  "must be a displacement (*_um) or a tilt (*_urad)", model.outputs);
   if (!inputs_known || !outputs_known) {
-    root.ignore_rest();  // no shape can be judged
+    root.ignore_rest();  // shapes cannot be checked
     return false;
   }
   read_reference(root, model);
@@ -432,7 +432,7 @@ ModelReading read_model_text(const std::string& text, const std::string& name) {
     const TomlDocument document = TomlDocument::from_text(text, name);
     reading.names_known = read_model(document, reading.model);
     reading.problems = document.all_problems();
-  } catch (const ConfigurationError& error) {  // not TOML at all
+  } catch (const ConfigurationError& error) {  // not TOML
     reading.problems = error.problems();
   }
   return reading;

@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::array<const char*, 3> phase_names{"heating", "turned", "cooling"};
 
-/// @return whether rows of gains can be judged
+/// @return whether rows of gains can be checked
 bool read_groups(const TomlTable& table, const ThermalModel& model, RecordedCourse& course) {
   const std::vector<TomlTable> groups = table.tables("group");
   if (groups.empty() || groups.size() > correction_groups_max) {
@@ -78,7 +78,7 @@ std::vector<RecordedCourse::Point> read_points(const TomlTable& table, std::size
   std::vector<RecordedCourse::Point> points;
   if (since_s.size() != phases.size() || rise_K.size() != phases.size() ||
       gain.size() != phases.size() || sd.size() != phases.size())
-    return points;  // problems already
+    return points;  // reported already
   for (std::size_t i = 0; i < phases.size(); ++i)
     points.push_back({phases[i], since_s[i], rise_K[i], gain[i], sd[i]});
   return points;
@@ -139,9 +139,9 @@ namespace {
 constexpr double rows_max = 1e12;
 constexpr double spread_min = 1e-9;
 constexpr double pivot_share_min = 1e-7;
-constexpr double value_max = 1e12;  ///< of a figure: keeps squares finite
+constexpr double value_max = 1e12;  ///< limit of a value: keeps squares finite
 
-/// The figures of an output, each under its key.
+/// The values of an output, each under its key.
 struct Figure {
   const char* name;
   double MadeFrom::Output::*value;
@@ -165,7 +165,7 @@ std::vector<double> numbers_for(const TomlTable& table, std::string_view key, st
   return values;
 }
 
-/// @return whether the shapes that stand on them can be judged
+/// @return whether shapes that depend on them can be checked
 bool read_columns(const TomlTable& table, const ThermalModel& model, MadeFrom& made_from) {
   made_from.columns = table.texts("columns");
   std::vector<std::string> read = model.temperature_columns();
@@ -174,7 +174,7 @@ bool read_columns(const TomlTable& table, const ThermalModel& model, MadeFrom& m
   std::set<std::string> seen;
   bool known = !made_from.columns.empty();
   for (const std::string& name : made_from.columns) {
-    if (name.empty()) continue;  // a problem already
+    if (name.empty()) continue;  // reported already
     if (std::find(read.begin(), read.end(), name) == read.end()) {
       table.problem("columns", name, "must be a column that the model reads");
       known = false;
@@ -209,7 +209,7 @@ bool is_positive_definite(const std::vector<std::vector<double>>& rows) {
   }
   const double largest = matrix.cwiseAbs().maxCoeff();
   if (!((matrix - matrix.transpose()).cwiseAbs().maxCoeff() <= 1e-9 * largest)) return false;
-  // Pivots, each beside its own spread: what squares of the inverse stand on.
+  // Pivots relative to the standard deviations: the accuracy of the inverse depends on them.
   const Eigen::LLT<Eigen::MatrixXd> factor(matrix);
   if (factor.info() != Eigen::Success) return false;
   const Eigen::ArrayXd spread = matrix.diagonal().array().sqrt();

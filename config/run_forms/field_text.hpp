@@ -7,22 +7,22 @@
 
 namespace thermocomp {
 
-/// Without blanks and tabs at the ends.
+/// Removes blanks and tabs at both ends.
 [[nodiscard]] std::string_view trimmed(std::string_view text);
 
-/// Empty, nan, NaN or NAN: what our own form writes for a missing value.
+/// Empty, nan, NaN or NAN: a missing value in our own form.
 [[nodiscard]] bool is_missing(std::string_view field);
 
-/// @return nullopt unless all of `field` is one finite decimal number
+/// @return nullopt unless `field` is one finite decimal number
 [[nodiscard]] std::optional<double> finite_number(std::string_view field);
 
-/// Takes the part before the next separator off `rest`. @return false when nothing is left
+/// Splits the part before the next separator off `rest`. @return false at the end
 [[nodiscard]] bool take(std::string_view& rest, char separator, std::string_view& part);
 
-/// At most 40 bytes of it, not cut within a letter; " ..." stands for what is left out.
+/// At most 40 bytes, cut between characters; " ..." marks an omission.
 [[nodiscard]] std::string shortened(std::string_view text);
 
-/// As a string of TOML, in quotes.
+/// As a quoted TOML string.
 [[nodiscard]] std::string toml_text(std::string_view text);
 
 }  // namespace thermocomp

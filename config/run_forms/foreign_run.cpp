@@ -22,7 +22,7 @@
 namespace thermocomp {
 namespace {
 
-/// Words that programs write for a missing value, in small letters.
+/// Usual words for a missing value, in lower case.
 constexpr auto missing_words = std::to_array<std::string_view>(
     {"na",       "n/a",         "#n/a",    "#nv",   "null",         "none",     "-",
      "--",       "---",         "----",    "-.-",   "--.-",         "*",        "***",
@@ -31,14 +31,14 @@ constexpr auto missing_words = std::to_array<std::string_view>(
      "#div/0!",  "#value!",     "undef",   "n.a.",  "disconnected", "over",     "under",
      "no value", "nodata",      "logged",  "nan"});
 
-/// What a column of the file becomes.
+/// The target of a column of the file.
 struct Meaning {
   std::size_t source{0};
   std::string name;
   UnitConversion conversion;
 };
 
-/// A name to write for a column without unit; the one who knows the column corrects it.
+/// Suggested name for a column without a unit; the user corrects it.
 std::string example_name(std::string_view base) {
   std::string name = plain_name(base);
   if (name.empty()) return "t1_degC";
@@ -73,7 +73,7 @@ class ForeignReader {
     has_own_names_ = plain && plain->has_own_names;
     ColumnMap without_names;
     if (has_own_names_ && map != nullptr) {
-      without_names = *map;  // the form has used them
+      without_names = *map;  // already used by the form
       without_names.names.clear();
     }
     table_ = read_text_table(std::move(plain ? plain->text : read.text),
@@ -117,7 +117,7 @@ class ForeignReader {
   }
 
  private:
-  /// A separator at the end of every line makes no column.
+  /// A separator at the end of every line does not make a column.
   void leave_empty_columns_out() {
     std::vector<bool> leaves(table_.columns());
     for (std::size_t i = 0; i < table_.columns(); ++i) {
@@ -128,7 +128,7 @@ class ForeignReader {
     table_.leave_out(leaves);
   }
 
-  /// From the header, the row of units, or the cells.
+  /// Reads units from the header, the row of units, or the cells.
   void read_units() {
     units_.clear();
     for (std::size_t i = 0; i < table_.columns(); ++i) {
@@ -141,7 +141,7 @@ class ForeignReader {
     }
   }
 
-  /// Rows of a long table become rows of a time; what is written backwards is turned.
+  /// Pivots a long table; reverses rows in descending order.
   void order_rows(TimeColumns& time, std::vector<double>& time_s) {
     if (const auto form = long_form(table_, time, time_s, map_, problems_)) {
       run_.understood.push_back(pivot(table_, time_s, *form, problems_));
@@ -171,7 +171,7 @@ class ForeignReader {
                       "the file of --columns");
   }
 
-  /// In autumn the clock of the wall is set back by an hour, once, and the rows go on as before.
+  /// In autumn, local time is set back by an hour once, while the rows continue.
   bool goes_on_an_hour_back(std::vector<double>& time_s) {
     constexpr double hour_s = 3600.0;
     constexpr double steps_max = 3.0;
@@ -224,7 +224,7 @@ class ForeignReader {
     return has(header) || (is_unnamed(header) && has(""));
   }
 
-  /// Whether no field of a column is a number: what cannot be a value is left out.
+  /// Whether the column has no number at all: it cannot be a value and is left out.
   [[nodiscard]] bool is_text(std::size_t column) const {
     for (std::size_t row = 0; row < table_.rows(); ++row) {
       const std::string_view field = table_.field(row, column);
@@ -233,7 +233,7 @@ class ForeignReader {
     return true;
   }
 
-  /// Whether a column counts the rows, 0 1 2 or 1 2 3.
+  /// Whether the column numbers the rows, 0 1 2 or 1 2 3.
   [[nodiscard]] bool counts_rows(std::size_t column) const {
     const auto first = finite_number(table_.field(0, column));
     if (!first || (*first != 0.0 && *first != 1.0)) return false;
@@ -243,7 +243,7 @@ class ForeignReader {
     return table_.rows() > 1;
   }
 
-  /// Why a column that nothing is said of is no value; empty: it is one.
+  /// Why an unmapped column is not a value; empty: it is one.
   [[nodiscard]] std::string no_value(std::size_t i) const {
     const std::string& header = table_.header[i];
     if (is_mapped(header)) return {};
@@ -295,7 +295,7 @@ class ForeignReader {
       problems_.add(0, "", "", "has no column of numbers beside the time");
   }
 
-  /// Several columns of one name: Temp_degC, Temp_2_degC.
+  /// Numbers columns of equal names: Temp_degC, Temp_2_degC.
   static void number_name(Meaning& meaning, const std::set<std::string>& seen) {
     const std::string suffix(unit_of(meaning.name).suffix);
     const std::string base = meaning.name.substr(0, meaning.name.size() - suffix.size());
@@ -312,7 +312,7 @@ class ForeignReader {
       rule += run_.name;
       std::string near = nearest_name(header, table_.header);
       for (const std::string& each : table_.header)
-        if (spelled_name(each).base == header) near = each;  // all but the unit
+        if (spelled_name(each).base == header) near = each;  // equal except for the unit
       if (count == 0 && !near.empty()) rule += "; '" + near + "' is";
       problems_.add({map_->file, 0, key, header, rule});
     };
@@ -363,7 +363,7 @@ class ForeignReader {
     return meaning;
   }
 
-  /// A name that reads as itself in a file of our own form.
+  /// A name that keeps its meaning in a file of our own form.
   static bool is_plain(const std::string& name) {
     return is_column_name(name) && spelled_name(name).known == nullptr && name != "time_s";
   }
@@ -434,7 +434,7 @@ class ForeignReader {
     run_.values.push_back(std::move(values));
   }
 
-  /// A cell may be in another unit than its column: 850 mA among A.
+  /// Converts a cell in another unit than its column: 850 mA among A.
   std::optional<double> in_unit_of_column(const Meaning& meaning, double number,
                                           const SpelledUnit& unit) const {
     const SpelledUnit* of_column = spelled_unit(units_[meaning.source]);
@@ -443,7 +443,7 @@ class ForeignReader {
     return (unit.factor * number + unit.offset - of_column->offset) / of_column->factor;
   }
 
-  /// One line for all words that are no numbers.
+  /// One problem for all words that are not numbers.
   void ask_for_words() {
     if (words_.empty()) return;
     constexpr std::size_t words_max = 5;
@@ -485,7 +485,7 @@ class ForeignReader {
   std::vector<std::string> units_;  ///< as written, by column
   bool from_latin1_{false};
   bool has_own_names_{false};
-  std::set<std::string> words_;  ///< that are neither numbers nor known to be missing values
+  std::set<std::string> words_;  ///< neither numbers nor known words for missing values
   std::pair<int, std::string> word_at_;
   NumberForm form_;
   std::vector<Meaning> meanings_;

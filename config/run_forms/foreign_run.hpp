@@ -1,6 +1,6 @@
-/// Run files as people have them: any usual separator, decimal comma, dates, units in the header.
-/// Nothing is guessed: what is ambiguous is a problem that shows the line to write in the file of
-/// `--columns`. docs/run_files.md has the rules.
+/// Run files of other programs: any usual separator, decimal comma, dates, units in the header.
+/// Nothing is guessed: an ambiguity is a problem that shows the line to add to the `--columns`
+/// file. Rules: docs/run_files.md.
 #pragma once
 
 #include <string>
@@ -11,11 +11,10 @@
 
 namespace thermocomp {
 
-/// Whether a file's header row is in the form that programs write: `time_s` between commas, and no
-/// name with a unit in another spelling.
+/// Whether a header row is in our own form: `time_s`, commas, and no unit in another spelling.
 [[nodiscard]] bool is_own_form(std::string_view header);
 
-/// The whole file; `understood` says line by line how it was taken. Nothing is selected yet.
+/// Reads the whole file without a selection; `understood` describes how.
 /// @param map  may be nullptr
 /// @throws ConfigurationError with every problem (the first 100)
 [[nodiscard]] RunFile read_foreign_run(std::string_view text, const std::string& name,

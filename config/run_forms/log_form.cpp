@@ -11,7 +11,7 @@ struct Form {
   bool (*is)(std::string_view text);
   PlainTable (*plain)(const forms::Log& log);
 };
-/// The first that knows the text takes it.
+/// The first form that recognises the text is used.
 constexpr Form known_forms[] = {
     {forms::is_json, forms::plain_json},        {forms::is_halscope, forms::plain_halscope},
     {forms::is_lvm, forms::plain_lvm},          {forms::is_kw_watcher, forms::plain_kw_watcher},

@@ -1,5 +1,5 @@
-/// Logs that are no table of rows under a header, rewritten as one. Each form is a file of forms/
-/// and a line of the table in log_form.cpp; whatever else comes is read as it is.
+/// Rewrites logs that are not tables with a header into such tables. Each form is a file in forms/
+/// and a line of the table in log_form.cpp; other files are read unchanged.
 #pragma once
 
 #include <optional>
@@ -11,24 +11,24 @@
 
 namespace thermocomp {
 
-/// The same values under one header with units in brackets.
+/// The values under one header, with units in brackets.
 struct PlainTable {
   std::string text;
-  std::vector<std::string> notes;  ///< what was understood, a line each
-  int lines_above{0};              ///< of the file, in front of the first line of `text`
-  bool has_own_names{false};       ///< the columns are called as in our own form
+  std::vector<std::string> notes;  ///< how it was read, one line each
+  int lines_above{0};              ///< lines of the file before the first line of `text`
+  bool has_own_names{false};       ///< columns have names of our own form
 };
 
 /// @param text  UTF-8
-/// @param map  what a person says; may be nullptr
-/// @return nullopt when the text is no such log
+/// @param map  may be nullptr
+/// @return nullopt when the text is not such a log
 /// @throws ConfigurationError
 [[nodiscard]] std::optional<PlainTable> plain_table(std::string_view text, const std::string& name,
                                                     const ColumnMap* map);
 
 namespace forms {
 
-/// A file, as its form reads it.
+/// A file, as input of its form.
 struct Log {
   std::string_view text;
   const std::string& name;
@@ -38,9 +38,9 @@ struct Log {
                            std::string rule) const;
 };
 
-/// LinuxCNC's sampler: numbers between blanks, the sample's number in front with -t. Where the
-/// buffer ran over, rows are missing: a gap in numbered rows, else an error. Numbers of other
-/// programs whose time is one of the names.
+/// LinuxCNC's sampler: numbers separated by blanks, with -t preceded by the sample's number. Rows
+/// lost by an overrun are a gap if numbered, else an error. Also numbers of other programs if one
+/// of the names is a time.
 bool is_halsampler(std::string_view text);
 PlainTable plain_halsampler(const Log& log);
 
@@ -56,7 +56,7 @@ PlainTable plain_json(const Log& log);
 bool is_kw_watcher(std::string_view text);
 PlainTable plain_kw_watcher(const Log& log);
 
-/// LabVIEW's LVM: a header of keys, names below it.
+/// LabVIEW's LVM: a header of keys, then names.
 bool is_lvm(std::string_view text);
 PlainTable plain_lvm(const Log& log);
 
@@ -64,17 +64,17 @@ PlainTable plain_lvm(const Log& log);
 bool is_twincat(std::string_view text);
 PlainTable plain_twincat(const Log& log);
 
-/// Lines of a time and "name: value" pairs: serial consoles, decoded CAN frames, logfmt.
+/// Lines with a time and "name: value" pairs: serial consoles, decoded CAN frames, logfmt.
 bool is_labelled(std::string_view text);
 PlainTable plain_labelled(const Log& log);
 
-/// Takes the first line off `text`; it comes without its end.
+/// Takes the first line off `text`; returned without its line end.
 std::string_view take_line(std::string_view& text);
 
-/// Fields between separators, without quotes and blanks.
+/// Splits at separators; removes quotes and blanks.
 std::vector<std::string> fields_of(std::string_view line, char separator = ',');
 
-/// As one field of a line between commas.
+/// Quotes a field of a comma-separated line.
 std::string in_quotes(std::string_view field);
 /// "PTemp [C]", quoted.
 std::string with_unit(std::string_view name, std::string_view unit);

@@ -25,8 +25,8 @@ bool is_one_of(const std::array<std::string_view, N>& names, std::string_view he
 }
 
 struct ColumnContent {
-  bool numbers{false};  ///< most are
-  bool complete{true};  ///< no field is empty
+  bool numbers{false};  ///< most fields are numbers
+  bool complete{true};  ///< no empty field
   std::size_t distinct{0};
 };
 
@@ -93,7 +93,7 @@ std::optional<LongForm> form_of(const TextTable& table, const ColumnMap& map,
   return form;
 }
 
-/// Keeps the fewest columns of words with which no series has a time twice.
+/// Keeps the fewest columns of words by which each series has a time only once.
 void keep_needed_names(const TextTable& table, const std::vector<double>& time_s, LongForm& form) {
   const auto is_clear = [&](const LongForm& tried) {
     std::set<std::pair<std::string, double>> seen;
@@ -126,7 +126,7 @@ std::optional<LongForm> long_form(const TextTable& table, const TimeColumns& tim
     if (is_one_of(unit_names, table.header[i])) {
       form.unit = i;
     } else if (here.numbers || named_value) {
-      // A number for each series, as InfluxDB's "table", is no value.
+      // A number for each series, such as InfluxDB's "table", is not a value.
       if (here.distinct > 1 || named_value) numbers.push_back(i);
     } else if (here.complete && here.distinct > 1 && 2 * here.distinct <= table.rows() &&
                here.distinct <= series_max) {
@@ -138,7 +138,7 @@ std::optional<LongForm> long_form(const TextTable& table, const TimeColumns& tim
     if (found) found->unit = form.unit;
     return found;
   }
-  // One series alone has one name throughout.
+  // A single series has the same name in all rows.
   if (form.names.empty() && values.size() == 1) {
     for (std::size_t i = 0; i < table.columns(); ++i) {
       if (time.has(i) || i == values[0] || i == form.unit) continue;
@@ -147,12 +147,12 @@ std::optional<LongForm> long_form(const TextTable& table, const TimeColumns& tim
     }
     while (form.names.size() > 1) form.names.pop_back();
   }
-  // A row per axis, as in a log of corrections.
+  // One row per axis, as in a log of corrections.
   if (numbers.size() == 1)
     for (std::size_t i = 0; i < table.columns(); ++i) {
       if (time.has(i) || !holds_axes(table, i)) continue;
       std::vector<std::size_t> names{i};
-      for (const std::size_t word : form.names)  // tools: the corrections of each are its own
+      for (const std::size_t word : form.names)  // each tool has its own corrections
         if (word != i) names.push_back(word);
       form.names = std::move(names);
       form.value = numbers[0];
@@ -178,7 +178,7 @@ std::string pivot(TextTable& table, std::vector<double>& time_s, const LongForm&
     row = times.size();
     times.push_back(at);
   }
-  // The name of the value's column says its unit, unless a column of units does.
+  // The unit comes from a column of units, else from the name of the value's column.
   const std::string& value_name = table.header[form.value];
   std::string value_unit = spelled_name(value_name).unit;
   if (value_unit.empty()) value_unit = unit_of(value_name).symbol;

@@ -1,4 +1,4 @@
-/// Tables of one row per value, with the name of the series beside it: Grafana, Home Assistant,
+/// Long tables, with one row per value and the name of its series: Grafana, Home Assistant,
 /// InfluxDB, historians.
 #pragma once
 
@@ -11,7 +11,7 @@
 
 namespace thermocomp {
 
-/// "x", "Z", "c": one letter of a linear or a rotary axis.
+/// "x", "Z", "c": the letter of a linear or rotary axis.
 [[nodiscard]] constexpr bool is_axis_letter(std::string_view name) noexcept {
   constexpr std::string_view letters = "xyzabcXYZABC";
   return name.size() == 1 && letters.find(name.front()) != std::string_view::npos;
@@ -23,17 +23,17 @@ struct LongForm {
   std::optional<std::size_t> unit;
 };
 
-/// What `pivot` of the map says; else a column of numbers called value, or one whose times repeat
-/// or go back, beside columns of words that recur; else a single column of numbers beside one of
-/// nothing but axes.
+/// According to `pivot` of the map; else a column of numbers called value, or one whose times
+/// repeat or decrease, with columns of recurring words; else a single column of numbers with one of
+/// axis letters only.
 /// @param time_s  of each row
 /// @return nullopt when the table is a wide one
 [[nodiscard]] std::optional<LongForm> long_form(const TextTable& table, const TimeColumns& time,
                                                 const std::vector<double>& time_s,
                                                 const ColumnMap* map, ProblemList& problems);
 
-/// A column a series, a row a time; what a series does not have at that time is empty.
-/// @return what was done
+/// Makes one column per series and one row per time; missing values are empty.
+/// @return a note on the change
 std::string pivot(TextTable& table, std::vector<double>& time_s, const LongForm& form,
                   ProblemList& problems);
 

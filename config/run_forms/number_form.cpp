@@ -9,8 +9,8 @@ namespace {
 
 enum class Shows {
   nothing,
-  comma,           ///< the comma is the decimal sign: 20,5
-  point,           ///< the point is
+  comma,           ///< decimal comma: 20,5
+  point,           ///< decimal point
   comma_or_group,  ///< 1,234
   point_or_group,  ///< 1.234
   groups           ///< 1,234.5 or 1.234.567
@@ -75,13 +75,13 @@ NumberForm number_form(const TextTable& table, const ColumnMap* map, ProblemList
     problems.add(where.line, "", where.field, rule);
   };
   const Seen comma = of(Shows::comma);
-  // Between fields a comma is no decimal sign, so a lone point is one.
+  // A separating comma cannot be a decimal sign, so a single point is one.
   const Seen point =
       of(Shows::point) || table.separator != ',' ? of(Shows::point) : of(Shows::point_or_group);
   const Seen unclear_comma = of(Shows::comma_or_group);
   const Seen unclear_point = table.separator == ',' ? Seen{} : of(Shows::point_or_group);
   if (const Seen& groups = of(Shows::groups)) {
-    // The last of two signs is the decimal one: 1.234,5.
+    // The last of two different signs is the decimal one: 1.234,5.
     const char first = groups.field[groups.field.find_first_of(".,")];
     form.thousands = first;
     form.decimal = first == '.' ? ',' : '.';

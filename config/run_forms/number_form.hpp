@@ -1,4 +1,4 @@
-/// Numbers with a decimal point or comma, and which of the two a table uses.
+/// Numbers with a decimal point or comma, and detection of a table's form.
 #pragma once
 
 #include <optional>
@@ -17,13 +17,13 @@ struct NumberForm {
   char thousands{'\0'};  ///< none
 };
 
-/// The form that the fields of the table show. 1,234 alone may be 1.234 or 1234 and decides
-/// nothing; a table that has nothing else is a problem, with the line to write.
+/// Detects the form of the table's numbers. 1,234 alone is ambiguous (1.234 or 1234); if all are,
+/// it is a problem that shows the line to add to the map.
 /// @param map  may be nullptr
 [[nodiscard]] NumberForm number_form(const TextTable& table, const ColumnMap* map,
                                      ProblemList& problems);
 
-/// @return nullopt unless all of `field` is one finite number of that form
+/// @return nullopt unless `field` is one finite number of that form
 [[nodiscard]] std::optional<double> number_of(std::string_view field, const NumberForm& form);
 
 }  // namespace thermocomp

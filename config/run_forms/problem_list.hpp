@@ -16,16 +16,16 @@ class ProblemList {
   explicit ProblemList(std::string file) : file_(std::move(file)) {}
 
   void add(int line, std::string key, std::string_view value, std::string rule) {
-    if (full()) return;  // also within a row of many columns
+    if (full()) return;  // checked here too, for rows of many columns
     problems_.push_back({file_, line, std::move(key), shortened(value), std::move(rule)});
   }
-  /// A problem of another file that belongs to it.
+  /// Adds a problem of another, related file.
   void add(Problem problem) {
     if (!full()) problems_.push_back(std::move(problem));
   }
   [[nodiscard]] bool empty() const noexcept { return problems_.empty(); }
   [[nodiscard]] bool full() const noexcept { return problems_.size() >= problems_max; }
-  /// @throws ConfigurationError unless there is none
+  /// @throws ConfigurationError if there are problems
   void throw_any() {
     if (!problems_.empty()) throw ConfigurationError(std::move(problems_));
   }

@@ -1,4 +1,4 @@
-/// What a run file holds, whatever its form was.
+/// The content of a run file, independent of its form.
 #pragma once
 
 #include <cstddef>
@@ -9,35 +9,35 @@
 
 namespace thermocomp {
 
-/// When time_s was 0, by the clock that wrote the file.
+/// Wall-clock time of time_s = 0, by the clock of the writer.
 struct WallZero {
   double seconds{0.0};  ///< since 1970, in UTC or the writer's zone
   bool is_utc{false};
 };
 
-/// A whole run, column by column. References and the states of lags start at row 0, whatever is
-/// selected; results are for the rows [selected_begin, selected_end).
+/// A whole run by columns. References and states of lags start at row 0, independent of the
+/// selection; results are for the rows [selected_begin, selected_end).
 struct RunFile {
   std::string name;                         ///< the file, for messages
-  std::vector<std::string> columns;         ///< order of the header, time_s among them
+  std::vector<std::string> columns;         ///< in header order, including time_s
   std::vector<std::vector<double>> values;  ///< shape (columns, rows); NaN: missing
   std::size_t selected_begin{0};
   std::size_t selected_end{0};
-  /// How a file of another form was read, line by line; empty: it has our own form.
+  /// How a file of another form was read, line by line; empty for our own form.
   std::vector<std::string> understood;
-  std::optional<WallZero> wall_zero;  ///< where the file has dates, or a comment that says it
+  std::optional<WallZero> wall_zero;  ///< from dates, or from a comment
 
   [[nodiscard]] std::size_t rows() const noexcept { return values.empty() ? 0 : values[0].size(); }
   [[nodiscard]] std::optional<std::size_t> find(std::string_view column) const;
-  /// @throws ConfigurationError naming the file when there is no such column
+  /// @throws ConfigurationError naming the file when the column is missing
   [[nodiscard]] const std::vector<double>& column(std::string_view name) const;
   [[nodiscard]] const std::vector<double>& time_s() const { return column("time_s"); }
 };
 
-/// The comment of a run file that says when its time_s was 0; `export` and `import` write it:
+/// The comment with the wall-clock time of time_s = 0, as written by `export` and `import`:
 /// "# 0.000 s: wall time 2026-03-02T07:00:00.000Z".
 inline constexpr std::string_view wall_zero_mark = "# 0.000 s: wall time ";
-/// @return nullopt when no comment of the text says it
+/// @return nullopt when there is no such comment
 [[nodiscard]] std::optional<WallZero> stated_wall_zero(std::string_view text);
 [[nodiscard]] std::string wall_zero_comment(const WallZero& zero);
 

@@ -42,7 +42,7 @@ void append_letter(std::string& text, std::uint32_t letter) {
   }
 }
 
-/// Letters beyond the first 65536 are in no log: they become '?'.
+/// Code points above 0xFFFF, which logs do not contain, become '?'.
 std::string utf8_of_utf16(std::string_view bytes, bool low_first) {
   std::string text;
   for (std::size_t i = 0; i + 1 < bytes.size(); i += 2) {
@@ -54,7 +54,7 @@ std::string utf8_of_utf16(std::string_view bytes, bool low_first) {
   return text;
 }
 
-/// Lines of an old Macintosh end with a carriage return alone.
+/// Old Macintosh lines end with a carriage return only.
 std::string with_line_ends(std::string text) {
   if (text.find('\n') == std::string::npos) std::replace(text.begin(), text.end(), '\r', '\n');
   return text;
@@ -91,7 +91,7 @@ RunText run_text(std::string_view bytes, const std::string& name) {
   if (bytes.starts_with("\xFF\xFE") || bytes.starts_with("\xFE\xFF"))
     return {utf8_of_utf16(bytes.substr(2), bytes.front() == '\xFF'), false};
   if (bytes.starts_with("\xEF\xBB\xBF")) bytes.remove_prefix(3);
-  // A logger that lost its supply leaves what it had reserved.
+  // A logger that lost power leaves preallocated zeros.
   while (!bytes.empty() && bytes.back() == '\0') bytes.remove_suffix(1);
   if (bytes.substr(0, 4096).find('\0') != std::string_view::npos)
     refuse("is no text and no form that is known here; docs/run_files.md lists them");

@@ -1,4 +1,4 @@
-/// The text in the bytes of a log.
+/// Decoding of a log's bytes.
 #pragma once
 
 #include <string>
@@ -12,10 +12,10 @@ struct RunText {
 };
 
 /// UTF-8, UTF-16 with a byte order mark, else Latin-1.
-/// @throws ConfigurationError when the bytes are no text (a workbook, an archive, a database)
+/// @throws ConfigurationError when the bytes are not text (a workbook, an archive, a database)
 [[nodiscard]] RunText run_text(std::string_view bytes, const std::string& name);
 
-/// Whether bytes are an Excel workbook, or another archive of that kind.
+/// Whether bytes are an Excel workbook or a similar archive.
 [[nodiscard]] bool is_workbook(std::string_view bytes);
 
 }  // namespace thermocomp

@@ -82,11 +82,11 @@ constexpr auto units = std::to_array<SpelledUnit>({
     {"days", "time", 86400, 0, "_s", true},
 });
 
-/// How the degree sign comes, letters that look like it and wrongly converted ones among them, in
-/// UTF-8, Latin-1 and GBK. Longer ones first.
+/// Encodings of the degree sign, including look-alikes and conversion errors, in UTF-8, Latin-1 and
+/// GBK. Longer ones first.
 struct DegreeSign {
   std::string_view bytes;
-  std::string_view letter;  ///< of a sign that is a whole unit
+  std::string_view letter;  ///< if the sign is a whole unit
 };
 constexpr auto degree_signs = std::to_array<DegreeSign>({{"℃", "c"},
                                                          {"℉", "f"},
@@ -100,8 +100,8 @@ constexpr auto degree_signs = std::to_array<DegreeSign>({{"℃", "c"},
                                                          {"\xB0", ""},
                                                          {"\xBA", ""}});
 
-/// The table's spelling of a temperature unit that is written otherwise: "ºC", "Deg. C", "oC",
-/// "Celcius". Empty: it is none.
+/// Normalises other spellings of a temperature unit: "ºC", "Deg. C", "oC", "Celcius". Empty: not a
+/// temperature unit.
 std::string_view plain_temperature(std::string_view unit) {
   constexpr std::size_t bytes_max = 24;
   if (unit.size() > bytes_max) return {};
@@ -137,14 +137,14 @@ std::string_view plain_temperature(std::string_view unit) {
   return left == "k" && has_degree ? "K" : "";
 }
 
-/// "TC(1)", "TC(1,2)": an element of a logger's array, no unit.
+/// "TC(1)", "TC(1,2)": an element of a logger's array, not a unit.
 bool is_index(std::string_view text) {
   return !text.empty() && text.find_first_not_of("0123456789, ") == std::string_view::npos;
 }
 
 bool split_blank(std::string_view header, SpelledName& name);
 
-/// "T1 [°C]": the part in the brackets at the end.
+/// "T1 [°C]": unit in brackets at the end.
 bool split_brackets(std::string_view header, SpelledName& name) {
   for (const auto& [open, close] : {std::pair('[', ']'), {'(', ')'}, {'{', '}'}}) {
     if (!header.ends_with(close)) continue;
@@ -156,7 +156,7 @@ bool split_brackets(std::string_view header, SpelledName& name) {
     name.base = base;
     name.unit = trimmed(header.substr(begin + 1, header.size() - begin - 2));
     name.known = spelled_unit(name.unit);
-    // "Temp, °C (LGR S/N: 1)": the unit stands in front of what else is said.
+    // "Temp, °C (LGR S/N: 1)": the unit precedes other text.
     SpelledName before;
     if (name.known == nullptr && split_blank(base, before)) name = before;
     return true;
@@ -164,7 +164,7 @@ bool split_brackets(std::string_view header, SpelledName& name) {
   return false;
 }
 
-/// "Temp °C", "Temp, °C", "I / A", "t in s": the unit after the last blank.
+/// "Temp °C", "Temp, °C", "I / A", "t in s": unit after the last blank.
 bool split_blank(std::string_view header, SpelledName& name) {
   const auto blank = header.rfind(' ');
   if (blank == std::string_view::npos) return false;
@@ -182,7 +182,7 @@ bool split_blank(std::string_view header, SpelledName& name) {
   return true;
 }
 
-/// "T1°C", "z/µm": letters that are in no name but in a unit.
+/// "T1°C", "z/µm": characters that occur in units only.
 bool split_letters(std::string_view header, SpelledName& name) {
   for (const std::string_view unit : {"°C", "ºC", "℃", "°F", "ºF", "µm", "μm"}) {
     if (!header.ends_with(unit)) continue;
@@ -262,7 +262,7 @@ NumberText number_text_of(std::string_view field) {
   const auto begin = field.find_first_not_of("+-.,");
   if (end == std::string_view::npos || begin == std::string_view::npos || !is_digit(field[begin]))
     return {field};
-  // Digits may belong to the unit, as in "1500 min-1".
+  // The unit may contain digits, as in "1500 min-1".
   const auto blank = field.find(' ');
   const auto cut = std::min(blank, end + 1);
   const SpelledUnit* unit = spelled_unit(trimmed(field.substr(cut)));

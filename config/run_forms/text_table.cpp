@@ -13,11 +13,11 @@ namespace {
 constexpr std::string_view separators = ";\t,|";
 constexpr std::size_t rows_judged = 200;
 constexpr std::size_t header_rows_max = 10;
-constexpr std::size_t columns_max = 1024;  // as of our own form
+constexpr std::size_t columns_max = 1024;  // as in our own form
 constexpr double values_share_min = 0.2;
 
-/// Fields of a line; a quoted one may hold the separator and doubled quotes.
-/// @return false when a quote is not closed, or something stands behind it
+/// Splits a line; a quoted field may contain the separator and doubled quotes.
+/// @return false for an unclosed quote or text after a closing one
 bool split(std::string_view line, char separator, std::vector<std::string_view>& fields) {
   fields.clear();
   if (separator == ' ') {
@@ -55,7 +55,7 @@ bool split(std::string_view line, char separator, std::vector<std::string_view>&
   return true;
 }
 
-/// With doubled quotes as one.
+/// Replaces doubled quotes by single ones.
 std::string unquoted(std::string_view field) {
   std::string text(field);
   for (auto at = text.find("\"\""); at != std::string::npos; at = text.find("\"\"", at + 1))
@@ -67,7 +67,7 @@ bool is_digit(char c) {
   return c >= '0' && c <= '9';
 }
 
-/// In front of a digit: a minus for a typeset one, nothing for a blank that groups digits.
+/// Before a digit: replaces a typeset minus by '-', removes a blank that groups digits.
 std::string with_plain_letters(std::string_view all) {
   constexpr std::string_view minus = "\u2212";
   std::string text;
@@ -108,7 +108,8 @@ class TableReader {
   TextTable read(std::string text) {
     table_.text = std::move(text);
     spell_numbers_plainly();
-    table_.text.reserve(64);  // on the heap, where it stays when the table is moved
+    table_.text.reserve(
+        64);  // heap-allocated, so that moving the table keeps pointers into it valid
     find_lines();
     if (lines_.empty()) {
       problems_.add(0, "", "", "has no header row");
@@ -127,17 +128,16 @@ class TableReader {
   };
   using Fields = std::vector<std::string_view>;
 
-  /// How the lines are cut by one separator.
+  /// The result of splitting all lines by one separator.
   struct Cut {
     char separator{','};
     std::size_t fields{1};
-    std::size_t begin{0};  ///< the first line with so many
+    std::size_t begin{0};  ///< first line with this number of fields
     double score{0.0};
     double values{0.0};  ///< share of fields that are numbers or times
   };
 
-  /// "+    20.0" becomes "    +20.0", as loggers align their numbers; a typeset minus a minus;
-  /// narrow and unbreakable blanks between groups of digits go.
+  /// Normalises "+    20.0" (aligned by loggers) to "    +20.0", typeset minus and digit groups.
   void spell_numbers_plainly() {
     std::string& all = table_.text;
     if (all.find_first_of("\xC2\xE2") != std::string::npos) all = with_plain_letters(all);
@@ -153,19 +153,19 @@ class TableReader {
     }
   }
 
-  /// "---------+-------" and "+-----+", as databases' consoles draw.
+  /// "---------+-------" and "+-----+", as drawn by database consoles.
   static bool is_rule(std::string_view line) {
     return line.starts_with("+--") ||
            (line.starts_with("---") && line.find_first_not_of("-+") == std::string_view::npos);
   }
 
-  /// What a program writes below the last row.
+  /// Lines that programs write after the last row.
   static bool is_end(std::string_view line) {
     return line == "EOF" ||
            (line.starts_with('(') && (line.ends_with(" rows)") || line.ends_with(" row)")));
   }
 
-  /// A name in quotes may go over several lines, as in a spreadsheet's header.
+  /// A quoted name may span several lines, as in a spreadsheet's header.
   std::string_view with_quoted_ends(std::string_view line, std::string_view& rest, int& number) {
     constexpr int lines_max = 8;
     const auto is_open = [](std::string_view text) {
@@ -200,7 +200,7 @@ class TableReader {
       if (is_comment && lines_.empty()) last_comment_ = {number, line};
       if (is_comment || line.find_first_not_of(" \t;,|") == std::string_view::npos) continue;
       if (is_rule(line)) continue;
-      // Excel's first line is taken at its word.
+      // Excel's first line defines the separator.
       if (lines_.empty() && line.size() == 5 && line.starts_with("sep=")) {
         given_separator_ = line[4];
         continue;
@@ -271,13 +271,13 @@ class TableReader {
     return fields;
   }
 
-  /// A row that ends before its last columns has nothing in them.
+  /// Missing last columns of a row are empty.
   void fill_up(Fields& fields) const {
     if (narrowest_ > 0 && fields.size() >= narrowest_ && fields.size() < cut_.fields)
       fields.resize(cut_.fields);
   }
 
-  /// Most rows leave out the last columns of the header: a serial number in the first row, say.
+  /// Allows most rows to omit the header's last columns, such as a serial number in the first row.
   void widen_to_header() {
     constexpr std::size_t left_out_max = 3;
     const std::size_t usual = cut_.fields;
@@ -301,7 +301,7 @@ class TableReader {
     });
   }
 
-  /// What the columns show in the lower half of the lines judged.
+  /// The kind of each column in the lower half of the judged lines.
   std::vector<Shows> kinds() {
     std::vector<std::array<std::size_t, 4>> counts(cut_.fields);
     for (std::size_t i = (cut_.begin + judged()) / 2; i < judged(); ++i) {
@@ -318,8 +318,8 @@ class TableReader {
     return kinds;
   }
 
-  /// The first line that is a row: its column of time, or else its first of numbers and half of
-  /// these, hold what they hold below.
+  /// The first line of values: its time column, or else its first numeric column and half of the
+  /// others, have the same kind as below.
   std::size_t first_row() {
     const std::vector<Shows> kind = kinds();
     const auto time = std::find(kind.begin(), kind.end(), Shows::time);
@@ -343,7 +343,7 @@ class TableReader {
     return std::min(cut_.begin + 1, lines_.size());
   }
 
-  /// Above columns that are no quantity: time stamp, number of the record.
+  /// Names of columns that are not a quantity: time stamp, record number.
   static bool is_word_of_logger(std::string_view field) {
     return field == "TS" || field == "RN" || field == "NO." || field == "Time";
   }
@@ -353,7 +353,7 @@ class TableReader {
       table_.units.emplace_back(is_word_of_logger(field) ? "" : without_brackets(field));
   }
 
-  /// A row of units has more of them than of anything else.
+  /// A row of units has more units than other fields.
   static bool is_row_of_units(const Fields& fields) {
     std::size_t known = 0;
     std::size_t other = 0;
@@ -370,7 +370,7 @@ class TableReader {
     return has ? trimmed(field.substr(1, field.size() - 2)) : field;
   }
 
-  /// Of the lines above the first row the one with the most names; the lowest of several.
+  /// Of the lines above the first row the one with the most names; in a tie the lowest.
   bool find_header() {
     const bool named = map_ != nullptr && map_->header_line > 0;
     row_begin_ = named ? std::max<std::size_t>(first_row(), 1) : first_row();
@@ -415,7 +415,7 @@ class TableReader {
     return names_are_clear();
   }
 
-  /// Names of columns that the rows do not have at their end, or names for all but the first.
+  /// Names for additional columns at the end, or for all columns but the first.
   bool fits_another_count(std::size_t line) {
     const std::size_t count = fields_of(line).size();
     return count >= 2 && count + 1 >= cut_.fields && is_all_words(line);
@@ -451,7 +451,7 @@ class TableReader {
                              more_lines(between - 1));
   }
 
-  /// "# time t1 z": names in the last comment above rows without a header.
+  /// "# time t1 z": names in the last comment before rows without a header.
   bool take_commented_names() {
     std::string_view text = last_comment_.text;
     if (row_begin_ > 0 || text.empty()) return false;
@@ -535,7 +535,7 @@ class TableReader {
   Line last_comment_{0, {}};
   std::optional<char> given_separator_;
   Cut cut_;
-  std::size_t narrowest_{0};  ///< fields that a row needs; 0: all
+  std::size_t narrowest_{0};  ///< required fields of a row; 0: all
   std::size_t row_begin_{0};
   std::string_view header_text_;
 };

@@ -24,14 +24,14 @@ constexpr auto date_names =
     std::to_array<std::string_view>({"date", "datum", "datetime", "date time", "date/time",
                                      "datum/uhrzeit", "time", "zeit", "timestamp", "zeitstempel"});
 
-/// Numbers whose size shows from when they count; the ranges are of the years 2001 to 2050 or so.
+/// Numbers whose size shows their epoch; the ranges are the years 2001 to about 2050.
 struct Epoch {
   const char* name;
   double low;
   double high;
   double per_second;
   double zero_s;    ///< since 1970
-  bool only_named;  ///< small numbers may be anything: the column must be called date or time
+  bool only_named;  ///< small, hence ambiguous: the column must be called date or time
   bool is_utc;
 };
 constexpr std::array<Epoch, 8> epochs{{
@@ -58,7 +58,7 @@ bool is_one_of(const std::array<std::string_view, N>& names, std::string_view he
   return std::find(names.begin(), names.end(), base) != names.end();
 }
 
-/// The unit of a time that its column's name ends with, "time_ms"; empty: none.
+/// The unit at the end of a time column's name, "time_ms"; empty: none.
 std::string unit_of_name(std::string_view header) {
   const auto bar = header.rfind('_');
   if (bar == std::string_view::npos || bar == 0 || !is_one_of(time_names, header.substr(0, bar)))
@@ -69,7 +69,7 @@ std::string unit_of_name(std::string_view header) {
 
 enum class Holds { other, date, clock, both };
 
-/// What the first rows of a column hold, where all of them hold the same.
+/// The kind of content of a column's first rows, if the same in all of them.
 Holds content(const TextTable& table, std::size_t column) {
   Holds holds = Holds::other;
   for (std::size_t row = 0; row < std::min(table.rows(), rows_judged); ++row) {
@@ -84,7 +84,7 @@ Holds content(const TextTable& table, std::size_t column) {
   return holds;
 }
 
-/// The numbers of a column's first rows; empty when one is none.
+/// The numbers of a column's first rows; empty if one is not a number.
 std::vector<double> first_numbers(const TextTable& table, std::size_t column,
                                   const NumberForm& form) {
   std::vector<double> numbers;
@@ -107,7 +107,7 @@ const Epoch* epoch_of(const std::vector<double>& numbers, std::string_view heade
   return nullptr;
 }
 
-/// "Date Time, GMT+01:00": the zone of all its times.
+/// "Date Time, GMT+01:00": time zone of the column.
 std::optional<double> zone_of_header(std::string_view header) {
   for (const std::string_view name : {"GMT", "UTC"}) {
     const auto at = header.find(name);
@@ -125,7 +125,7 @@ bool within(const std::vector<double>& numbers, double low, double high) {
   });
 }
 
-/// Year, day of the year and hhmm side by side, as arrays of Campbell's loggers have them.
+/// Columns of year, day of the year and hhmm, as in arrays of Campbell loggers.
 std::optional<TimeColumns> day_of_year(const TextTable& table, const NumberForm& form) {
   for (std::size_t i = 0; i + 2 < std::min<std::size_t>(table.columns(), 6); ++i) {
     const std::vector<double> clock = first_numbers(table, i + 2, form);
@@ -221,7 +221,7 @@ class TimeReader {
     const Epoch* epoch = epoch_of(run_.time_s, header);
     if (epoch == nullptr && is_time) epoch = epoch_of(run_.time_s, "date");
     if (epoch != nullptr && is_time && std::abs(known->factor * epoch->per_second - 1) > 1e-9)
-      epoch = nullptr;  // the unit says another scale
+      epoch = nullptr;  // the unit implies another scale
     if (epoch != nullptr) {
       count_from_first(header, *epoch);
     } else if (is_time) {
@@ -236,7 +236,7 @@ class TimeReader {
     }
   }
 
-  /// Fractions are rounded where they were written: to a microsecond here.
+  /// Rounds to a microsecond, since fractions were rounded when written.
   void count_from_first(const std::string& header, const Epoch& epoch) {
     const double first = run_.time_s.front();
     for (double& value : run_.time_s)
@@ -248,7 +248,7 @@ class TimeReader {
                 (epoch.is_utc ? date_text(zero_s) + " UTC)" : number_text(first) + ")");
   }
 
-  // ---- dates and times of the clock
+  // ---- dates and clock times
   void read_stamps() {
     std::vector<TimeStamp> stamps;
     const auto zone = zone_of_header(table_.header[time_.columns[0]]);
@@ -281,7 +281,7 @@ class TimeReader {
       run_.wall_zero = WallZero{first, stamps.front().zone_s.has_value()};
   }
 
-  /// NaN where the calendar has no such day.
+  /// NaN for a day that does not exist.
   [[nodiscard]] std::vector<double> seconds_by(const std::vector<TimeStamp>& stamps,
                                                DateOrder order) const {
     const bool minutes_first = asked_unit() == "mm:ss";
@@ -315,9 +315,9 @@ class TimeReader {
            a.zone_s.has_value() == b.zone_s.has_value() && a.clock_parts == b.clock_parts;
   }
 
-  /// The order that all rows allow. Of several the one by which they lie within a far shorter
-  /// time; where all rows are of one day, any does for the seconds, and none for the date.
-  /// @return nullopt: the date is not known
+  /// The order of day, month and year that all rows allow. Of several, the one with a far shorter
+  /// duration of the run; if all rows are of one day, any for the seconds, but none for the date.
+  /// @return nullopt: the date is unknown
   std::optional<DateOrder> date_order(const std::vector<TimeStamp>& stamps) {
     if (!stamps.front().has_date) return DateOrder::unknown;
     std::vector<DateOrder> possible;
@@ -392,7 +392,7 @@ class TimeReader {
     }
   }
 
-  /// By the first row; the others say no more.
+  /// Reports the first row only.
   bool refuse_form() {
     refuse(0, "must be a number or a time of a form that is read; docs/run_files.md lists them");
     return false;
@@ -414,16 +414,16 @@ class TimeReader {
   RunTime run_;
 };
 
-/// What may be the time, by kinds.
+/// Possible time columns, by kind.
 struct Candidates {
-  std::vector<std::size_t> dates;   ///< with or without the clock time
-  std::vector<std::size_t> clocks;  ///< alone
+  std::vector<std::size_t> dates;   ///< with or without clock time
+  std::vector<std::size_t> clocks;  ///< clock time only
   std::vector<std::size_t> epochs;
-  std::vector<std::size_t> counting;  ///< numbers with a unit of time, or called so
+  std::vector<std::size_t> counting;  ///< numbers with a unit of time, or called time
 };
 
-/// Dates that never change, as the start of a query, are no time; of several the first that the
-/// others do not differ from.
+/// Drops constant dates, such as the start of a query, unless all are; of the rest keeps the one
+/// called time, if there is exactly one.
 void keep_moving_dates(const TextTable& table, std::vector<std::size_t>& dates) {
   if (dates.size() < 2) return;
   const auto is_constant = [&](std::size_t column) {

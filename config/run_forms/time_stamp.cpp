@@ -20,7 +20,7 @@ bool is_digit(char c) {
   return c >= '0' && c <= '9';
 }
 
-/// Takes one to `digits_max` digits off the front.
+/// Takes one to `digits_max` leading digits.
 std::optional<int> take_digits(std::string_view& text, std::size_t digits_max) {
   std::size_t count = 0;
   int value = 0;
@@ -57,7 +57,7 @@ bool take_day_name(std::string_view& text) {
   return true;
 }
 
-/// A number of a date and how many digits it has; a month's name has none.
+/// A number in a date and its count of digits; 0 for a month's name.
 struct DatePart {
   int value{0};
   std::size_t digits{0};
@@ -70,7 +70,7 @@ std::optional<DatePart> take_date_part(std::string_view& text) {
   return std::nullopt;
 }
 
-/// Which orders of day, month and year three parts allow.
+/// Determines the orders of day, month and year that three parts allow.
 void find_orders(const std::array<DatePart, 3>& parts, char separator, TimeStamp& stamp) {
   const auto allow = [&](DateOrder order, std::size_t day, std::size_t month, std::size_t year) {
     const bool is_year = parts[year].digits == 4 || parts[year].digits == 2;
@@ -161,7 +161,7 @@ std::optional<double> take_zone(std::string_view& text) {
   return (west ? -60.0 : 60.0) * (60 * *hours + minutes);
 }
 
-/// "PM", "am": 12 hours are added or the hour 12 is 0.
+/// "PM", "am".
 bool take_half_of_day(std::string_view& text, TimeStamp& stamp) {
   text = trimmed(text);
   if (text.size() != 2 || (text[1] != 'M' && text[1] != 'm')) return text.empty();
@@ -217,7 +217,7 @@ bool take_clock(std::string_view& text, TimeStamp& stamp) {
   return rest.empty();
 }
 
-/// ctime: "Wed Jun 11 11:50:00 2026" with the year at its end.
+/// ctime: "Wed Jun 11 11:50:00 2026", with the year at its end.
 std::string year_in_front(std::string_view text) {
   take_day_name(text);
   if (text.size() < 18 || text[text.size() - 5] != ' ') return {};
@@ -236,7 +236,7 @@ std::string year_in_front(std::string_view text) {
 std::optional<TimeStamp> parse_time_stamp(std::string_view text) {
   text = trimmed(text);
   TimeStamp stamp;
-  // No letter of a plain field is the first of a date.
+  // Quick rejection: most fields of text are not dates.
   if (text.size() < 4 || text.size() > 64) return std::nullopt;
   const std::string_view whole = text;
   std::string turned;

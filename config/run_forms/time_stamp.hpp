@@ -1,4 +1,4 @@
-/// Times as people write them: 2026-03-01T08:30:00+01:00, 01.03.2026 08:30, 3/1/26 8:30:00 PM,
+/// Parser of time stamps: 2026-03-01T08:30:00+01:00, 01.03.2026 08:30, 3/1/26 8:30:00 PM,
 /// 01-Mar-2026, Mar 1, 2026, 2026/03/01-08:30:15, 20260301T083015Z, 08:30:15,250.
 #pragma once
 
@@ -10,11 +10,11 @@
 
 namespace thermocomp {
 
-/// The parts of one time, before it is known which number is the day, the month and the year.
+/// The parts of a time stamp, before the order of day, month and year is known.
 struct TimeStamp {
   bool has_date{false};
-  std::array<int, 3> date{};  ///< as they stand; a month's name is its number
-  /// The orders that the spelling allows; of two-digit years and slashes there may be three.
+  std::array<int, 3> date{};  ///< in written order; a month's name is its number
+  /// The orders that the spelling allows; up to three for two-digit years and slashes.
   std::array<bool, 4> allows{};  ///< by DateOrder
   [[nodiscard]] bool allows_order(DateOrder order) const noexcept {
     return allows[static_cast<std::size_t>(order)];
@@ -22,23 +22,23 @@ struct TimeStamp {
 
   bool has_clock{false};
   int clock_parts{0};   ///< 2: hh:mm or mm:ss; 3: hh:mm:ss
-  double clock_a{0.0};  ///< the number in front of the first colon
+  double clock_a{0.0};  ///< the number before the first colon
   double clock_b{0.0};
   double clock_c{0.0};
   std::optional<double> zone_s;  ///< east of Greenwich
 };
 
-/// @return nullopt when `text` is neither a date nor a clock time. A day that no calendar has is
-///         found by seconds_of(), not here.
+/// @return nullopt when `text` is neither a date nor a clock time. Nonexistent days are found by
+///         seconds_of(), not here.
 [[nodiscard]] std::optional<TimeStamp> parse_time_stamp(std::string_view text);
 
 /// "GMT+01:00", "+0200", "Z", "UTC": seconds east of Greenwich; nullopt: none.
 [[nodiscard]] std::optional<double> parse_zone(std::string_view text);
 
-/// Seconds since 1970 in the stamp's own zone or, where it has one, in UTC; without a date since
-/// midnight. A clock of two parts is hours and minutes unless `minutes_first`.
-/// @param order  unknown: the first that the stamp allows
-/// @return nullopt when the calendar has no such day, or the stamp does not allow the order
+/// Seconds since 1970 in the stamp's own zone or, if it has one, in UTC; without a date since
+/// midnight. A clock time of two parts is hours and minutes unless `minutes_first`.
+/// @param order  unknown: the first one allowed
+/// @return nullopt when the day does not exist, or the stamp does not allow the order
 [[nodiscard]] std::optional<double> seconds_of(const TimeStamp& stamp, DateOrder order,
                                                bool minutes_first);
 

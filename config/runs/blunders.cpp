@@ -18,16 +18,16 @@ constexpr std::size_t side = 4;
 constexpr std::size_t rows_min = 2 * side + 1;
 constexpr double usual_deviations = 12.0;
 constexpr double share_of_way = 0.25;
-/// At an end nothing tells a blunder from a first step of the machine but its size.
+/// At an end, only its size distinguishes an outlier from a first step of the machine.
 constexpr double share_of_way_at_end = 0.5;
-constexpr double share_max = 0.1;  ///< of the values; more are no blunders but the course itself
+constexpr double share_max = 0.1;  ///< of the values; more are the column's own course
 constexpr std::size_t stuck_rows_min = 10;
-constexpr std::size_t stuck_longer_min = 3;  ///< than the second longest stretch of one value
+constexpr std::size_t stuck_longer_min = 3;  ///< times the second longest stretch of one value
 constexpr std::size_t times_named_max = 6;
 
 using Values = std::vector<double>;
 
-/// The straight line through those beside an end, at the end; slopes are a median of pairs.
+/// Robust line (median of pairwise slopes) through the values beside an end, evaluated at the end.
 double line_at_end(const Values& values, bool front) {
   const std::size_t count = 2 * side;
   const auto at = [&](std::size_t i) { return front ? values[i] : values[values.size() - 1 - i]; };
@@ -40,7 +40,7 @@ double line_at_end(const Values& values, bool front) {
   return median(levels);
 }
 
-/// Of each value how far it stands off what its neighbours have there.
+/// Deviation of each value from its neighbours.
 Values leaps_of(const Values& values) {
   Values leaps(values.size());
   for (std::size_t i = 0; i < values.size(); ++i) {
@@ -50,7 +50,7 @@ Values leaps_of(const Values& values) {
   return leaps;
 }
 
-/// The way from the least to the most of the running medians, without their outermost hundredths.
+/// Range of the running median, without 2 % at either end.
 double way_of(const Values& values, const Values& leaps) {
   Values expected;
   for (std::size_t i = 0; i < values.size(); ++i) expected.push_back(values[i] - leaps[i]);
@@ -70,7 +70,7 @@ Blunders blunders_of(const RunFile& run, const std::string& column) {
     values.push_back(all[row]);
     times_s.push_back(run.time_s()[row]);
   }
-  // Once more without those found: one beside an end bends the line there.
+  // Repeated without the outliers found: one beside an end bends the line there.
   while (values.size() >= rows_min) {
     const Values leaps = leaps_of(values);
     const double usual_um = usual_deviations * robust_deviation(leaps);
@@ -97,7 +97,7 @@ Blunders blunders_of(const RunFile& run, const std::string& column) {
   return found;
 }
 
-/// The longest stretch of one value, when it ends with a leap that the column does not make else.
+/// The longest stretch of one value, if it ends with a jump larger than any usual change.
 Blunders stuck_of(const RunFile& run, const std::string& column) {
   Blunders found;
   found.column = column;
@@ -175,7 +175,7 @@ bool same_file(const std::string& a, const std::string& b) {
 }
 
 [[noreturn]] void refuse(const RunFile& run, const RunFile& other, const char* rule) {
-  // The other one is named only where it is the same file by another path.
+  // The other one is named only if it is the same file by another path.
   throw ConfigurationError(
       {Problem{run.name, 0, "", other.name == run.name ? "" : other.name, rule}});
 }

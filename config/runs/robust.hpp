@@ -1,4 +1,4 @@
-/// Medians and deviations that a few wild values do not move.
+/// Robust statistics.
 #pragma once
 
 #include <cstddef>
@@ -8,24 +8,24 @@
 
 namespace thermocomp {
 
-/// Median of the finite values, the upper of two; NaN without any.
+/// Median of the finite values, of an even number the upper one; NaN if there are none.
 [[nodiscard]] double median(std::vector<double> values);
 
-/// 1.4826 times the median distance from the median: the standard deviation of what is normal. 0
-/// without a finite value.
+/// 1.4826 times the median absolute deviation: standard deviation without outliers. 0 if there is
+/// no finite value.
 [[nodiscard]] double robust_deviation(std::span<const double> values);
 
-/// Median of the values within `side` rows, as many on both sides, so that a slope is no leap.
+/// Median of the values within `side` rows, symmetric, so that a slope does not bias it.
 [[nodiscard]] double median_around(const std::vector<double>& values, std::size_t row,
                                    std::size_t side);
 
-/// Rows [begin, end) of one and the same value.
+/// Rows [begin, end) of one value.
 struct StillRows {
   std::size_t begin{0};
   std::size_t end{0};
   [[nodiscard]] std::size_t rows() const noexcept { return end - begin; }
 };
-/// The longest such stretch, and how many rows the second longest has (1 at least).
+/// The longest such stretch, and the number of rows of the second longest (at least 1).
 [[nodiscard]] std::pair<StillRows, std::size_t> longest_still(const std::vector<double>& values);
 
 }  // namespace thermocomp

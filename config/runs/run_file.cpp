@@ -23,14 +23,12 @@ namespace thermocomp {
 namespace {
 
 constexpr std::size_t problems_max = 100;
-/// The greatest model has 512 inputs and 64 outputs; what searches among columns takes time with
-/// their square.
+/// The largest model has 512 inputs and 64 outputs; searches among columns take quadratic time.
 constexpr std::size_t columns_max = 1024;
 
-/// A number of digits and at most one point within them, so few that the digits and the power of
-/// ten are exact in a double: their quotient is then what std::from_chars gives, in a third of the
-/// time.
-/// @return how many characters of `text` it takes; 0 when it is another kind of number, or none
+/// Parses a decimal number with so few digits that digits and power of ten are exact in a double:
+/// their quotient equals the result of std::from_chars, in a third of the time.
+/// @return number of characters; 0 if it is another kind of number, or not a number
 std::size_t plain_number(std::string_view text, double& value) {
   constexpr std::array<double, 16> power_of_ten{1e0, 1e1, 1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
                                                 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15};
@@ -67,7 +65,7 @@ class RunParser {
     while (next_line(line)) {
       if (run_.columns.empty()) {
         read_header(line);
-        if (!problems_.empty()) break;  // no row can be judged
+        if (!problems_.empty()) break;  // rows cannot be checked
       } else if (!blank_to_the_end(line)) {
         if (take_plain_row(line))
           check_time();
@@ -84,14 +82,14 @@ class RunParser {
 
  private:
   void add(int line, std::string key, std::string_view value, std::string rule) {
-    if (problems_.size() >= problems_max) return;  // also within a row of many columns
+    if (problems_.size() >= problems_max) return;  // checked here too, for rows of many columns
     constexpr std::size_t shown_max = 40;
     std::string shown(value.substr(0, shown_max));
     if (value.size() > shown_max) shown += " ...";
     problems_.push_back({run_.name, line, std::move(key), std::move(shown), std::move(rule)});
   }
 
-  /// The next line that is no comment.
+  /// The next line that is not a comment.
   bool next_line(std::string_view& line) {
     while (!rest_.empty()) {
       ++line_number_;
@@ -102,7 +100,7 @@ class RunParser {
     return false;
   }
 
-  /// Empty lines are allowed where nothing but empty lines follows.
+  /// Empty lines are allowed at the end of the file only.
   [[nodiscard]] bool blank_to_the_end(std::string_view line) const {
     return trimmed(line).empty() && rest_.find_first_not_of(" \t\r\n") == std::string_view::npos &&
            run_.columns.size() > 1;
@@ -142,8 +140,8 @@ class RunParser {
     row_.resize(run_.columns.size());
   }
 
-  /// Nearly every row is one of plain numbers.
-  /// @return false when it is not, and nothing was taken
+  /// Fast path for a row of plain decimal numbers.
+  /// @return false if it is not, with the state unchanged
   bool take_plain_row(std::string_view line) {
     for (double& value : row_) {
       const std::size_t length = plain_number(line, value);
@@ -202,7 +200,7 @@ class RunParser {
   std::vector<double> row_;
   std::optional<std::size_t> time_;
   std::optional<double> last_time_s_;
-  bool bad_time_{false};  ///< the row's time has its problem already
+  bool bad_time_{false};  ///< reported already
   std::vector<Problem> problems_;
 };
 
@@ -259,7 +257,7 @@ std::optional<std::size_t> RunFile::find(std::string_view column_name) const {
 
 namespace {
 
-/// Offsets and what a controller applied are none.
+/// Whether there is a displacement other than offsets and applied offsets.
 bool has_displacement(const std::vector<std::string>& columns) {
   return std::any_of(columns.begin(), columns.end(), [](const std::string& column) {
     return is_output(column) && !column.ends_with("_offset_um") && !column.ends_with("_applied_um");
@@ -287,7 +285,7 @@ const std::vector<double>& RunFile::column(std::string_view column_name) const {
 
 namespace {
 
-/// The first line that is neither comment nor empty.
+/// The first line that is not a comment or empty.
 std::string_view header_of(std::string_view text) {
   std::string_view line;
   while (take(text, '\n', line)) {
@@ -309,7 +307,7 @@ bool names_a_column(const ColumnMap& map, std::string_view header) {
   return false;
 }
 
-/// The sheet of a workbook as CSV, by the program that Debian has for it.
+/// Converts the sheet of a workbook to CSV, with Debian's program for that.
 std::string sheet_of(const std::filesystem::path& path) {
   const auto refuse = [&](const std::string& rule) {
     throw ConfigurationError({{path.string(), 0, "", "(Excel workbook)", rule}});

@@ -1,6 +1,6 @@
 /// Run files: measured or simulated data, CSV with one header row; the unit is in the column's name
-/// (config/text/units.hpp). An empty field or `nan` is a missing value. One file is one run. That
-/// is the form that programs write; what people have (run_forms/foreign_run.hpp) is read too.
+/// (config/text/units.hpp). An empty field or `nan` is a missing value. One file is one run. Our
+/// programs write this form; other forms (run_forms/foreign_run.hpp) can be read too.
 #pragma once
 
 #include <filesystem>
@@ -22,19 +22,20 @@ struct RunSelection {
   double to_s{std::numeric_limits<double>::infinity()};
 };
 
-/// `FILE`, `FILE@T0:T1`, `FILE@T0:`, `FILE@:T1`. An `@` that no `:` follows belongs to the name.
-/// @throws ConfigurationError when a bound is not a number or T0 < T1 does not hold
+/// `FILE`, `FILE@T0:T1`, `FILE@T0:`, `FILE@:T1`. An `@` without a later `:` is part of the name.
+/// @throws ConfigurationError when a bound is not a number or T0 >= T1
 [[nodiscard]] RunSelection parse_selection(std::string_view argument);
 
-/// The file, with `@T0:T1` where not all of its rows are selected; parse_selection() reads it back.
+/// The file name, with `@T0:T1` for a selection; parse_selection() parses it.
 [[nodiscard]] std::string selected_name(const RunFile& run);
 
-/// At least one row; time_s present and strictly increasing. A selection without rows is refused.
-/// @param map  what a person said about files of other forms; nullptr: nothing. A file of our own
-///             form of which it names no column is read without it.
+/// Requires at least one row, a strictly increasing time_s, and a selection that is not empty.
+/// @param map  describes files of other forms; may be nullptr. Ignored for a file of our own form
+/// of
+///             which it names no column.
 /// @throws ConfigurationError with every problem (the first 100), each with line, column and rule
 [[nodiscard]] RunFile load_run(const RunSelection& selection, const ColumnMap* map = nullptr);
-/// @param name stands for the file in problems; `selection.file` is not looked at
+/// @param name  file name in problems; `selection.file` is not used
 [[nodiscard]] RunFile parse_run(std::string_view text, const std::string& name,
                                 const RunSelection& selection = {}, const ColumnMap* map = nullptr);
 

@@ -20,7 +20,7 @@ const Names<ByteOrder>& byte_orders() {
   return names;
 }
 
-/// Raw values that a sentinel may have. A float is compared as a number.
+/// Range of valid raw values of a sentinel. A float is compared as a number.
 std::pair<std::int64_t, std::int64_t> codes_of(const CanSignal& signal) {
   if (signal.is_float) return {-(1LL << 53), 1LL << 53};
   if (signal.length_bits >= 64) return {signal.is_signed ? INT64_MIN : 0, INT64_MAX};
@@ -33,18 +33,18 @@ std::pair<std::int64_t, std::int64_t> codes_of(const CanSignal& signal) {
 }
 
 bool stands(const TomlTable& own, const TomlTable& base, std::string_view key) {
-  const bool in_base = base.has(key);  // marks it
+  const bool in_base = base.has(key);  // marks the key as known
   return own.has(key) || in_base;
 }
 
-/// A whole number that may stand in `own` or in `base`. Both are checked.
+/// An integer in `own` or else `base`. Both are checked.
 int whole(const TomlTable& own, const TomlTable& base, std::string_view key, int low, int high,
           int otherwise, bool is_required) {
   if (is_required && !stands(own, base, key)) own.problem(key, "must be given");
   return own.integer(key, low, high, base.integer(key, low, high, otherwise));
 }
 
-/// The first bit of the same bytes in the other order; none where they are not whole bytes.
+/// The first bit of the same bytes in the other byte order; none for partial bytes.
 std::optional<int> turned(const CanSignal& signal) {
   const bool was_little = signal.byte_order == ByteOrder::little_endian;
   if (signal.length_bits % 8 != 0 || signal.start_bit % 8 != (was_little ? 0 : 7)) return {};
@@ -70,7 +70,7 @@ void read_identifier(const TomlTable& own, const TomlTable& base, bool is_requir
   const TomlTable& source = own.has("id") ? own : base;
   const std::int64_t id_max = signal.extended_id ? extended_id_max : standard_id_max;
   signal.id = static_cast<std::uint32_t>(source.integer<std::int64_t>("id", 0, id_max, 0));
-  signal.id_mask = CanSignal{}.id_mask;  // this sender, not the whole group
+  signal.id_mask = CanSignal{}.id_mask;  // this sender only, not the whole group
 }
 
 void read_place(const TomlTable& own, const TomlTable& base, bool is_required, CanSignal& signal) {
@@ -101,7 +101,7 @@ void read_form(const TomlTable& own, const TomlTable& base, CanSignal& signal) {
   }
 }
 
-/// The number that `table` gives the place of; none where it does not fit into the frame.
+/// The number described by `table`; none if it does not fit into the frame.
 std::optional<CanField> read_field(const TomlTable& table, bool fd) {
   CanSignal number;
   number.fd = fd;
@@ -186,7 +186,7 @@ CanSignal read_can_signal(const TomlTable& own, const TomlTable& base, CanUse us
   signal.scale = read_scale(own, read_scale(base, signal.scale));
   if (use == CanUse::signal) signal.offset = own.number("offset", Range::any(), 0.0);
   if (use == CanUse::temperature) {
-    const Range range = Range::between(-1e5, 1e5);  // of unsigned numbers with many bits
+    const Range range = Range::between(-1e5, 1e5);  // for unsigned numbers with many bits
     signal.offset =
         own.number("offset_degC", range, base.number("offset_degC", range, signal.offset));
     signal.sentinels = read_can_codes(own, base, signal);
@@ -205,7 +205,7 @@ FrameBits frame_bits(const CanSignal& signal) {
     if (signal.byte_order == ByteOrder::little_endian) {
       ++bit;
     } else {
-      bit = bit % 8 == 0 ? bit + 15 : bit - 1;  // from bit 0 on to bit 7 of the next byte
+      bit = bit % 8 == 0 ? bit + 15 : bit - 1;  // after bit 0 continues with bit 7 of the next byte
     }
   }
   return bits;

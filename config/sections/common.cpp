@@ -15,7 +15,7 @@ std::vector<Sentinel> read_codes(const TomlTable& own, const TomlTable& base, st
       {"under_range_codes", Fault::out_of_range},
       {"error_codes", Fault::device_error},
   }};
-  // Manuals give the bits of a signed number too: 0x8000 for -32768.
+  // Manuals also give the bit pattern of a signed number: 0x8000 for -32768.
   const bool is_signed = low == -high - 1 && high <= 0x7FFFFFFF;
   const std::int64_t greatest = is_signed ? 2 * high + 1 : high;
   std::vector<Sentinel> sentinels;

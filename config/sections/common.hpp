@@ -1,4 +1,4 @@
-/// What the sections of the daemon's file have in common.
+/// Common parts of the sections of the daemon's file.
 #pragma once
 
 #include <initializer_list>
@@ -14,7 +14,7 @@
 
 namespace thermocomp::sections {
 
-/// Refuses each of `keys` that stands in the table.
+/// Refuses each of `keys` that is present.
 inline void refuse_all(const TomlTable& table, std::initializer_list<std::string_view> keys,
                        std::string_view rule) {
   for (const std::string_view key : keys) table.refuse(key, rule);
@@ -35,20 +35,19 @@ inline std::string unique_name(const TomlTable& table, std::set<std::string>& se
   return 1.0;
 }
 
-/// The codes within `[low, high]`, of a signed number also as its bits, that are messages, not
-/// values, by the lists open_circuit_codes, short_circuit_codes, over_range_codes,
+/// The codes within `[low, high]` (of a signed number also as bit pattern) that are messages
+/// instead of values, from the lists open_circuit_codes, short_circuit_codes, over_range_codes,
 /// under_range_codes and error_codes; a list in `own` replaces that of `base`.
 [[nodiscard]] std::vector<Sentinel> read_codes(const TomlTable& own, const TomlTable& base,
                                                std::int64_t low, std::int64_t high);
 
-/// The codes of a status: those lists, and good_codes (Fault::none), without which 0 is good. A
-/// code that `mask` hides is a problem.
+/// The codes of a status: the same lists, and good_codes (Fault::none; default 0). A code with bits
+/// outside `mask` is a problem.
 [[nodiscard]] std::vector<Sentinel> read_status_codes(const TomlTable& table, std::int64_t high,
                                                       std::int64_t mask);
 
-/// Reads Config::numbers(), absent ones as in `fallback`, and then calls Config::validate(): every
-/// number it refuses becomes a problem at its key and goes back to `fallback`, until the rest is
-/// valid.
+/// Reads Config::numbers(), missing ones from `fallback`, and calls Config::validate(): every
+/// refused number becomes a problem at its key and is reset to `fallback`, until the rest is valid.
 /// @pre fallback.validate() passes
 template <class Config>
 void read_numbers(const TomlTable& table, const Config& fallback, Config& config) {
@@ -72,7 +71,7 @@ void read_numbers(const TomlTable& table, const Config& fallback, Config& config
         config.*number.member = fallback.*number.member;
         reset = true;
       }
-      if (!reset) break;  // broken beside a fallback: nothing more can be told apart
+      if (!reset) break;  // only a fallback is left: the cause cannot be isolated
     }
   }
   for (const auto& number : numbers) config.*number.member = fallback.*number.member;

@@ -29,7 +29,7 @@ enum class Kind {
   unknown
 };
 
-/// Of a controller that cannot interpolate along the travel.
+/// For a controller that cannot interpolate along the travel.
 void refuse_travel(const TomlTable& axis) {
   refuse_all(axis, {"line", "table"},
              "needs a controller that takes a set of values as a whole (kind = \"modbus_tcp\", "
@@ -146,10 +146,10 @@ class ControllerReader {
     }
     read_signals([](const TomlTable&, std::size_t) {});
     config.signals = result_.signals;
-    result_.config = std::move(config);  // the bridge sets the pace: no period
+    result_.config = std::move(config);  // the bridge sets the pace
   }
 
-  /// Calls read_value(table, index) for every signal whose name can be used.
+  /// Calls read_value(table, index) for every signal with a valid name.
   template <class ReadValue>
   void read_signals(ReadValue read_value) {
     std::set<std::string> names;
@@ -168,7 +168,7 @@ class ControllerReader {
     }
   }
 
-  /// Either every axis shows what is applied, or none does.
+  /// Either every axis is read back, or none.
   void check_read_back() {
     const auto shows = [](const TomlTable& axis) {
       return axis.has("applied") || travel_table(axis).has("applied");
@@ -183,7 +183,7 @@ class ControllerReader {
     }
   }
 
-  /// @param volts  the offsets go to piezos, by the voltage of their amplifiers
+  /// @param volts  offsets are sent as voltages of piezo amplifiers
   void read_modbus(std::string_view kind, bool volts,
                    const std::map<std::string, ModbusRtu>& serial_lines) {
     ModbusControllerConfig config;
@@ -207,7 +207,7 @@ class ControllerReader {
     read_places(std::move(config), volts);
   }
 
-  /// One data block: the bytes between its values are there, and may be read along.
+  /// A data block can be read with the gaps between its values.
   void read_s7() {
     ModbusControllerConfig config;
     config.name = name_;
@@ -246,7 +246,7 @@ class ControllerReader {
     return function;
   }
 
-  /// A value of several registers would stand there half old and half new.
+  /// A value of several registers would be written in parts.
   void check_single(const ModbusControllerConfig& config) const {
     constexpr std::string_view rule = "must be of one register: write_function = 6 writes no more";
     for (std::size_t i = 0; i < config.axes.size(); ++i) {
@@ -282,7 +282,7 @@ class ControllerReader {
     return place;
   }
 
-  /// Of an axis with a travel.
+  /// For an axis with a travel.
   static void refuse_plain_places(const TomlTable& axis) {
     refuse_all(axis, {"offset", "applied", "piezo"},
                "makes no sense beside `line` or `table`, which has places of its own");
@@ -433,8 +433,8 @@ class ControllerReader {
 
   TomlTable table_;
   const std::vector<TomlTable>& axis_tables_;
-  std::vector<AxisConfig> axes_;  ///< one a table; of a travel its first node
-  std::size_t offsets_;           ///< nodes of travels counted
+  std::vector<AxisConfig> axes_;  ///< one per table; of a travel its first node
+  std::size_t offsets_;           ///< including nodes of travels
   std::string name_;
   ModbusValue (*read_value_)(const TomlTable&, RegisterUse){read_modbus_value};
   ControllerReading result_;

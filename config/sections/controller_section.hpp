@@ -1,4 +1,4 @@
-/// [controller], [[controller.signal]] and where each [[axis]] takes its offset.
+/// [controller], [[controller.signal]] and the place of each [[axis]]' offset.
 #pragma once
 
 #include <map>
@@ -16,11 +16,11 @@ struct ControllerReading {
   std::vector<std::string> signals;  ///< names, in order
   bool reads_back{true};
   double period_s{0.0};  ///< of the exchange; 0: no exchange
-  bool dry_run{false};   ///< nothing is to be written
+  bool dry_run{false};   ///< nothing is written
 };
 
-/// @param axis_tables  the [[axis]] tables, in the order of `axes`; of one with a travel all nodes
-/// @param serial_lines  those of the buses
+/// @param axis_tables  the [[axis]] tables, in the order of `axes`; for a travel of all its nodes
+/// @param serial_lines  serial lines of the buses
 [[nodiscard]] ControllerReading read_controller(
     const TomlTable& table, const std::vector<TomlTable>& axis_tables,
     const std::vector<AxisConfig>& axes, const std::map<std::string, ModbusRtu>& serial_lines);

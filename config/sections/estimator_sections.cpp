@@ -60,7 +60,7 @@ void read_references(const std::vector<TomlTable>& tables, std::vector<SensorCon
   }
 }
 
-/// A chain of references that comes back to where it began has no temperature at its end.
+/// Refuses a cycle of reference sensors.
 void refuse_cycles(const std::vector<TomlTable>& tables, std::vector<SensorConfig>& sensors) {
   std::vector<bool> in_cycle(sensors.size(), false);
   for (std::size_t i = 0; i < sensors.size(); ++i) {
@@ -155,7 +155,7 @@ std::set<std::string> names_of(const std::vector<TomlTable>& tables) {
   return names;
 }
 
-/// An axis whose controller interpolates along its travel becomes its nodes: "x_1", "x_2", ...
+/// Nodes of an axis whose controller interpolates along its travel: "x_1", "x_2", ...
 /// @param names  of the [[axis]] tables
 std::vector<AxisConfig> nodes_of(const TomlTable& table, const AxisConfig& axis,
                                  const std::set<std::string>& names) {
@@ -181,7 +181,7 @@ std::vector<AxisConfig> nodes_of(const TomlTable& table, const AxisConfig& axis,
       table.problem("name", "the nodes of its travel are called " + axis.name + "_1, " + axis.name +
                                 "_2, ...: another axis must not be called " + each.name);
   }
-  // After a problem there is one axis all the same, so that the rest can be looked at.
+  // One axis is kept after a problem, so that the rest can be checked.
   if (nodes.empty()) nodes.push_back(axis);
   return nodes;
 }
@@ -201,8 +201,7 @@ std::vector<AxisConfig> read_axes(const std::vector<TomlTable>& tables) {
     const int sign = table.integer("sign", -1, 1, 1);
     if (sign == 0) table.problem("sign", "must be 1 or -1");
     axis.sign = sign;
-    for (const auto& number :
-         LimiterConfig::numbers()) {  // how far and how fast an axis may move has no default
+    for (const auto& number : LimiterConfig::numbers()) {  // bound and slew limit have no default
       if (!table.has(number.key)) table.problem(number.key, "must be given");
     }
     read_numbers(table, LimiterConfig{}, axis.limiter);

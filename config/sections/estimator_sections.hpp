@@ -17,17 +17,17 @@ namespace thermocomp::sections {
 [[nodiscard]] std::vector<BlockConfig> read_blocks(const std::vector<TomlTable>& tables,
                                                    const std::vector<SensorConfig>& sensors);
 
-/// Without the keys that say where the offset goes (`offset`, `applied`).
+/// Without `offset` and `applied`, the keys for its place.
 [[nodiscard]] std::vector<AxisConfig> read_axes(const std::vector<TomlTable>& tables);
 
-/// @param signals  what the controller reports
+/// @param signals  signals of the controller
 [[nodiscard]] CompensationConfig read_compensation(const TomlTable& table,
                                                    const std::vector<std::string>& signals);
 
-/// [correction]: how measured displacements correct the model while it runs.
+/// [correction]: correction of the model by measured displacements.
 [[nodiscard]] CorrectionConfig read_correction(const TomlTable& table);
 
-/// Checks that every input of a group is one of the model, and in no other group.
+/// Checks that every input of a group is one of the model, and in one group only.
 void check_correction(const TomlTable& table, const CorrectionConfig& config,
                       const ThermalModel& model);
 

@@ -54,7 +54,7 @@ struct Codes {
   std::int64_t high;
 };
 
-/// Raw values of an encoding; of a float the whole numbers that it holds exactly.
+/// Range of raw values of an encoding; for a float the integers that it represents exactly.
 Codes codes_of(Encoding encoding) {
   switch (encoding) {
     case Encoding::int16:
@@ -73,7 +73,7 @@ Codes codes_of(Encoding encoding) {
   return {-(1LL << 53), 1LL << 53};
 }
 
-/// A name, an IPv4 or an IPv6 address that could be one.
+/// Whether it may be a host name, an IPv4 or an IPv6 address.
 bool is_host(const std::string& host) {
   constexpr std::size_t name_max = 253;
   if (host.empty() || host.size() > name_max) return false;
@@ -113,7 +113,7 @@ ModbusTcp read_tcp(const TomlTable& table, std::string_view kind) {
 }
 
 ModbusRtu read_rtu(const TomlTable& table) {
-  // The rates that Linux' termios has names for.
+  // The baud rates of Linux' termios.
   constexpr std::array bauds{300,    600,    1200,    1800,    2400,    4800,   9600,
                              19200,  38400,  57600,   115200,  230400,  460800, 500000,
                              576000, 921600, 1000000, 1152000, 1500000, 2000000};
@@ -137,7 +137,7 @@ ModbusRtu read_rtu(const TomlTable& table) {
   return rtu;
 }
 
-/// A value that began below the last register and would pass it.
+/// Refuses a value that extends beyond the last register.
 void check_address(const TomlTable& table, int address, Encoding encoding) {
   const auto count = static_cast<int>(registers_of(encoding));
   if (address + count - 1 <= address_max) return;
@@ -146,14 +146,14 @@ void check_address(const TomlTable& table, int address, Encoding encoding) {
 }
 
 struct NumberedTable {
-  int first;  ///< the number of its first register in a manual; with six digits ten times as much
+  int first;  ///< a manual's number for the first register; with six digits ten times as large
   ModbusTable table;
 };
 constexpr std::array numbered_tables{NumberedTable{10001, ModbusTable::discrete_input},
                                      NumberedTable{30001, ModbusTable::input},
                                      NumberedTable{40001, ModbusTable::holding}};
 
-/// "400021" is no address on the wire, but the manual's number of holding register 20.
+/// "400021" is not an address on the wire, but the manual's number for holding register 20.
 std::optional<std::pair<ModbusTable, int>> numbered_address(int address) {
   for (const NumberedTable& each : numbered_tables) {
     const int first = 10 * (each.first - 1) + 1;
@@ -163,7 +163,7 @@ std::optional<std::pair<ModbusTable, int>> numbered_address(int address) {
   return std::nullopt;
 }
 
-/// What a register's number in a manual means, for a rule.
+/// Explanation of a manual's register number, for a rule.
 std::string number_rule(int address) {
   const auto found = numbered_address(address);
   const std::string table = !found                                 ? ""
@@ -175,7 +175,7 @@ std::string number_rule(int address) {
                : "must be a whole number in [0, 65535]";
 }
 
-/// @param table  of the register; a manual's number (400021) must be one of it
+/// @param table  of the register; must agree with a manual's number (400021)
 std::uint16_t read_address(const TomlTable& table, ModbusTable of) {
   const int address =
       table.integer("address", std::numeric_limits<int>::min(), std::numeric_limits<int>::max());
@@ -187,7 +187,7 @@ std::uint16_t read_address(const TomlTable& table, ModbusTable of) {
   return 0;
 }
 
-/// @param base_address  where the device's registers begin; bits do not move with them
+/// @param base_address  first register of the device; does not apply to bits
 ModbusStatus read_status(const TomlTable& table, int base_address) {
   ModbusStatus status;
   status.table = table.choice("table", all_tables());
@@ -292,7 +292,7 @@ ModbusValue read_s7_value(const TomlTable& table, RegisterUse use) {
 
 ModbusChannel read_modbus_channel(const TomlTable& sensor, const TomlTable& device) {
   ModbusChannel channel;
-  // Every key is read in both places, so that a default nobody uses is checked as well.
+  // Keys are read in both tables, so that an unused default is checked as well.
   const auto required = [&](std::string_view key) {
     const bool in_device = device.has(key);
     if (!sensor.has(key) && !in_device) {

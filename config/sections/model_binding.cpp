@@ -27,7 +27,7 @@ void check_blocks(const BindingTables& tables, const EstimatorConfig& config,
   std::vector<std::string> bound;
   for (std::size_t i = 0; i < config.blocks.size(); ++i) {
     const std::string& input = config.blocks[i].input;
-    if (!is_temperature(input)) continue;  // a problem already
+    if (!is_temperature(input)) continue;  // reported already
     if (!contains(columns, input)) {
       tables.blocks[i].problem(
           "input", "must be a temperature of the model: " + joined(columns) + like_hint);
@@ -43,7 +43,7 @@ void check_blocks(const BindingTables& tables, const EstimatorConfig& config,
   }
 }
 
-/// Asked for and impossible: nobody would notice that no sensor is ever weighed down.
+/// Refuses weigh_down where it can never take effect.
 void check_weighing_down(const BindingTables& tables, const EstimatorConfig& config,
                          const ThermalModel& model) {
   if (config.compensation.suspected_sensors != SuspectedPolicy::weigh_down) return;
@@ -54,8 +54,8 @@ void check_weighing_down(const BindingTables& tables, const EstimatorConfig& con
                           .append(" inputs (`thermocomp covariance` makes it from records)"));
 }
 
-/// What a controller is to interpolate by must be what the displacement depends on, and that must
-/// be a curve: with play in a joint it is one on the way there and another on the way back.
+/// A controller must interpolate by a position on which the displacement depends uniquely: with
+/// backlash it differs between the two directions.
 void check_travel(const TomlTable& table, const AxisConfig& axis, const ThermalModel& model) {
   const TomlTable travel = table.table(axis.node->form == TravelForm::line ? "line" : "table");
   std::vector<std::string> positions;
@@ -84,7 +84,7 @@ void check_signals(const TomlTable& root, const EstimatorConfig& config, const T
                    const std::string& model_file) {
   const bool has_controller = root.table("controller").text("kind") != "dry_run";
   for (const std::string& signal : model.signal_columns()) {
-    if (!is_operating(signal)) continue;  // a problem of the model file already
+    if (!is_operating(signal)) continue;  // reported by the model file
     if (contains(config.signals, signal)) continue;
     std::string rule = model_file;
     rule += " needs this signal";

@@ -1,4 +1,4 @@
-/// Whether the daemon's file and the model fit together.
+/// Checks the daemon's file and the model against each other.
 #pragma once
 
 #include <string>
@@ -17,9 +17,8 @@ struct BindingTables {
 };
 
 /// Checks that every temperature column of the model has exactly one block, every signal it names
-/// is read from the controller, every axis' output exists, and the model has the covariance that
-/// the configuration needs.
-/// @param model_file  named where the model is what does not fit
+/// is read from the controller, every axis' output exists, and a required covariance is present.
+/// @param model_file  file name in problems of the model
 void check_binding(const BindingTables& tables, const EstimatorConfig& config,
                    const ThermalModel& model, const std::string& model_file);
 

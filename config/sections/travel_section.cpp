@@ -15,11 +15,11 @@ namespace thermocomp::sections {
 namespace {
 
 constexpr double mm_per_m = 1000.0;
-/// As much as a read-back may differ from what was sent because values are rounded to counts.
+/// Largest rounding difference between sent offset and read-back [um].
 constexpr double rounding_um_max = 0.1;
 
-/// Controllers count offsets in um at the coarsest. Beyond that one count may be what the slew
-/// allows in a second, and a quarter of the bound.
+/// Largest count of an offset [um]: 1 um, the coarsest usual one, or the slew per second if that is
+/// more, but at most a quarter of the bound.
 double count_um_max(const LimiterConfig& limiter) {
   constexpr double coarsest_um = 1.0;
   constexpr double share_of_bound = 0.25;
@@ -57,7 +57,7 @@ void TravelSection::read_line() {
   nodes_mm = table_.numbers("travel_mm");
   shape_.p0_mm = table_.number("p0_mm", Range::any());
   is_travel_ = nodes_mm.size() == 2 && nodes_mm[1] > nodes_mm[0];
-  // A problem of read_axes() already.
+  // Reported by read_axes() already.
   if (!is_travel_) nodes_mm = {0.0, 1.0};
   if (is_travel_ && table_.has("p0_mm") &&
       !(*shape_.p0_mm >= nodes_mm[0] && *shape_.p0_mm <= nodes_mm[1]))
@@ -112,7 +112,7 @@ Carried carried(const CanSignal& signal) {
   return {reach(signal), count_of(signal)};
 }
 
-/// Sets that follow one another, in so many bits.
+/// Whether set numbers of this length are supported.
 bool can_count(int bits) {
   return bits >= CanSet::number_bits_min && bits <= CanSet::number_bits_max;
 }
@@ -243,7 +243,7 @@ void CanTravelSection::check_numbers(const std::vector<Place>& values,
     if (!value.table || numbered.contains(id_of(value.signal))) continue;
     value.table.problem("id",
                         "the frame carries no number of the set: name its place in set_numbers");
-    numbered.insert(id_of(value.signal));  // once a frame
+    numbered.insert(id_of(value.signal));  // once per frame
   }
 }
 
@@ -258,7 +258,7 @@ struct TravelReader {
   WrittenRegisters& written;
   ModbusTravel travel{section.shape(), {}, {}, {}, {}};
 
-  /// begin, values and end are one block; `next` is where it goes on.
+  /// Places begin, values and end in one block; `next` is the following address.
   ModbusValue read_in_block(const TomlTable& own, std::string_view key, RegisterUse use,
                             std::optional<int>& next) {
     const TomlTable place = own.table(key);
@@ -302,7 +302,7 @@ struct TravelReader {
     if (values.size() > 2) section.check_p0(own, "p0_register_mm", carried(values[2]));
   }
 
-  /// One after the other from where the first one stands.
+  /// Consecutive values, beginning with `first`.
   static std::vector<ModbusValue> row_from(const ModbusValue& first, std::size_t count) {
     std::vector<ModbusValue> row(count, first);
     for (std::size_t i = 0; i < count; ++i)

@@ -1,4 +1,4 @@
-/// A travel in the daemon's file: what is the same on every bus, and its values on CAN and Modbus.
+/// Travels in the daemon's file: the part common to all buses, and the values on CAN and Modbus.
 #pragma once
 
 #include <map>
@@ -13,24 +13,24 @@
 
 namespace thermocomp::sections {
 
-/// What a value's place can carry.
+/// Range and resolution of a value's place.
 struct Carried {
   Range reach;
-  double count{0.0};  ///< what one count is, in the value's unit; of a float the least step
+  double count{0.0};  ///< value of one count; for a float its smallest step
 };
 
-/// The value of an offset must be able to carry the bound, or the offset would be cut off, and one
-/// count of it must be small enough beside bound and slew, or the axis would leap or stand still.
+/// Checks that the place of an offset can represent the bound, and that one count is small against
+/// bound and slew limit: otherwise the axis would jump or stand still.
 void check_offset_place(const TomlTable& table, std::string_view key, const Carried& place,
                         const LimiterConfig& limiter);
 
-/// [axis.line] or [axis.table] of an axis; not there: it has neither.
+/// [axis.line] or [axis.table] of an axis; false if it has neither.
 [[nodiscard]] TomlTable travel_table(const TomlTable& axis);
 
-/// Reads the travel itself, and tells what its values must be able to hold.
+/// Reads the travel itself, and gives the required ranges of its values.
 class TravelSection {
  public:
-  /// @param axis  has a travel_table(); what the estimator needs of it is read with the axis
+  /// @param axis  has a travel_table(); the estimator's part is read with the axis
   TravelSection(const TomlTable& axis, const LimiterConfig& limiter);
 
   [[nodiscard]] const TomlTable& table() const noexcept { return table_; }
@@ -48,23 +48,22 @@ class TravelSection {
   TomlTable table_;
   LimiterConfig limiter_;
   TravelShape shape_;
-  bool is_travel_{true};  ///< the ends of the travel could be read
+  bool is_travel_{true};  ///< the ends of the travel are valid
 };
 
-/// Reads the set of an axis: first what is sent, and, when all frames that are sent are known, what
-/// is applied.
+/// Reads the frames of an axis: sent ones and, when those of all axes are known, applied ones.
 class CanTravelSection {
  public:
   /// @param axis  has a travel_table()
   CanTravelSection(const TomlTable& axis, const LimiterConfig& limiter, TakenBits& sent);
 
   void read_applied(const TakenBits& sent);
-  /// The numbers must not come round while a frame of the controller still counts.
+  /// Set numbers must not repeat while a frame of the controller is still valid.
   void check_round(double period_s, double silent_after_s) const;
   [[nodiscard]] const CanTravel& travel() const noexcept { return travel_; }
 
  private:
-  /// A signal of the set and the table that describes it.
+  /// A signal and the table that describes it.
   struct Place {
     TomlTable table;
     CanSignal signal;
@@ -79,7 +78,7 @@ class CanTravelSection {
   CanTravel travel_;
 };
 
-/// Registers that are written, and by what: no register may be written for two purposes.
+/// Written registers and their keys: no register may be written for two purposes.
 class WrittenRegisters {
  public:
   void add(const TomlTable& table, std::string_view key, const ModbusValue& value);

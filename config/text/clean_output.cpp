@@ -18,16 +18,16 @@
 namespace thermocomp {
 namespace {
 
-/// Stands in the place of ESC; nullptr: nothing is cleaned. Its first byte is not part of UTF-8.
-/// Never freed, as nothing here is: the streams are flushed after everything else has ended.
+/// Replaces ESC in marks; nullptr: no cleaning. Its first byte is invalid in UTF-8. Never freed,
+/// since the streams are flushed after everything else has ended.
 const std::string* code_mark = nullptr;
 
 struct Stream {
   int fd;
-  std::string pending;  ///< the beginning of a character or mark whose end is not written yet
+  std::string pending;  ///< incomplete character or mark at the end of the last write
 };
 
-/// How many bytes at the end of `text` are the beginning of a mark or of a longer character.
+/// Number of bytes at the end of `text` that begin a mark or a multibyte character.
 std::size_t cut_off_bytes(std::string_view text) {
   const std::size_t mark = text.rfind('\xFF');
   if (mark != std::string_view::npos && text.size() - mark < code_mark->size() &&
@@ -69,7 +69,7 @@ bool write_all(int fd, std::string_view bytes) {
   return true;
 }
 
-/// @return `size`, or 0: could not be written (errno says why)
+/// @return `size`, or 0 on a write error (see errno)
 ssize_t write_cleaned(void* cookie, const char* bytes, std::size_t size) {
   Stream& stream = *static_cast<Stream*>(cookie);
   std::string text = std::move(stream.pending);

@@ -1,4 +1,4 @@
-/// The one place where this project's text meets a terminal.
+/// Cleaning of terminal output.
 #pragma once
 
 #include <string>
@@ -6,15 +6,13 @@
 
 namespace thermocomp {
 
-/// From here on everything that this process writes to standard output and standard error (by
-/// printf, std::cout, std::cerr, a library or CLI11) goes through printable_text(): names from a
-/// file, texts of another process and file names command no terminal. Lines and tabulators stay.
-/// First in main(), once; for the rest of the process' life.
+/// From now on, all output to stdout and stderr (by printf, std::cout, std::cerr, a library or
+/// CLI11) goes through printable_text(): names from files and texts of other processes cannot send
+/// control codes to the terminal. Line ends and tabulators stay. Call once, first in main().
 void clean_standard_output();
 
-/// A command for the terminal that this project gives itself: "[32m" for ESC [32m. Between
-/// clean_standard_output() and the terminal it is marked by a random number, so that no text can
-/// pass for one.
+/// A terminal code of our own: "[32m" for ESC [32m. Until it reaches the terminal it is marked by a
+/// random number, so that other text cannot imitate one.
 [[nodiscard]] std::string terminal_code(std::string_view code);
 
 }  // namespace thermocomp

@@ -13,7 +13,7 @@ struct Extent {
   std::size_t values{0};
 };
 
-/// Of brackets and commas outside strings, whether or not they match.
+/// Counts brackets and commas outside strings, matching or not.
 Extent extent_of(std::string_view text) noexcept {
   Extent extent;
   int depth = 0;

@@ -1,4 +1,4 @@
-/// JSON from outside (a socket, a file, a browser): bounded before anything is built from it.
+/// JSON from outside (a socket, a file, a browser), with limits checked before parsing.
 #pragma once
 
 #include <cstddef>
@@ -9,23 +9,23 @@
 
 namespace thermocomp {
 
-/// Why a text is not taken; the message is a sentence without a subject: "must be ...".
+/// Why a text is refused; the message is a predicate: "must be ...".
 class JsonError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
 struct JsonLimits {
-  /// Nesting of arrays and objects; the deepest message of this project has 6. Copying, printing
-  /// and comparing what is nested 100,000 deep would need a stack as deep.
+  /// Nesting of arrays and objects; our deepest message has 6. Copying, printing and comparing
+  /// recurse, so that a depth of 100,000 would overflow the stack.
   int depth_max{16};
-  /// Values and commas: each takes some tens of bytes of memory, however short its text.
+  /// Values and commas: each takes some tens of bytes of memory.
   std::size_t values_max{1'000'000};
   std::size_t bytes_max{std::size_t{16} << 20};
 };
 
-/// Every text in JSON that another process, a person or a file wrote is read by this.
-/// @throws JsonError  beyond a limit, or no JSON in UTF-8
+/// Parses JSON written by another process, a person or a file.
+/// @throws JsonError  beyond a limit, or not JSON in UTF-8
 [[nodiscard]] nlohmann::json parse_outer_json(std::string_view text, const JsonLimits& limits = {});
 
 }  // namespace thermocomp

@@ -12,8 +12,8 @@
 namespace thermocomp {
 namespace {
 
-/// The character at the front and how many bytes it takes. Source: RFC 3629, section 4.
-/// @return nullopt: not UTF-8 (too long a form, a surrogate, beyond U+10FFFF, cut off)
+/// The first character and its number of bytes. Source: RFC 3629, section 4.
+/// @return nullopt: invalid UTF-8 (overlong form, surrogate, beyond U+10FFFF, truncated)
 std::optional<char32_t> first_character(std::string_view text, std::size_t& bytes) {
   const auto byte = [&](std::size_t i) { return static_cast<std::uint8_t>(text[i]); };
   const std::uint8_t lead = byte(0);
@@ -92,7 +92,7 @@ std::string printable_text(std::string_view text) {
 }
 
 void append_number(std::string& text, double value) {
-  if (std::isnan(value)) {  // to_chars would show the sign of a NaN
+  if (std::isnan(value)) {  // to_chars would print the sign of a NaN
     text += "nan";
     return;
   }

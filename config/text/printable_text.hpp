@@ -1,4 +1,4 @@
-/// What somebody else wrote as text that can be shown, and numbers as text that reads back.
+/// Foreign text made printable, and numbers as text that parses to the same value.
 #pragma once
 
 #include <string>
@@ -6,18 +6,18 @@
 
 namespace thermocomp {
 
-/// No control character (C0, DEL, C1), none of Unicode's marks, embeddings, overrides and isolates
-/// of direction, no line or paragraph separator, no invisible character without width that joins
-/// nothing, no byte that is not UTF-8.
+/// Without control characters (C0, DEL, C1), Unicode's directional marks, embeddings, overrides and
+/// isolates, line and paragraph separators, zero-width characters except joiners, and invalid
+/// UTF-8.
 [[nodiscard]] bool is_printable(std::string_view text);
 inline constexpr std::string_view printable_rule =
     "must be printable: no control characters, none that turn the direction of writing";
 
-/// The same text with what is not printable named: `<U+202E>`; a byte that is not UTF-8 as `?`, a
-/// C0 control character or DEL as a blank.
+/// Replaces unprintable characters by their name: `<U+202E>`; a byte that is not UTF-8 by `?`, a C0
+/// control character or DEL by a blank.
 [[nodiscard]] std::string printable_text(std::string_view text);
 
-/// Appends the shortest decimal text of `value`; NaN becomes "nan".
+/// Appends the shortest decimal text that parses to `value`; NaN becomes "nan".
 void append_number(std::string& text, double value);
 [[nodiscard]] std::string number_text(double value);
 

@@ -10,11 +10,11 @@
 namespace thermocomp {
 namespace {
 
-/// More than that nobody reads, and an answer over the socket must stay one line of a sane length.
+/// Enough to read, and an answer over the socket must stay one line of reasonable length.
 constexpr std::size_t shown_max = 100;
 constexpr std::size_t part_bytes_max = 1000;
 
-/// A key or a rule (which may list names) of a file whose names are as long as it is.
+/// Shortens a key or rule; the names in a file may be arbitrarily long.
 std::string cut(const std::string& part) {
   if (part.size() <= part_bytes_max) return part;
   std::size_t end = part_bytes_max;
@@ -34,7 +34,7 @@ std::vector<Problem> in_order(std::vector<Problem> problems) {
   };
   std::stable_sort(problems.begin(), problems.end(),
                    [&](const Problem& a, const Problem& b) { return rank(a) < rank(b); });
-  // A set, as a file can have many thousands.
+  // A set, since a file can have many thousands of problems.
   std::set<std::tuple<std::string, int, std::string, std::string, std::string>> seen;
   std::vector<Problem> once;
   for (Problem& problem : problems) {
@@ -73,7 +73,7 @@ std::string to_string(const Problem& problem) {
     text += cut(problem.value) + ": ";
   }
   text += cut(problem.rule);
-  // A quoted name may hold anything; a problem stays on its line and commands no terminal.
+  // A quoted name may contain anything; a problem stays on its line and without control codes.
   return printable_text(text);
 }
 

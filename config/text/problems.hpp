@@ -1,4 +1,4 @@
-/// What is wrong with a file somebody wrote: every problem at once, each with its place and rule.
+/// Problems of a configuration file: all at once, each with its place and rule.
 #pragma once
 
 #include <stdexcept>
@@ -12,11 +12,11 @@ struct Problem {
   std::string file;   ///< as named by the caller
   int line{0};        ///< counted from 1; 0: the file as a whole
   std::string key;    ///< e.g. "sensor[bed_front].address"; in a run file the column
-  std::string value;  ///< as written, shortened; "(missing)" where there is none
-  std::string rule;   ///< what would have been right
+  std::string value;  ///< as written, shortened; "(missing)" if absent
+  std::string rule;   ///< the rule that it breaks
 };
 
-/// `file:line: key = value: rule`; what does not apply is left out.
+/// `file:line: key = value: rule`; inapplicable parts are omitted.
 [[nodiscard]] std::string to_string(const Problem& problem);
 
 /// All problems of one load. what() has one line per problem.

@@ -28,7 +28,7 @@ FileDescriptor open_regular_file(const std::filesystem::path& path, int flags) {
   FileDescriptor file(open(path.c_str(), flags | O_NONBLOCK | O_CLOEXEC | O_NOCTTY, mode));
   const int error = errno;
   struct stat found {};
-  // A pipe without a reader and a socket cannot even be opened like this.
+  // open() fails for a pipe without a reader and for a socket; stat() identifies them.
   const bool is_known =
       file.get() >= 0 ? fstat(file.get(), &found) == 0 : stat(path.c_str(), &found) == 0;
   if (is_known && !S_ISREG(found.st_mode)) refuse(regular_rule);
@@ -53,7 +53,7 @@ std::string read_regular_file(const std::filesystem::path& path, std::uintmax_t 
     if (count < 0 && errno == EINTR) continue;
     if (count < 0) refuse(std::string("cannot be read: ") + std::strerror(errno));
     if (count == 0) return text;
-    // It may grow while it is read.
+    // The file may grow while it is read.
     if (text.size() + static_cast<std::size_t>(count) > bytes_max) refuse_size();
     text.append(part, 0, static_cast<std::size_t>(count));
   }

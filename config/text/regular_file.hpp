@@ -1,4 +1,4 @@
-/// Opening files that somebody else may have replaced.
+/// Opens files that may have been replaced by something else.
 #pragma once
 
 #include <cstdint>
@@ -7,7 +7,7 @@
 
 namespace thermocomp {
 
-/// Closes itself; -1 is none.
+/// Owns a file descriptor; -1: none.
 class FileDescriptor {
  public:
   explicit FileDescriptor(int fd = -1) noexcept : fd_(fd) {}
@@ -21,18 +21,18 @@ class FileDescriptor {
   int fd_;
 };
 
-/// Opens a regular file and nothing else: opening a pipe waits for its other end, reading a device
-/// may never end.
+/// Opens regular files only: opening a pipe blocks until its other end is opened, and reading a
+/// device may never end.
 /// @param flags  of open(2); O_NONBLOCK and O_CLOEXEC are added
 /// @throws std::runtime_error "no such file", "must be a regular file", "cannot be opened: ..."
 [[nodiscard]] FileDescriptor open_regular_file(const std::filesystem::path& path, int flags);
 
-/// All of it. @throws as above, and where it has more than `bytes_max`
+/// The whole content. @throws as above, and if it exceeds `bytes_max`
 [[nodiscard]] std::string read_regular_file(const std::filesystem::path& path,
                                             std::uintmax_t bytes_max);
 
 /// For a library that opens the file itself.
-/// @throws std::runtime_error "must be a regular file" where something else stands there
+/// @throws std::runtime_error "must be a regular file" if it exists and is not one
 void require_regular_or_missing(const std::filesystem::path& path);
 
 }  // namespace thermocomp

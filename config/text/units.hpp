@@ -20,17 +20,17 @@ struct Unit {
   QuantityKind kind{QuantityKind::signal};
 };
 
-/// @param column full name of a column. A name that is nothing but the suffix has no unit.
+/// @param column  full name. A name that equals the suffix has no unit.
 [[nodiscard]] Unit unit_of(std::string_view column);
 [[nodiscard]] QuantityKind kind_of(std::string_view column);
 [[nodiscard]] bool is_temperature(std::string_view column);
-/// Displacement or tilt: what a model puts out and an axis takes.
+/// Displacement or tilt: a model's output and an axis' input.
 [[nodiscard]] bool is_output(std::string_view column);
-/// Position or operating signal: what a controller reports.
+/// Position or operating signal, reported by a controller.
 [[nodiscard]] bool is_operating(std::string_view column);
 
-/// Whether a column of a run file can have this name: printable UTF-8 without blanks at the ends,
-/// without comma, quote, `|` (which joins two subjects) and `#` at the start.
+/// Whether a run file's column can have this name: printable UTF-8 without comma, quote, `|` (which
+/// joins two subjects), blanks at the ends, and `#` at the start.
 [[nodiscard]] bool is_column_name(std::string_view name);
 inline constexpr std::string_view column_name_rule =
     "a column's name must be printable, without comma, quote, |, a blank at an end, # at the start";

@@ -1,4 +1,4 @@
-// A document: parsing, and all that is wrong with it.
+// Parsing of a document, and its problems.
 
 #include <algorithm>
 #include <array>
@@ -15,25 +15,25 @@
 namespace thermocomp {
 namespace {
 
-// Limits of a TOML text, checked before it is parsed: the parser recurses into nested tables and
-// lists, and its result takes thirty times the text's size.
+// Limits of a TOML text, checked before parsing: the parser recurses into nested tables and lists,
+// and its result takes thirty times the text's size.
 
-/// Tables and lists within each other: `[a.b]` has 2, `c = [[1]]` under it 4.
+/// Nesting depth of tables and lists: `[a.b]` has 2, `c = [[1]]` under it 4.
 constexpr std::size_t toml_depth_max = 16;
-/// Keys and headers of a file.
+/// Number of keys and headers.
 constexpr std::size_t toml_keys_max = 50'000;
-/// Elements of all its lists.
+/// Number of elements in all lists.
 constexpr std::size_t toml_elements_max = 1'000'000;
 
 struct TomlExcess {
   int line{1};
   std::string rule;
 };
-/// The first place that breaks a limit; nullopt: there is none. A text that is not TOML is checked
-/// up to where it stops being TOML. Does not recurse, O(size).
+/// The first place that exceeds a limit; nullopt: none. Checks an invalid text up to its first
+/// syntax error. Does not recurse, O(size).
 [[nodiscard]] std::optional<TomlExcess> toml_excess(std::string_view text);
 
-/// Follows the text as the parser will, without making anything of it.
+/// Scans the text as the parser does, without building anything.
 class Scanner {
  public:
   explicit Scanner(std::string_view text) : text_(text) {}
@@ -94,7 +94,7 @@ class Scanner {
     in_value_ = true;
   }
 
-  /// A dot in a key goes one table deeper; in a value it is a number's.
+  /// A dot in a key adds a level; in a value it is part of a number.
   void note_dot() {
     if (!in_value_) deeper();
   }
@@ -146,7 +146,7 @@ class Scanner {
     if (!excess_) excess_ = TomlExcess{line_, before + std::to_string(limit) + after};
   }
 
-  /// @return false when it does not end: no TOML from here on
+  /// @return false when the string does not end: no valid TOML from here on
   bool skip_text(char quote) {
     line_is_empty_ = false;
     const std::array<char, 3> three{quote, quote, quote};
@@ -169,7 +169,7 @@ class Scanner {
     return false;
   }
 
-  /// Up to two quotes more belong to the text in front of the fence.
+  /// Up to two quotes before the closing delimiter belong to the text.
   void skip_fence(char quote) {
     at_ += 3;
     for (int more = 0; more < 2 && at_ < text_.size() && text_[at_] == quote; ++more) ++at_;
@@ -177,7 +177,7 @@ class Scanner {
 
   struct Level {
     bool is_table{false};
-    std::size_t key_depth{0};  ///< of the keys around it
+    std::size_t key_depth{0};  ///< depth of the enclosing keys
   };
 
   std::string_view text_;
@@ -186,8 +186,8 @@ class Scanner {
   std::size_t keys_{0};
   std::size_t elements_{0};
   std::size_t header_depth_{0};
-  std::size_t key_depth_{0};  ///< dots of the keys that lead here
-  std::size_t nested_{0};     ///< lists and inline tables that are open
+  std::size_t key_depth_{0};  ///< dots of the enclosing keys
+  std::size_t nested_{0};     ///< open lists and inline tables
   std::array<Level, toml_depth_max + 1> levels_{};
   bool in_header_{false};
   bool in_value_{false};
@@ -236,7 +236,7 @@ const std::string& TomlDocument::name() const noexcept {
 
 namespace {
 
-/// A key that nobody asked for.
+/// A key that was never read.
 struct UnknownKey {
   const detail::TomlState::Opened* table;
   const toml::key* key;
@@ -259,7 +259,7 @@ Problem unknown_problem(const std::string& file, const UnknownKey& unknown, bool
 }  // namespace
 
 std::vector<Problem> TomlDocument::all_problems() const {
-  constexpr std::size_t suggestions_max = 100;  // as many are reported
+  constexpr std::size_t suggestions_max = 100;  // matches the number reported
   std::vector<UnknownKey> unknown;
   for (const auto& [table, opened] : state_->opened) {
     if (opened.ignore_rest) continue;

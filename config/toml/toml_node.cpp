@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::size_t shown_value_max = 60;
 
-/// Appends the value as a person would write it on one line, and stops when that is long enough.
+/// Appends the value in TOML syntax on one line, up to the length limit.
 void append_shown(const toml::node& node, std::string& out) {
   if (out.size() > shown_value_max) return;
   if (const auto* text = node.as_string()) {

@@ -1,6 +1,5 @@
-/// One document's values: what its tables share, where each stands, how it is shown to a person,
-/// and as a number that keeps a rule. Only for the files of this folder: nobody else sees the
-/// library that parses.
+/// Nodes of a document: shared state of its tables, positions, display, and numbers with a range.
+/// Only for the files of this folder, which hides the parser library.
 #pragma once
 
 #include <cstddef>
@@ -21,7 +20,7 @@
 
 namespace thermocomp::detail {
 
-/// The reader keeps so many problems and reports the first hundred; it looks for no more.
+/// Number of problems kept; the first hundred are reported.
 inline constexpr std::size_t kept_problems_max = 10'000;
 
 struct TomlState {
@@ -51,16 +50,16 @@ struct TomlState {
 
 [[nodiscard]] int line_of(const toml::source_region& source);
 
-/// On one line, and not longer than a problem shows.
+/// Reduces the text to one line of the length shown in a problem.
 [[nodiscard]] std::string shortened(std::string text);
-/// The value as a person would write it, shortened.
+/// The value in TOML syntax, shortened.
 [[nodiscard]] std::string shown(const toml::node& node);
 /// "element 3 must be ..."
 [[nodiscard]] std::string at_position(std::size_t position, std::string_view rule);
 
-/// A number inside the range, for reading on after a problem.
+/// A number inside the range, to continue reading after a problem.
 [[nodiscard]] double harmless(const Range& range);
-/// @return the number, or a problem's rule
+/// @return the number; none, with `rule` set, after a problem
 [[nodiscard]] std::optional<double> number_in(const toml::node& node, const Range& range,
                                               std::string& rule);
 [[nodiscard]] std::optional<std::int64_t> integer_in(const toml::node& node, std::int64_t low,

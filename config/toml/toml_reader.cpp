@@ -1,5 +1,4 @@
-// What toml_reader.hpp offers that needs no parser: ranges, limits of files, the nearest of the
-// known keys.
+// Parts of toml_reader.hpp that need no parser: ranges, file limits, the nearest known key.
 
 #include "config/toml/toml_reader.hpp"
 
@@ -63,7 +62,7 @@ std::string read_text_file(const std::filesystem::path& path) {
 }
 
 std::string nearest_name(std::string_view name, const std::vector<std::string>& known) {
-  constexpr std::size_t name_bytes_max = 100;  // the time grows with its length
+  constexpr std::size_t name_bytes_max = 100;  // the time grows with the length
   if (name.size() > name_bytes_max) return {};
   std::size_t best = std::max<std::size_t>(2, name.size() / 3) + 1;
   std::string nearest;
@@ -79,7 +78,7 @@ std::string nearest_name(std::string_view name, const std::vector<std::string>& 
     best = distance;
     nearest = candidate;
   }
-  // T_01 and T_02 are nearer to each other than a name that is neither is to one of them.
+  // With similar names such as T_01 and T_02 the nearest one is ambiguous.
   const auto is_twin = [&](const std::string& other) {
     return other != nearest && edit_distance(nearest, other) < best;
   };

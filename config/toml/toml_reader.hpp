@@ -1,5 +1,5 @@
 /// Strict reading of a TOML file: every key has a type and a rule, every problem is collected with
-/// file, line, key, value and rule, and a key that nobody asked for is an error.
+/// file, line, key, value and rule, and an unknown key is an error.
 ///
 ///     TomlDocument document = TomlDocument::from_file("machine.toml");
 ///     const TomlTable root = document.root();
@@ -16,7 +16,7 @@
 ///     document.finish();  // throws ConfigurationError with all problems, unknown keys among them
 ///
 /// A getter without a default requires its key. After a problem a getter returns its default or
-/// else something harmless inside the rule (so that reading can go on); finish() then throws.
+/// another valid value, so that reading can continue; finish() then throws.
 #pragma once
 
 #include <cstdint>
@@ -34,7 +34,7 @@
 
 namespace thermocomp {
 
-/// Numbers a key may have; always finite.
+/// Range of valid numbers; always finite.
 struct Range {
   double min{-std::numeric_limits<double>::max()};
   double max{std::numeric_limits<double>::max()};
@@ -51,7 +51,7 @@ struct Range {
   [[nodiscard]] std::string rule() const;  ///< "must be in (0, 500]"
 };
 
-/// The names of an enumeration's values, in the order in which they are shown to the user.
+/// The names of an enumeration's values, in the order shown to the user.
 template <class E>
 using Names = std::vector<std::pair<std::string_view, E>>;
 
@@ -59,13 +59,13 @@ namespace detail {
 struct TomlState;
 }
 
-/// One table of a document; cheap to copy, valid for as long as some copy of the document is.
-/// Reading a key marks it as known, even where it is absent.
+/// One table of a document; cheap to copy, valid while any copy of the document exists. Reading a
+/// key marks it as known, even if it is absent.
 class TomlTable {
  public:
   [[nodiscard]] double number(std::string_view key, Range range = {}) const;
   [[nodiscard]] double number(std::string_view key, Range range, double otherwise) const;
-  /// A whole number in [low, high]; `6.0` is not one.
+  /// An integer in [low, high]; `6.0` is not one.
   template <class T = int>
   [[nodiscard]] T integer(std::string_view key, T low, T high) const {
     return static_cast<T>(integer_value(key, static_cast<std::int64_t>(low),
@@ -77,7 +77,7 @@ class TomlTable {
                                         static_cast<std::int64_t>(high),
                                         static_cast<std::int64_t>(otherwise)));
   }
-  /// A string that is not empty.
+  /// A non-empty string.
   [[nodiscard]] std::string text(std::string_view key) const;
   [[nodiscard]] std::string text(std::string_view key, std::string_view otherwise) const;
   [[nodiscard]] bool flag(std::string_view key) const;
@@ -92,8 +92,8 @@ class TomlTable {
     return index == names.size() ? otherwise : names[index].second;
   }
 
-  /// Lists. Without `otherwise` the key is required. Each bad element is a problem of its own and
-  /// is left in place with a harmless value, so that counts stay right.
+  /// Lists. Without `otherwise` the key is required. Each invalid element is a problem and is
+  /// replaced by a valid value, so that counts stay correct.
   [[nodiscard]] std::vector<double> numbers(std::string_view key, Range range = {}) const;
   [[nodiscard]] std::vector<double> numbers(std::string_view key, Range range,
                                             std::vector<double> otherwise) const;
@@ -107,48 +107,47 @@ class TomlTable {
   [[nodiscard]] std::vector<std::string> texts(std::string_view key,
                                                std::vector<std::string> otherwise,
                                                bool takes_empty = false) const;
-  /// Rows of finite numbers, shape (rows, columns); empty after a problem. Required.
+  /// A required matrix of finite numbers, shape (rows, columns); empty after a problem.
   [[nodiscard]] std::vector<std::vector<double>> matrix(std::string_view key, std::size_t rows,
                                                         std::size_t columns) const;
 
-  /// A required table. After a problem the result is silent: nothing more is said about its keys.
+  /// A required table. After a problem the result reports no further ones.
   [[nodiscard]] TomlTable table(std::string_view key) const;
-  /// A table that may be left out; then it is as if it were there and empty.
+  /// An optional table; if absent, an empty one.
   [[nodiscard]] TomlTable table_or_empty(std::string_view key) const;
-  /// `[[key]]`, none if absent.
+  /// `[[key]]`; empty if absent.
   [[nodiscard]] std::vector<TomlTable> tables(std::string_view key) const;
   /// `[[key]]`, at least one.
   [[nodiscard]] std::vector<TomlTable> tables_required(std::string_view key) const;
 
-  /// This table over `base`: a key that is not here is looked up there, and problems name the file
-  /// and the line where it stands. Nested tables are not merged; keys() is as before.
+  /// This table merged over `base`: missing keys are looked up there, and problems name the key's
+  /// file and line. Nested tables are not merged; keys() is unchanged.
   [[nodiscard]] TomlTable over(const TomlTable& base) const;
 
-  /// Whether the key stands there. Marks it as known.
+  /// Whether the key is present. Marks it as known.
   [[nodiscard]] bool has(std::string_view key) const;
-  /// Whether the value is of this sort; false if absent. Marks the key as known.
+  /// Whether the value has this type; false if absent. Marks the key as known.
   [[nodiscard]] bool is_text(std::string_view key) const;
-  /// ... or a list that begins with one.
+  /// ... or is a list that begins with a number.
   [[nodiscard]] bool is_list_of_numbers(std::string_view key) const;
   [[nodiscard]] bool is_table(std::string_view key) const;
-  /// The keys that stand there, in the order of the file; marks none. For tables of free names.
+  /// The present keys in file order; marks none. For tables with arbitrary keys.
   [[nodiscard]] std::vector<std::string> keys() const;
 
-  /// A rule of the caller's own that `key` breaks; value and line are looked up.
+  /// Reports a rule of the caller that `key` breaks, with its value and line.
   void problem(std::string_view key, std::string_view rule) const;
-  /// The same, about one element of the key's list or about what is inside the value.
+  /// The same for an element of the key's list or a part of its value.
   void problem(std::string_view key, std::string_view value, std::string_view rule) const;
-  /// `key` must not stand here: `rule` says why.
+  /// Reports `key`, if present, as not allowed, with the reason `rule`.
   void refuse(std::string_view key, std::string_view rule) const;
-  /// Does not report keys of this table that nobody asked for (because their meaning depends on a
-  /// key that has a problem).
+  /// Suppresses problems for unknown keys of this table, as their meaning depends on a wrong key.
   void ignore_rest() const;
 
-  /// Line of the key, or of the table where the key is absent.
+  /// Line of the key, or of the table if the key is absent.
   [[nodiscard]] int line(std::string_view key) const;
   [[nodiscard]] int line() const noexcept { return line_; }
   [[nodiscard]] const std::string& path() const noexcept { return path_; }  ///< "bus[cabinet]"
-  /// Whether it stands in the file (false: table_or_empty of an absent key, or after a problem).
+  /// Whether it is in the file (false: table_or_empty() of an absent key, or after a problem).
   [[nodiscard]] explicit operator bool() const noexcept { return node_ != nullptr; }
 
  private:
@@ -168,9 +167,10 @@ class TomlTable {
   [[nodiscard]] std::size_t choice_index(std::string_view key,
                                          const std::vector<std::string_view>& names,
                                          std::optional<std::size_t> otherwise) const;
-  [[nodiscard]] const void* find(std::string_view key) const;  ///< marks; nullptr: absent
+  [[nodiscard]] const void* find(std::string_view key) const;  ///< marks the key; nullptr: absent
   [[nodiscard]] const void* find_own(std::string_view key) const;
-  [[nodiscard]] const TomlTable& owner(std::string_view key) const;  ///< where it stands, or this
+  [[nodiscard]] const TomlTable& owner(
+      std::string_view key) const;  ///< the table that has the key, or this
   [[nodiscard]] std::string full(std::string_view key) const;
   [[nodiscard]] TomlTable child(std::string_view key, const void* node, std::string path) const;
   [[nodiscard]] TomlTable silent_child(std::string_view key) const;
@@ -191,16 +191,16 @@ class TomlDocument {
  public:
   /// @throws ConfigurationError when the file cannot be read or is not TOML (with the line)
   [[nodiscard]] static TomlDocument from_file(const std::filesystem::path& path);
-  /// @param name stands for the file in problems
+  /// @param name  file name in problems
   [[nodiscard]] static TomlDocument from_text(std::string text, std::string name);
 
   [[nodiscard]] TomlTable root() const;
   [[nodiscard]] const std::string& text() const noexcept;  ///< as read
   [[nodiscard]] const std::string& name() const noexcept;
-  /// Everything found so far and, besides, every key that stands in the file but that nobody read.
-  /// For those who have several files to report about; others call finish().
+  /// All problems so far, and every key in the file that was not read. For callers with several
+  /// files; others call finish().
   [[nodiscard]] std::vector<Problem> all_problems() const;
-  /// @throws ConfigurationError unless there is no problem at all
+  /// @throws ConfigurationError if there is any problem
   void finish() const;
 
  private:
@@ -208,26 +208,25 @@ class TomlDocument {
   std::shared_ptr<detail::TomlState> state_;
 };
 
-/// The text of a regular file of at most 4 MB (config/toml/toml_reader.hpp has the limits).
+/// Reads a regular file of at most 4 MB.
 /// @throws ConfigurationError
 [[nodiscard]] std::string read_text_file(const std::filesystem::path& path);
 
-/// The name of `known` that is so near to `name` that it was probably meant; else empty, also where
-/// another one may have been meant as well.
+/// The name in `known` closest to `name`, if close enough and unambiguous; else empty.
 [[nodiscard]] std::string nearest_name(std::string_view name,
                                        const std::vector<std::string>& known);
 
-/// How large a file that somebody wrote may be; it is refused before it is read.
+/// Size limits of files, checked before reading.
 inline constexpr std::uintmax_t bytes_per_MB = std::uintmax_t{1024} * 1024;
-/// A configuration, a preset, what describes a machine, a structure, factors.
+/// Configurations, presets, descriptions of machines, structures, factors.
 inline constexpr std::uintmax_t file_bytes_max = 4 * bytes_per_MB;
-/// Models; tables of messages and objects (DBC, EDS), which others wrote.
+/// Models; tables of messages and objects (DBC, EDS).
 inline constexpr std::uintmax_t model_bytes_max = 16 * bytes_per_MB;
 inline constexpr std::uintmax_t bus_table_bytes_max = 16 * bytes_per_MB;
 /// Run files.
 inline constexpr std::uintmax_t run_bytes_max = 64 * bytes_per_MB;
 
-/// The text of a regular file. @throws ConfigurationError
+/// Reads a regular file. @throws ConfigurationError
 [[nodiscard]] std::string read_text_file(const std::filesystem::path& path,
                                          std::uintmax_t bytes_max);
 

@@ -1,4 +1,4 @@
-// A table: what stands in it, its single values and the tables inside it.
+// TomlTable: single values and nested tables.
 
 #include <algorithm>
 #include <string>
@@ -48,7 +48,7 @@ const void* TomlTable::find_own(std::string_view key) const {
 
 const void* TomlTable::find(std::string_view key) const {
   const void* own = find_own(key);
-  const void* below = base_ ? base_->find(key) : nullptr;  // known there, even where hidden
+  const void* below = base_ ? base_->find(key) : nullptr;  // marked there even if hidden
   return own != nullptr ? own : below;
 }
 

@@ -1,4 +1,4 @@
-/// TOML as text, for writers of files.
+/// Values as TOML text, for writers of files.
 #pragma once
 
 #include <string>
@@ -9,11 +9,11 @@ namespace thermocomp {
 
 /// A TOML basic string.
 [[nodiscard]] std::string toml_string(std::string_view text);
-/// A bare key where that is possible, else a quoted one.
+/// A bare key if possible, else a quoted one.
 [[nodiscard]] std::string toml_key(std::string_view name);
-/// A TOML float: unlike JSON's it needs a point or an exponent to be one.
+/// A TOML float: unlike in JSON it must have a point or an exponent.
 [[nodiscard]] std::string toml_number(double value);
-/// A list of rows, one per line, with the end of the line.
+/// A list of rows, one per line, with a final line end.
 [[nodiscard]] std::string toml_rows(const std::vector<std::vector<double>>& values);
 
 template <class Values, class Show>

@@ -25,7 +25,7 @@ Samples samples_of(const Log& log) {
     rest = trimmed(rest);
     if (rest.empty()) continue;
     if (rest == "overrun") {
-      overrun = !samples.rows.empty();  // no row of the file is missing before its first one
+      overrun = !samples.rows.empty();  // rows before the first one are not part of the file
       continue;
     }
     std::vector<double> row;
@@ -38,7 +38,7 @@ Samples samples_of(const Log& log) {
       rest = trimmed(rest.substr(end));
     }
     if (!samples.rows.empty() && row.size() != samples.rows.front().size()) {
-      // Whoever ends the program may cut its last line.
+      // The last line may be cut when the program is stopped.
       if (trimmed(text).empty()) break;
       log.refuse(
           line, "", std::to_string(row.size()) + " numbers",
@@ -51,7 +51,7 @@ Samples samples_of(const Log& log) {
   return samples;
 }
 
-/// Whether the first number counts samples: whole and rising in every row.
+/// Whether the first column may be sample numbers: integers that rise in every row.
 bool may_be_numbered(const Samples& samples) {
   for (std::size_t i = 0; i < samples.rows.size(); ++i) {
     const double number = samples.rows[i].front();
@@ -68,7 +68,7 @@ std::string example(std::size_t count) {
   return names;
 }
 
-/// Whether the rows begin with the sample's number, which the count of names decides.
+/// Whether the rows begin with the sample's number, decided by the number of names.
 bool is_numbered(const Samples& samples, const Log& log) {
   const std::size_t columns = samples.rows.front().size();
   const std::vector<std::string>& names = log.map.names;
@@ -97,14 +97,14 @@ void check_names(const Log& log) {
   }
 }
 
-/// A time among the names may be in another unit: "t [ms]" of a map, "time_s".
+/// Whether a name is a time, possibly in another unit: "t [ms]" of a map, "time_s".
 bool has_time(const std::vector<std::string>& names) {
   return std::find(names.begin(), names.end(), "time_s") != names.end();
 }
 
 }  // namespace
 
-/// Whether nothing but numbers and blanks, in at least one row.
+/// Whether the text has only numbers and blanks, in at least one row.
 bool is_halsampler(std::string_view text) {
   constexpr int rows_judged = 20;
   int rows = 0;

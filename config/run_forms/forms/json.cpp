@@ -15,7 +15,7 @@ namespace {
 
 using nlohmann::json;
 
-// A list of values as `import` takes it: as long as a run file of text.
+// Limits for a run of the same size as a text file.
 constexpr JsonLimits limits{16, 8'000'000, std::size_t{64} << 20};
 
 json parsed(const Log& log, std::string_view text, int line) {
@@ -28,7 +28,7 @@ json parsed(const Log& log, std::string_view text, int line) {
 
 // ---- Moonraker's temperature store
 
-/// "temperature_sensor chamber" is called chamber, unless two would be called so.
+/// Shortens "temperature_sensor chamber" to chamber, unless ambiguous.
 std::map<std::string, std::string> short_names(const json& store) {
   std::map<std::string, std::string> names;
   const auto last_word = [](const std::string& full) {
@@ -113,7 +113,7 @@ PlainTable plain_store(const Log& log, const json& store) {
 
 class Records {
  public:
-  /// @param time  beside the record; empty: it is one of its values
+  /// @param time  given outside of the record; empty: one of its values
   void add(const json& record, const std::string& time = {}) {
     std::map<std::size_t, std::string> row;
     if (!time.empty()) row[column("time")] = time;
@@ -168,9 +168,9 @@ class Records {
 
 constexpr int depth_max = 5;
 
-/// Names once, then the values of all rows: by rows (InfluxDB 1, pandas "split"), by columns, or a
-/// series of times and values (Prometheus).
-/// @return false: the object is none of these
+/// Tables with the names once: by rows (InfluxDB 1, pandas "split"), by columns, or as series of
+/// times and values (Prometheus).
+/// @return false: the object is not a table
 bool add_table(const json& object, Records& records) {
   const auto list = [&](const char* key) {
     const auto found = object.find(key);
@@ -213,7 +213,7 @@ bool add_table(const json& object, Records& records) {
   return has_columns;
 }
 
-/// The tables of a document, wherever they stand in it.
+/// Collects the tables anywhere in a document.
 void collect_tables(const json& value, int depth, Records& records) {
   if (depth > depth_max || !value.is_structured() ||
       (value.is_object() && add_table(value, records)))
@@ -221,7 +221,7 @@ void collect_tables(const json& value, int depth, Records& records) {
   for (const json& each : value) collect_tables(each, depth + 1, records);
 }
 
-/// Records in lists, or under their times.
+/// Collects records in lists, or keyed by time.
 void collect(const json& value, int depth, Records& records) {
   if (depth > depth_max) return;
   if (value.is_array()) {
@@ -263,7 +263,7 @@ PlainTable plain_lines(const Log& log) {
 bool is_json(std::string_view text) {
   const std::string_view first = trimmed(text.substr(0, text.find('\n')));
   if (first.starts_with('{')) return true;
-  // "[INFO]" begins a line of another log.
+  // "[INFO]" begins a line of another kind of log.
   const auto next = text.find_first_not_of(" \t\r\n[");
   return first.starts_with('[') && next != std::string_view::npos && text[next] == '{';
 }

@@ -10,14 +10,14 @@ namespace {
 
 struct Labelled {
   std::string time;
-  std::vector<std::pair<std::string, std::string>> values;  ///< a name and a number, maybe a unit
+  std::vector<std::pair<std::string, std::string>> values;  ///< name and number, maybe with unit
 };
 
 bool is_name(char c) {
   return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '@' || c == '.';
 }
 
-/// The time that a line begins with: in brackets, or the longest words that are one.
+/// Takes the leading time off a line: in brackets, or the longest prefix that is a time.
 std::string take_time(std::string_view& line) {
   line = trimmed(line);
   const bool bracketed = !line.empty() && (line.front() == '(' || line.front() == '[');
@@ -43,7 +43,7 @@ std::string take_time(std::string_view& line) {
   return found;
 }
 
-/// "T:25.00 /0.00", "T1: 10.0 degC", "temp=22.1".
+/// Parses "T:25.00 /0.00", "T1: 10.0 degC", "temp=22.1".
 Labelled labelled_of(std::string_view line) {
   Labelled found;
   found.time = take_time(line);
@@ -93,7 +93,7 @@ PlainTable plain_labelled(const Log& log) {
       ++left_out;
       continue;
     }
-    // Lines of one time are one row.
+    // Lines of equal time form one row.
     if (rows.empty() || rows.back().first != found.time)
       rows.emplace_back(found.time, std::vector<std::string>(names.size()));
     std::vector<std::string>& row = rows.back().second;

@@ -37,7 +37,7 @@ PlainTable plain_lvm(const Log& log) {
       const std::string key = fields[0];
       keys[key] = std::move(fields);
     }
-    // The first header ends with an empty line; that of a segment with the names.
+    // The first header ends with an empty line, that of a segment with the names.
     if (names_line == line && (names.empty() || names[0] != "X_Value")) rows = {};
     if (!rows.empty()) break;
   }

@@ -14,7 +14,7 @@ char separator_of(std::string_view text) {
   return behind.empty() || behind.front() == '"' ? '\t' : behind.front();
 }
 
-/// 100 ns since 1601 as ms since 1970.
+/// Converts 100 ns since 1601 to ms since 1970.
 std::string start_ms(const std::string& filetime) {
   const auto ticks = finite_number(filetime);
   if (!ticks || !(*ticks > 1.2e17 && *ticks < 1.5e17)) return {};
@@ -48,7 +48,7 @@ PlainTable plain_twincat(const Log& log) {
   }
   if (rows.empty() || names.size() < 2)
     log.refuse(line, "Name", "(missing)", "must name the channels of TwinCAT's scope");
-  // A column called Name is one of times; the channels behind it count by these.
+  // A column called Name is a time column, and applies to the channels after it.
   std::vector<std::string> series;
   PlainTable table;
   const bool many_times = std::count(names.begin(), names.end(), "Name") > 1;

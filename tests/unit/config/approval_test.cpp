@@ -16,7 +16,7 @@ using thermocomp::signer_of;
 
 namespace fs = std::filesystem;
 
-/// Of the first test of RFC 8032, section 7.1: its secret key, and its public one.
+/// Secret and public key of the first test of RFC 8032, section 7.1.
 constexpr const char* secret =
     "-----BEGIN PRIVATE KEY-----\n"
     "MC4CAQAwBQYDK2VwBCIEIJ1hsZ3v/VpguoRK9JLsLMREScVpezJpGXA7rAMcrn9g\n"
@@ -42,7 +42,7 @@ struct Keys {
 
 const ReleaseOrder order{"mill_1", 17, std::string(64, 'a'), false};
 
-TEST_CASE("an order is by whose key signed it, and no other order can be made of it",
+TEST_CASE("a signature identifies its key and is not valid for any other order",
           "[config][approval]") {
   const Keys keys;
   const std::string signature = sign_order(order, keys.folder / "secret.key");
@@ -65,7 +65,7 @@ TEST_CASE("an order is by whose key signed it, and no other order can be made of
     CHECK(signer_of(order, forged, keys.folder).empty());
 }
 
-TEST_CASE("a key that cannot be used is named", "[config][approval]") {
+TEST_CASE("an unusable key is named", "[config][approval]") {
   const Keys keys;
   CHECK_THROWS_WITH(sign_order(order, keys.folder / "maria.pem"),
                     Contains("maria.pem") && Contains("private Ed25519 key"));

@@ -362,7 +362,7 @@ TEST_CASE("each broken CAN configuration is refused with file, line, key, value 
   }
 }
 
-TEST_CASE("a dry run takes no place for offsets", "[config]") {
+TEST_CASE("a dry run accepts no place for offsets", "[config]") {
   const std::string model = example("column_model.toml");
   const std::string good = example("modbus_rtu.toml");
   const std::vector<Broken> table = {
@@ -407,8 +407,7 @@ TEST_CASE("all problems are reported at once, in both files, in the order of the
                        [](const Problem& a, const Problem& b) { return a.line < b.line; }));
 }
 
-TEST_CASE("suspected sensors can be weighed down only where a covariance says by what",
-          "[config]") {
+TEST_CASE("suspected sensors can be weighed down only with a covariance", "[config]") {
   const std::string asked = edited(example("small_machine.toml"), "suspected_sensors = \"warn\"",
                                    "suspected_sensors = \"weigh_down\"");
   const std::string model = example("small_machine_model.toml");
@@ -432,7 +431,7 @@ TEST_CASE("suspected sensors can be weighed down only where a covariance says by
   CHECK(parse(asked, able).estimator.compensation.suspected_sensors == SuspectedPolicy::weigh_down);
 }
 
-TEST_CASE("a model that needs a signal is refused where there is no controller", "[config]") {
+TEST_CASE("a model that needs a signal is refused without a controller", "[config]") {
   const std::string model = example("column_model.toml") +
                             "[[term]]\nkind = \"speed_growth\"\nsubject = \"spindle_rpm\"\n"
                             "gain_um_per_unit2 = { z_um = 1e-7 }\n";
@@ -440,7 +439,7 @@ TEST_CASE("a model that needs a signal is refused where there is no controller",
                  "controller.signal", "own kind and dry_run = true"));
 }
 
-TEST_CASE("an edit that breaks several rules is reported once a rule", "[config]") {
+TEST_CASE("an edit that breaks several rules is reported once per rule", "[config]") {
   const std::string good = example("small_machine.toml");
   const std::string model = example("small_machine_model.toml");
   const auto told = [&](const std::string& from, const std::string& to) {
@@ -467,7 +466,7 @@ TEST_CASE("an edit that breaks several rules is reported once a rule", "[config]
                  "sensor[column_left].address", "registers_per_request_max"));
 }
 
-TEST_CASE("sensors that refer to each other in a circle are refused", "[config]") {
+TEST_CASE("a cycle of reference sensors is refused", "[config]") {
   const std::string good = example("small_machine.toml");
   std::string text = edited(good, "address = 4\nscreening",
                             "address = 4\nreference_sensor = "
@@ -498,7 +497,7 @@ TEST_CASE("too many axes and too many signals are refused", "[config]") {
                  "at most 48 signals"));
 }
 
-TEST_CASE("what is no TOML is refused with its line", "[config]") {
+TEST_CASE("invalid TOML is refused with its line", "[config]") {
   const std::string model = example("column_model.toml");
   for (const std::string text : {"format = 1\nformat = 2\n", "format = 1\n[loop\n",
                                  "format = 1\nx = \n", "format = 1\nx = \"\xff\"\n"}) {
@@ -509,7 +508,7 @@ TEST_CASE("what is no TOML is refused with its line", "[config]") {
   }
 }
 
-TEST_CASE("an empty file is reported everything it lacks", "[config]") {
+TEST_CASE("an empty file is reported with all missing keys", "[config]") {
   const auto problems = problems_of([] { return parse("", ""); });
   for (const char* key : {"format", "model", "bus", "device", "sensor", "block", "axis",
                           "controller", "inputs", "outputs"}) {
@@ -518,7 +517,7 @@ TEST_CASE("an empty file is reported everything it lacks", "[config]") {
   }
 }
 
-TEST_CASE("files that cannot be read are named", "[config]") {
+TEST_CASE("unreadable files are named", "[config]") {
   CHECK(problems_of([] { return load_daemon_config("/nonexistent/machine.toml"); }).size() == 1);
   CHECK(problems_of([] { return load_daemon_config("/"); }).size() == 1);
   const auto folder =
@@ -532,8 +531,8 @@ TEST_CASE("files that cannot be read are named", "[config]") {
   CHECK_THAT(problems.front().rule, Catch::Contains("no such file"));
 }
 
-TEST_CASE("no damage to a file does worse than being refused", "[config][property]") {
-  // Bytes dropped, doubled and replaced at places given by a fixed sequence.
+TEST_CASE("a damaged file is at worst refused", "[config][property]") {
+  // Bytes dropped, doubled and replaced at pseudo-random positions.
   const std::string good = example("small_machine.toml");
   const std::string model = example("small_machine_model.toml");
   std::uint32_t state = 12345;

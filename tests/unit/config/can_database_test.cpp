@@ -1,4 +1,4 @@
-// Configurations whose CAN signals are named: what is wrong with the names, or with the file.
+// Configurations with named CAN signals: errors of names and of the DBC file.
 #include <string>
 
 #include "config/daemon/daemon_config.hpp"
@@ -14,7 +14,7 @@ class Folder : public ExampleFolder {
   Folder() : ExampleFolder({"can_dbc.toml", "can_dbc.dbc", "column_model.toml"}) {}
 };
 
-/// What is told after one edit of the configuration.
+/// The problems after one edit of the configuration.
 std::string told_after(const std::string& from, const std::string& to) {
   const Folder folder;
   folder.edit("can_dbc.toml", from, to);
@@ -23,7 +23,7 @@ std::string told_after(const std::string& from, const std::string& to) {
 
 }  // namespace
 
-TEST_CASE("names that are not in the DBC file are refused with what may be meant", "[dbc]") {
+TEST_CASE("names that are not in the DBC file are refused with a suggestion", "[dbc]") {
   CHECK_THAT(told_after("signal = \"Column\"", "signal = \"Colum\""),
              Catch::Contains("sensor[column].signal = \"Colum\": must be a signal of the message "
                              "NODE_TEMPERATURES; did you mean \"Column\"?"));
@@ -36,7 +36,7 @@ TEST_CASE("names that are not in the DBC file are refused with what may be meant
              Catch::Contains("sensor[spindle].counter = \"Oil\": must be in every frame"));
 }
 
-TEST_CASE("a key says otherwise than the DBC file, and the rest stays as it is there", "[dbc]") {
+TEST_CASE("a key overrides the DBC file, and the rest is taken from there", "[dbc]") {
   const auto column = [](const std::string& keys) {
     const Folder folder;
     folder.edit("can_dbc.toml", "signal = \"Column\"", "signal = \"Column\"\n" + keys);
@@ -73,8 +73,7 @@ TEST_CASE("a key says otherwise than the DBC file, and the rest stays as it is t
              Catch::Contains("extended_id = false: is false, but the file's number has more"));
 }
 
-TEST_CASE("a flaw of the DBC file counts where a sensor stands on it and no key says otherwise",
-          "[dbc]") {
+TEST_CASE("a flaw of the DBC file counts if a sensor uses it and no key overrides it", "[dbc]") {
   const Folder folder;
   folder.edit("can_dbc.dbc", "Oil m3 : 64|16@1-", "Oil m3 : 127|16@1-");
   folder.edit("can_dbc.dbc", "CM_ SG_ 385", "SIG_VALTYPE_ 77 Gone : 1;\nCM_ SG_ 385");
@@ -95,7 +94,7 @@ TEST_CASE("a flaw of the DBC file counts where a sensor stands on it and no key 
   CHECK(folder.told().empty());
 }
 
-TEST_CASE("a name that cannot be found is reported with the flaws that may be why", "[dbc]") {
+TEST_CASE("an unknown name is reported with the flaws that may be the cause", "[dbc]") {
   const Folder folder;
   folder.edit("can_dbc.dbc", "BO_ 385 NODE_TEMPERATURES:", "BO_ 385 NODE_TEMPERATURES");
   const std::string told = folder.told();
@@ -105,7 +104,7 @@ TEST_CASE("a name that cannot be found is reported with the flaws that may be wh
   CHECK_THAT(told, Catch::Contains("can_dbc.dbc:9: 8 NODE: must be ':'"));
 }
 
-TEST_CASE("of two messages of one name the identifier says which is meant", "[dbc]") {
+TEST_CASE("of two messages of one name the identifier selects one", "[dbc]") {
   const Folder folder;
   folder.edit("can_dbc.dbc", "CM_ SG_ 385",
               "BO_ 400 NODE_TEMPERATURES: 8 NODE\n"
@@ -120,7 +119,7 @@ TEST_CASE("of two messages of one name the identifier says which is meant", "[db
   CHECK(signal.scale == 0.5);
 }
 
-TEST_CASE("two sensors that read one place are remarked on", "[dbc]") {
+TEST_CASE("two sensors that read one place cause a warning", "[dbc]") {
   const Folder folder;
   CHECK(folder.load().remarks.empty());
   folder.edit("can_dbc.toml", "message = \"NODE_PAGES\"\nsignal = \"Spindle\"",
@@ -131,7 +130,7 @@ TEST_CASE("two sensors that read one place are remarked on", "[dbc]") {
              Catch::EndsWith(": sensor[spindle]: reads the same value as sensor[column]"));
 }
 
-TEST_CASE("signals are named only where there is a DBC file and a message", "[dbc]") {
+TEST_CASE("named signals require a DBC file and a message", "[dbc]") {
   CHECK_THAT(told_after("dbc = \"can_dbc.dbc\"", ""),
              Catch::Contains("sensor[column].signal = \"Column\": needs a bus that names a DBC"));
   CHECK_THAT(told_after("message = \"NODE_TEMPERATURES\"", ""),
@@ -140,11 +139,11 @@ TEST_CASE("signals are named only where there is a DBC file and a message", "[db
              Catch::Contains("bus[machine_bus].dbc = \"other.dbc\": no such file"));
 }
 
-TEST_CASE("a code that the named signal cannot show is refused", "[dbc]") {
+TEST_CASE("a code out of range of the named signal is refused", "[dbc]") {
   CHECK_THAT(told_after("[0x7FFF]", "[0x10000]"), Catch::Contains("open_circuit_codes"));
 }
 
-TEST_CASE("a broken DBC file is reported by its own name and line, once", "[dbc]") {
+TEST_CASE("a broken DBC file is reported once, by its own name and line", "[dbc]") {
   const Folder folder;
   folder.edit("can_dbc.dbc", "0|16@1-", "0|77@1-");
   CHECK(folder.told() ==
@@ -152,7 +151,8 @@ TEST_CASE("a broken DBC file is reported by its own name and line, once", "[dbc]
         "replaces it\n");
 }
 
-TEST_CASE("a named signal in no unit of temperature is refused, one in degF is turned", "[dbc]") {
+TEST_CASE("a named signal without a temperature unit is refused, one in degF is converted",
+          "[dbc]") {
   Folder folder;
   folder.edit("can_dbc.dbc", "\"degC\"", "\"bar\"");
   CHECK_THAT(folder.told(),
@@ -166,7 +166,7 @@ TEST_CASE("a named signal in no unit of temperature is refused, one in degF is t
   CHECK(100.0 * signal.scale + signal.offset == Approx(100.0 * 5 / 9));
 }
 
-TEST_CASE("a message of more bytes than its format has is no frame", "[dbc]") {
+TEST_CASE("a message of more bytes than its frame format is refused", "[dbc]") {
   const Folder folder;
   folder.edit("can_dbc.dbc", "BO_ 2566844926 15;", "BO_ 2566844926 1;");
   CHECK_THAT(folder.told(),

@@ -1,4 +1,4 @@
-// A travel in CAN frames, as the configuration gives it.
+// A travel in CAN frames in the configuration.
 #include <functional>
 
 #include "config/daemon/daemon_config.hpp"
@@ -17,7 +17,7 @@ const CanControllerConfig& controller_of(const DaemonConfig& config) {
   return std::get<CanControllerConfig>(config.controller);
 }
 
-/// One of the tables of axis z, by its edit.
+/// An edit of one of the tables of axis z.
 Broken in_table(const std::string& what, const std::string& from, const std::string& to,
                 const std::string& key, const std::string& rule, const std::string& at = "") {
   return {what, from, to, at, "axis[z].table." + key, rule};
@@ -127,7 +127,7 @@ const std::vector<Broken>& broken_frames() {
 
 }  // namespace
 
-TEST_CASE("a travel stands in frames, each with the number of its set", "[config][travel][can]") {
+TEST_CASE("a travel is in frames, each with the number of its set", "[config][travel][can]") {
   const DaemonConfig config = load_daemon_config(examples / "travel_can.toml");
   REQUIRE(config.estimator.axes.size() == 7);
   CHECK(config.estimator.axes[6].node->position_mm == 600.0);
@@ -152,14 +152,13 @@ TEST_CASE("a travel stands in frames, each with the number of its set", "[config
   CHECK(table.applied.numbers.size() == 2);
 }
 
-TEST_CASE("a travel that cannot stand in frames is refused, with file, line, key and rule",
+TEST_CASE("an invalid travel in frames is refused with file, line, key and rule",
           "[config][travel][can]") {
   for (const Broken& broken : broken_frames())
     check_refused(broken, example("travel_can.toml"), "machine.toml", parse);
 }
 
-TEST_CASE("a frame of a set that the controller sends must not be one that is sent",
-          "[config][travel][can]") {
+TEST_CASE("a frame of the controller's set must not be one that is sent", "[config][travel][can]") {
   std::string text = example("travel_can.toml");
   for (const char* key : {"k0_um", "slope_um_per_m"})
     text = edited(text, std::string(key) + " = { id = 0x290", std::string(key) + " = { id = 0x210");
@@ -170,7 +169,7 @@ TEST_CASE("a frame of a set that the controller sends must not be one that is se
   CHECK(told == 3);
 }
 
-TEST_CASE("all sets in frames are read back or none", "[config][travel][can]") {
+TEST_CASE("either all sets in frames are read back or none", "[config][travel][can]") {
   std::string text = example("travel_can.toml");
   text.resize(text.find("[axis.table.applied]"));
   CHECK_THROWS_WITH(parse(text), Catch::Contains("must be given for all axes or for none"));
@@ -181,7 +180,7 @@ TEST_CASE("all sets in frames are read back or none", "[config][travel][can]") {
   CHECK_FALSE(controller_of(config).axes[0].reads_back());
 }
 
-TEST_CASE("numbers must not come round while what is shown still counts", "[config][travel][can]") {
+TEST_CASE("set numbers must not repeat while a read-back is still valid", "[config][travel][can]") {
   const auto with = [](const char* silent_after_s) {
     return parse(
         edited(example("travel_can.toml"), "period_s = 0.1\nvalid",
@@ -189,14 +188,14 @@ TEST_CASE("numbers must not come round while what is shown still counts", "[conf
   };
   CHECK_NOTHROW(with("3270"));
   const auto problems = problems_of([&] { return with("3280"); });
-  REQUIRE(problems.size() == 2);  // 65536 turns of 0.05 s, on either axis
+  REQUIRE(problems.size() == 2);  // 65536 periods of 0.05 s, for each axis
   CHECK(problems[0].key == "axis[x].line.set_numbers");
   CHECK(problems[0].rule ==
         "must have more bits: the numbers come round after 3276.8 s, within "
         "silent_after_s");
 }
 
-TEST_CASE("P0 has a place in the frames that can hold it", "[config][travel][can]") {
+TEST_CASE("P0 has a place of sufficient range in the frames", "[config][travel][can]") {
   const std::string wide =
       edited(edited(example("travel_can.toml"),
                     "set_numbers = [{ id = 0x210, start_bit = 48, length_bits = 16 }]",
@@ -215,7 +214,7 @@ TEST_CASE("P0 has a place in the frames that can hold it", "[config][travel][can
                     Catch::Contains("must be able to hold p0_mm = 12.5"));
 }
 
-TEST_CASE("a reload cannot take over another place in the frames", "[config][travel][can]") {
+TEST_CASE("a reload cannot change a place in the frames", "[config][travel][can]") {
   const std::string text = example("travel_can.toml");
   const DaemonConfig running = parse(text);
   CHECK(restart_needed(running, parse(text)).empty());
@@ -227,7 +226,7 @@ TEST_CASE("a reload cannot take over another place in the frames", "[config][tra
   CHECK(restart_needed(running, parse(moved)) == changed);
 }
 
-TEST_CASE("only a controller on Modbus or CAN takes a set as a whole", "[config][travel]") {
+TEST_CASE("only a controller on Modbus or CAN accepts a set", "[config][travel]") {
   const std::string text = example("travel_can.toml");
   const auto begin = text.find("[controller]");
   const std::string bridge = text.substr(0, begin) +

@@ -14,7 +14,7 @@ using namespace thermocomp;
 
 namespace {
 
-/// What a process of its own writes to standard output and standard error.
+/// Output of a child process on stdout and stderr.
 std::string written_by(const std::function<void()>& program) {
   std::array<int, 2> ends{};
   REQUIRE(pipe(ends.data()) == 0);
@@ -48,7 +48,7 @@ constexpr const char* harmless = "a ]0;owned  [2Jb<U+202E>c<U+009B>d e";
 
 }  // namespace
 
-TEST_CASE("nothing that a process prints commands a terminal", "[terminal]") {
+TEST_CASE("printed text cannot send control codes to a terminal", "[terminal]") {
   const std::string expected = std::string(harmless) + "\n";
   CHECK(written_by([] { std::printf("%s\n", hostile); }) == expected);
   CHECK(written_by([] { std::fprintf(stderr, "%s\n", hostile); }) == expected);
@@ -57,10 +57,10 @@ TEST_CASE("nothing that a process prints commands a terminal", "[terminal]") {
   CHECK(written_by([] { std::puts(hostile); }) == expected);
 }
 
-TEST_CASE("lines, tabulators and every script stay as they are", "[terminal]") {
+TEST_CASE("line ends, tabulators and all scripts are unchanged", "[terminal]") {
   const std::string text = "Spindel\t床前 주축 Ось äöü € \U0001F525\n";
   CHECK(written_by([&] { std::fputs(text.c_str(), stdout); }) == text);
-  // Whatever a buffer's end cuts.
+  // Cut anywhere by the end of a buffer.
   CHECK(written_by([&] {
           for (const char c : text) {
             std::fputc(c, stdout);
@@ -75,8 +75,8 @@ TEST_CASE("lines, tabulators and every script stay as they are", "[terminal]") {
   CHECK(written_by([&] { std::cout << large; }) == large);
 }
 
-TEST_CASE("own codes reach the terminal, and no text passes for one", "[terminal]") {
-  CHECK(terminal_code("[32m") == "\033[32m");  // nothing is cleaned here
+TEST_CASE("own codes reach the terminal, and other text cannot imitate them", "[terminal]") {
+  CHECK(terminal_code("[32m") == "\033[32m");  // no cleaning in this process
   CHECK(written_by([] { std::cout << terminal_code("[32m") << "yes" << terminal_code("[0m"); }) ==
         "\033[32myes\033[0m");
   CHECK(written_by([] {

@@ -16,7 +16,7 @@ DaemonConfig parse(const std::string& text, const std::string& model = "small_ma
   return parse_daemon_config(text, "machine.toml", example(model), "model.toml");
 }
 
-/// The examples that are the daemon's; the others are models or another program's.
+/// Examples of daemon configurations; the others are models or for other programs.
 std::vector<std::filesystem::path> configurations() {
   std::vector<std::filesystem::path> paths;
   for (const auto& entry : std::filesystem::directory_iterator(examples)) {
@@ -44,7 +44,7 @@ TEST_CASE("every example loads", "[config]") {
   CHECK(paths.size() >= 4);
 }
 
-TEST_CASE("every kind of bus has a commented example, and can be told about", "[config]") {
+TEST_CASE("every kind of bus has a commented example", "[config]") {
   std::set<std::string> kinds;
   for (const auto& path : configurations())
     for (const BusConfig& bus : load_daemon_config(path).buses) {
@@ -59,7 +59,7 @@ TEST_CASE("every kind of bus has a commented example, and can be told about", "[
   CHECK(kinds.size() == sections::bus_kinds().size());
 }
 
-TEST_CASE("the small machine is what its file says", "[config]") {
+TEST_CASE("the small machine is loaded as in its file", "[config]") {
   const DaemonConfig config = load_daemon_config(examples / "small_machine.toml");
   CHECK(config.loop.rate_hz == 100);
   CHECK(config.model_file == examples / "small_machine_model.toml");
@@ -88,7 +88,7 @@ TEST_CASE("the small machine is what its file says", "[config]") {
   CHECK(over_tcp.line.inter_frame_delay_ms < 0);
 }
 
-TEST_CASE("a sensor's own keys stand above those for every sensor", "[config]") {
+TEST_CASE("a sensor's own keys override those for every sensor", "[config]") {
   const DaemonConfig config = load_daemon_config(examples / "small_machine.toml");
   const auto& sensors = config.estimator.sensors;
   REQUIRE(sensors.size() == 8);
@@ -114,7 +114,7 @@ TEST_CASE("axes, blocks and signals keep their order and places", "[config]") {
   CHECK(controller.heartbeat->address == 11);
 }
 
-TEST_CASE("the CAN example is what its file says", "[config][can]") {
+TEST_CASE("the CAN example is loaded as in its file", "[config][can]") {
   const DaemonConfig config = load_daemon_config(examples / "can.toml");
   REQUIRE(config.buses.size() == 1);
   const auto& channels = std::get<CanBusConfig>(config.buses[0]).devices.at(0).channels;
@@ -129,7 +129,7 @@ TEST_CASE("the CAN example is what its file says", "[config][can]") {
   CHECK(config.estimator.compensation.hold_while_cutting);
 }
 
-TEST_CASE("sensors of a CAN bus are named by its DBC file", "[config][can][dbc]") {
+TEST_CASE("sensors of a CAN bus can use names of its DBC file", "[config][can][dbc]") {
   const DaemonConfig config = load_daemon_config(examples / "can_dbc.toml");
   const auto& channels = std::get<CanBusConfig>(config.buses.at(0)).devices.at(0).channels;
   REQUIRE(channels.size() == 2);
@@ -150,13 +150,13 @@ TEST_CASE("a replay needs no DBC file", "[config][can][dbc]") {
   CHECK_NOTHROW(parse(example("can_dbc.toml"), "column_model.toml"));
 }
 
-TEST_CASE("a dry run reads back what it is offered", "[config]") {
+TEST_CASE("a dry run reads back the offered offsets", "[config]") {
   const DaemonConfig config = load_daemon_config(examples / "modbus_rtu.toml");
   CHECK(std::get<DryRunControllerConfig>(config.controller).axes == 1);
   CHECK(config.estimator.controller_reads_back);
 }
 
-TEST_CASE("any controller can be run dry", "[config]") {
+TEST_CASE("a dry run is possible with any controller", "[config]") {
   for (const char* name :
        {"small_machine.toml", "modbus_tcp.toml", "can.toml", "piezo.toml", "s7.toml"}) {
     INFO(name);
@@ -170,18 +170,18 @@ TEST_CASE("any controller can be run dry", "[config]") {
     const DaemonConfig config = parse(dry, model);
     CHECK_FALSE(real.dry_run);
     CHECK(config.dry_run);
-    CHECK(config.controller == real.controller);  // all places stay checked
+    CHECK(config.controller == real.controller);  // all places are checked
     CHECK(config.estimator.signals == real.estimator.signals);
     CHECK(config.estimator.controller_reads_back);
-    // Nothing is in effect at the machine, so what remains there is all of it.
+    // Without an offset at the machine, a measured remainder is the total displacement.
     CHECK(real.estimator.correction.measured == MeasuredMeaning::remaining);
     CHECK(config.estimator.correction.measured == MeasuredMeaning::total);
     CHECK(restart_needed(real, config) == std::vector<std::string>{"dry_run of the controller"});
   }
-  CHECK(load_daemon_config(examples / "modbus_rtu.toml").dry_run);  // the kind of no controller
+  CHECK(load_daemon_config(examples / "modbus_rtu.toml").dry_run);  // it has no controller
 }
 
-TEST_CASE("without any applied offset the controller does not read back", "[config]") {
+TEST_CASE("without an applied offset the controller has no read-back", "[config]") {
   const std::string text = edited(
       example("modbus_tcp.toml"),
       "applied = { table = \"input\", address = 0, encoding = \"int16\", scale = 0.01 }\n", "");
@@ -220,7 +220,7 @@ TEST_CASE("values at their bounds are accepted", "[config]") {
   }
 }
 
-TEST_CASE("everything behind \"default\" may be left out and is then the same", "[config]") {
+TEST_CASE("keys with a \"default\" comment may be left out without a change", "[config]") {
   const std::string full = example("small_machine.toml");
   std::string text;
   std::size_t dropped = 0;
@@ -248,7 +248,7 @@ TEST_CASE("everything behind \"default\" may be left out and is then the same", 
   CHECK(a.estimator.correction.form == CorrectionForm::off);
 }
 
-TEST_CASE("a correction's groups are inputs of the model, each named once", "[config]") {
+TEST_CASE("a correction's groups consist of inputs of the model, each named once", "[config]") {
   const auto with = [](const std::string& correction) {
     std::string text = example("small_machine.toml");
     text.erase(text.find("[correction]"),
@@ -275,7 +275,7 @@ TEST_CASE("a correction's groups are inputs of the model, each named once", "[co
   }
 }
 
-TEST_CASE("two sensors on one register are remarked on", "[config]") {
+TEST_CASE("two sensors on one register cause a warning", "[config]") {
   const std::string text = example("modbus_tcp.toml");
   CHECK(parse(text, "column_model.toml").remarks.empty());
   const auto remarks =
@@ -286,7 +286,7 @@ TEST_CASE("two sensors on one register are remarked on", "[config]") {
              Catch::EndsWith(": sensor[spindle]: reads the same value as sensor[column]"));
 }
 
-TEST_CASE("a data block's places are bytes, each written for one purpose", "[config]") {
+TEST_CASE("places in a data block are bytes, each written for one purpose", "[config]") {
   const DaemonConfig config = load_daemon_config(examples / "s7.toml");
   const auto& controller = std::get<ModbusControllerConfig>(config.controller);
   const S7Block* block = s7_of(controller.line);
@@ -363,7 +363,7 @@ TEST_CASE("an axis whose controller interpolates along the travel becomes its no
   CHECK(controller.axes[1].travel->applied.at(4).address == 125);
 }
 
-TEST_CASE("a travel that cannot be is refused, with key and rule", "[config][travel]") {
+TEST_CASE("an invalid travel is refused with key and rule", "[config][travel]") {
   const std::string text = example("travel.toml");
   const std::vector<std::pair<std::pair<std::string, std::string>, const char*>> bad = {
       {{"travel_mm = [0.0, 800.0]", "travel_mm = [800.0, 0.0]"}, "travel_mm"},
@@ -408,7 +408,7 @@ TEST_CASE("a travel that cannot be is refused, with key and rule", "[config][tra
                     Catch::Contains("is no curve"));
 }
 
-TEST_CASE("a register that cannot carry the offset in sensible steps is refused", "[config]") {
+TEST_CASE("a register with too coarse steps for the offset is refused", "[config]") {
   const std::string text = example("small_machine.toml");
   const std::size_t line = text.find("\noffset = { table");
   REQUIRE(line != std::string::npos);
@@ -432,7 +432,7 @@ TEST_CASE("a register that cannot carry the offset in sensible steps is refused"
     CHECK_NOTHROW(with(works));
 }
 
-TEST_CASE("keys of cycles make no sense where the offset follows the model", "[config]") {
+TEST_CASE("keys of cycles are refused if the offset follows the model", "[config]") {
   CHECK_THROWS_WITH(
       edited_machine("update = \"continuous\"", "update = \"continuous\"\ncycles_per_update = 2"),
       Catch::Contains("makes no sense"));
@@ -472,7 +472,7 @@ TEST_CASE("a reload takes over model, blocks, screening, smoothing, limits and p
   }
 }
 
-TEST_CASE("a candidate that cannot run keeps nothing from working and says why",
+TEST_CASE("a candidate that cannot run affects nothing else and has its reason",
           "[config][candidate]") {
   const ExampleFolder folder({"small_machine.toml", "small_machine_model.toml"});
   folder.edit("small_machine.toml", "file = \"small_machine_model.toml\"",
@@ -492,12 +492,12 @@ TEST_CASE("a candidate that cannot run keeps nothing from working and says why",
   CHECK_THAT(problem_of("nonsense"), Catch::Contains("new.toml"));
   CHECK_THAT(problem_of(edited(model, missing.model.outputs.front(), "other_um")),
              Catch::Contains("other_um") || Catch::Contains("output"));
-  // A temperature that no sensor of the machine measures.
+  // A temperature without a sensor.
   CHECK_THAT(problem_of(edited(model, missing.model.inputs.front(), "other_degC")),
              Catch::Contains("other_degC"));
 }
 
-TEST_CASE("what a reload cannot take over is named", "[config]") {
+TEST_CASE("changes that need a restart are named", "[config]") {
   const DaemonConfig running = parse(example("small_machine.toml"));
   const std::vector<std::vector<std::string>> edits = {
       {"rate_hz = 100", "rate_hz = 200", "loop"},
@@ -525,7 +525,7 @@ TEST_CASE("what a reload cannot take over is named", "[config]") {
         std::vector<std::string>{"names or order of the sensors"});
 }
 
-TEST_CASE("a file that is named twice is refused, by whatever path or link", "[config][files]") {
+TEST_CASE("a file that is named twice is refused, through any path or link", "[config][files]") {
   const auto told_with = [&](const std::string& history, const std::string& state) {
     const ExampleFolder folder({"small_machine.toml", "small_machine_model.toml"});
     folder.name_files(history, state);

@@ -1,5 +1,4 @@
-// What a DBC file may say, and what is refused by file, line and rule. Values beside canmatrix:
-// tests/integration/can.
+// Valid and refused content of DBC files. Comparison with canmatrix: tests/integration/can.
 #include "config/bus_files/dbc_file.hpp"
 
 #include <array>
@@ -15,7 +14,7 @@ namespace {
 
 const std::string head = "VERSION \"\"\nNS_ :\nBS_:\nBU_: A B\n";
 
-/// All flaws, one a line; "" for a good file.
+/// All flaws, one per line; "" for a valid file.
 std::string problems_of(const std::string& body) {
   std::string told;
   for (const DbcFlaw& flaw : read_dbc_text(head + body, "x.dbc").flaws) {
@@ -35,7 +34,7 @@ std::string placed(const std::string& place, const std::string& bytes = "8") {
 
 }  // namespace
 
-TEST_CASE("a DBC file's messages and signals are read as they stand", "[dbc]") {
+TEST_CASE("a DBC file's messages and signals are read", "[dbc]") {
   const DbcFile file =
       read_dbc_text(head +
                         "BO_ 385 NODE: 8 A\n"
@@ -93,7 +92,7 @@ TEST_CASE("multiplexors of a DBC file select by page, nested ones by all of thei
   CHECK(deep.messages[0].find("T")->place.selectors == both);
 }
 
-TEST_CASE("a DBC file may say what is of no use here", "[dbc]") {
+TEST_CASE("a DBC file may contain unused statements", "[dbc]") {
   CHECK(problems_of("VAL_TABLE_ States 1 \"a;b\" 0 \"c\" ;\n" + placed("0|8@1+") +
                     "BO_TX_BU_ 385 : A,B;\nCM_ SG_ 385 T \"two\nlines \\\"quoted\\\"; so\";\n"
                     "BA_DEF_ SG_ \"Start\" INT 0 10;\nBA_DEF_DEF_ \"Start\" 0;\n"
@@ -103,7 +102,7 @@ TEST_CASE("a DBC file may say what is of no use here", "[dbc]") {
             .empty());
 }
 
-TEST_CASE("what a DBC file must not say is refused by line and rule", "[dbc]") {
+TEST_CASE("invalid content of a DBC file is refused by line and rule", "[dbc]") {
   const auto tells = [](const std::string& body, const std::string& start) {
     INFO(problems_of(body));
     return problems_of(body).find(start) == 0;
@@ -134,7 +133,7 @@ TEST_CASE("what a DBC file must not say is refused by line and rule", "[dbc]") {
               "x.dbc:8: VFrameFormat = 2: must be one of the formats"));
 }
 
-TEST_CASE("a DBC file that breaks the grammar is refused where it does", "[dbc]") {
+TEST_CASE("a syntax error of a DBC file is refused at its position", "[dbc]") {
   const auto tells = [](const std::string& body, const std::string& start) {
     INFO(problems_of(body));
     return problems_of(body).find(start) == 0;
@@ -152,7 +151,7 @@ TEST_CASE("a DBC file that breaks the grammar is refused where it does", "[dbc]"
   CHECK(tells(std::string("BO_ 1 \x01\x02"), "x.dbc:5: ??: must be a message's name"));
 }
 
-TEST_CASE("a flaw of a DBC file stands at its message and signal, and the others are read",
+TEST_CASE("a flaw of a DBC file belongs to its message and signal, and the others are read",
           "[dbc]") {
   const DbcFile file = read_dbc_text(head +
                                          "BO_ 385 NODE: 8 A\n"
@@ -176,7 +175,7 @@ TEST_CASE("a flaw of a DBC file stands at its message and signal, and the others
   CHECK(file.find("LAST")->find("T")->place.scale == 0.5);
 }
 
-TEST_CASE("a quote too many or a semicolon too few costs no more than its statement", "[dbc]") {
+TEST_CASE("an extra quote or a missing semicolon costs only its statement", "[dbc]") {
   for (const char* comment :
        {"CM_ SG_ 385 T \"a 5\" pipe\";\n", "CM_ \"no end;\n", "CM_ \"none\"\n"}) {
     INFO(comment);
@@ -204,7 +203,7 @@ TEST_CASE("a signal whose multiplexor has a flaw has one as well", "[dbc]") {
   CHECK(file.flaws[1].signal == "T");
 }
 
-TEST_CASE("a DBC file with more than 1000 flaws is not read on", "[dbc]") {
+TEST_CASE("reading a DBC file stops at 1000 flaws", "[dbc]") {
   std::string text = placed("0|8@1+");
   for (int i = 0; i < 2000; ++i) text += "BO_ x\n";
   const DbcFile file = read_dbc_text(head + text, "x.dbc");
@@ -212,7 +211,7 @@ TEST_CASE("a DBC file with more than 1000 flaws is not read on", "[dbc]") {
   CHECK(file.messages.empty());
 }
 
-TEST_CASE("names of a DBC file may begin with a digit, have a hyphen, and be cut", "[dbc]") {
+TEST_CASE("names of a DBC file may begin with a digit, have a hyphen, and be shortened", "[dbc]") {
   const DbcFile file = read_dbc_text(
       "VERSION \"\"\nBU_: 2A B-C\nBO_ 385 2_Node: 8 2A\n"
       " SG_ Near-Th_01 : 0|16@1- (0.1,0) [0|0] \"\" B-C,2A\n"
@@ -231,13 +230,14 @@ TEST_CASE("names of a DBC file may begin with a digit, have a hyphen, and be cut
   CHECK(node == file.find("2_Node"));
   CHECK(node->find("NearTheBed")->place.start_bit == 16);
   CHECK(node->find("Near-Th_02")->place.start_bit == 16);
-  // A long name of two signals is none.
+  // A long name of two signals is ignored.
   CHECK(node->find("Far") == nullptr);
   REQUIRE(file.flaws.size() == 1);
   CHECK(to_string(file.flaws[0].problem) == "x.dbc:13: Far: is the long name of two signals");
 }
 
-TEST_CASE("of a J1939 group neither sender nor priority count, nor the receiver of some", "[dbc]") {
+TEST_CASE("a J1939 group matches any sender and priority, and any receiver if not a broadcast",
+          "[dbc]") {
   const auto mask = [](const std::string& number, const std::string& format) {
     const DbcFile file = read_dbc_text(
         head + "BO_ " + number + " NODE: 8 A\n SG_ T : 0|8@1+ (1,0) [0|0] \"\" B\n" +

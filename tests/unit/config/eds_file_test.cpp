@@ -1,4 +1,4 @@
-// What an electronic data sheet may say, and what is refused by file, line and rule.
+// Valid and refused content of electronic data sheets.
 #include "config/bus_files/eds_file.hpp"
 
 #include <string>
@@ -11,7 +11,7 @@ using namespace thermocomp;
 
 namespace {
 
-/// All problems, one a line; "" for a good file.
+/// All problems, one per line; "" for a valid file.
 std::string told(const std::string& text) {
   std::string told;
   for (const EdsFlaw& flaw : read_eds_text(text, "x.eds").flaws) {
@@ -47,13 +47,13 @@ TEST_CASE("objects of a data sheet are found by address and by name", "[eds]") {
   CHECK(file.find("AI input PV 2")[0] == value);
   REQUIRE(file.find("AI input PV/AI input PV 2").size() == 1);
   CHECK(file.find("AI input PV/AI input PV 2")[0] == value);
-  // The array itself holds no value, and each array has a number of entries.
+  // The array itself has no value, and each array has a number of entries.
   CHECK(file.find("AI input PV").empty());
   CHECK(file.find(ObjectAddress{0x7130, 3}) == nullptr);
   CHECK(file.find("Number of entries").size() == 2);
 }
 
-TEST_CASE("a part of a name is no name", "[eds]") {
+TEST_CASE("a part of a name is not found", "[eds]") {
   const EdsFile file = good(array);
   CHECK(file.find("PV 1").empty());
   CHECK(file.find("").empty());
@@ -95,7 +95,7 @@ TEST_CASE("CompactSubObj makes as many objects, named by its list or numbered", 
              Catch::Contains("x.eds:1: 7130.CompactSubObj = 255: must be at most 254"));
 }
 
-TEST_CASE("what is not the form of a data sheet is refused with its line", "[eds]") {
+TEST_CASE("a malformed line of a data sheet is refused", "[eds]") {
   CHECK(told("") == "x.eds: is no electronic data sheet: it has no object\n");
   CHECK_THAT(told("[FileInfo]\nFileName=x\n"), Catch::Contains("it has no object"));
   CHECK_THAT(told(array + "PDOMapping\n"),
@@ -110,7 +110,7 @@ TEST_CASE("what is not the form of a data sheet is refused with its line", "[eds
              Catch::Contains("x.eds:14: 7130SUB1: stands there twice, first in line 8"));
 }
 
-TEST_CASE("objects of a data sheet that cannot be are refused", "[eds]") {
+TEST_CASE("invalid objects of a data sheet are refused", "[eds]") {
   CHECK_THAT(told("[2000]\nDataType=3\n"),
              Catch::Contains("x.eds:1: 2000.ParameterName = (missing): must be given"));
   CHECK_THAT(told("[2000]\nParameterName=x\nDataType=int16\n"),
@@ -122,7 +122,7 @@ TEST_CASE("objects of a data sheet that cannot be are refused", "[eds]") {
              Catch::Contains("is an object that stands there already"));
 }
 
-TEST_CASE("a file that is wrong everywhere is not read to its end", "[eds]") {
+TEST_CASE("reading a data sheet stops after too many flaws", "[eds]") {
   std::string text = array;
   for (int i = 0; i < 2000; ++i) text += "rubbish\n";
   const EdsFile file = read_eds_text(text, "x.eds");
@@ -132,7 +132,7 @@ TEST_CASE("a file that is wrong everywhere is not read to its end", "[eds]") {
              Catch::Contains("x.eds:2: " + std::string(60, 'x') + ": must be"));
 }
 
-TEST_CASE("a flaw of a data sheet belongs to the object that it stands in", "[eds]") {
+TEST_CASE("a flaw of a data sheet belongs to its object", "[eds]") {
   const EdsFile file = read_eds_text("rubbish\n" + array +
                                          "[2000]\nDataType=int\n[2001sub1]\nParameterName=x\n"
                                          "DataType=3\n",
@@ -141,7 +141,7 @@ TEST_CASE("a flaw of a data sheet belongs to the object that it stands in", "[ed
   CHECK_FALSE(file.flaws[0].object);
   CHECK(file.flaws[1].object == ObjectAddress{0x2000, 0});  // no name
   CHECK(file.flaws[2].object == ObjectAddress{0x2000, 0});  // no type
-  CHECK(file.flaws[3].object == ObjectAddress{0x2001, 1});  // part of nothing
+  CHECK(file.flaws[3].object == ObjectAddress{0x2001, 1});  // without a parent
   CHECK(file.find("Input PV 1").size() == 1);
   REQUIRE(file.find(ObjectAddress{0x2001, 1}) != nullptr);
   CHECK(file.find(ObjectAddress{0x2001, 1})->type == ObjectType{16, true, false});

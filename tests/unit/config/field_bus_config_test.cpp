@@ -1,4 +1,4 @@
-// CANopen and J1939 buses of a configuration: what of them is refused.
+// CANopen and J1939 buses of a configuration: refused content.
 #include <string>
 #include <vector>
 
@@ -12,7 +12,7 @@ namespace {
 
 const std::string twice_given = "is the COB-ID of a TPDO of the device cantrans already";
 
-/// Broken without a look into the data sheet.
+/// Edits that are refused without the data sheet.
 void check_all(const std::string& file, const std::vector<Broken>& table) {
   const std::string model = example("column_model.toml");
   for (const Broken& broken : table) {
@@ -22,7 +22,7 @@ void check_all(const std::string& file, const std::vector<Broken>& table) {
   }
 }
 
-/// What is told after one edit of a file beside or of the CANopen example.
+/// The problems after one edit of the CANopen example or a file beside it.
 std::string told_after(const std::string& file, const std::string& from, const std::string& to) {
   const ExampleFolder folder({"canopen.toml", "two_channel_module.eds", "column_model.toml"});
   folder.edit(file, from, to);
@@ -127,7 +127,7 @@ TEST_CASE("a CANopen sensor is refused by key and rule", "[canopen][config]") {
               "device[cantrans].over_range_codes", ""}});
 }
 
-TEST_CASE("names are those of the node's data sheet", "[canopen][config]") {
+TEST_CASE("names must be in the node's data sheet", "[canopen][config]") {
   CHECK(told_after("heartbeat_s = 1.0 ", "heartbeat_s = 1.0 ").empty());
   CHECK(
       told_after("\"AI input PV 1\"", "\"AI input PW 1\"") ==
@@ -152,7 +152,7 @@ TEST_CASE("names are those of the node's data sheet", "[canopen][config]") {
         "type in the configuration replaces it\n");
 }
 
-TEST_CASE("a flaw of a data sheet is a remark where no sensor stands on it, or type replaces it",
+TEST_CASE("a flaw of a data sheet is a warning if no sensor uses it, or if type replaces it",
           "[canopen][config]") {
   const ExampleFolder folder({"canopen.toml", "two_channel_module.eds", "column_model.toml"});
   folder.edit("two_channel_module.eds", "AccessType=ro\n", "AccessType\n");

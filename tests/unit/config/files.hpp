@@ -1,4 +1,4 @@
-/// The examples as texts, and how tests break them.
+/// The examples as texts, and edits that break them.
 #pragma once
 
 #include <algorithm>
@@ -28,7 +28,7 @@ inline std::string example(const std::string& name) {
   return text_of(examples / name);
 }
 
-/// `text` with the first `from` replaced by `to`; `from` has to be there.
+/// `text` with the first `from`, which must exist, replaced by `to`.
 inline std::string edited(std::string text, const std::string& from, const std::string& to) {
   const auto at = text.find(from);
   INFO("looking for: " << from);
@@ -36,7 +36,7 @@ inline std::string edited(std::string text, const std::string& from, const std::
   return text.replace(at, from.size(), to);
 }
 
-/// Line, counted from 1, of the first `snippet`.
+/// Line of the first `snippet`, counted from 1.
 inline int line_of(const std::string& text, const std::string& snippet) {
   const auto at = text.find(snippet);
   INFO("looking for: " << snippet);
@@ -45,7 +45,7 @@ inline int line_of(const std::string& text, const std::string& snippet) {
                  std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n'));
 }
 
-/// What `load` throws; none when it does not throw.
+/// Problems thrown by `load`; empty if it does not throw.
 template <class Load>
 std::vector<Problem> problems_of(Load load) {
   try {
@@ -56,7 +56,7 @@ std::vector<Problem> problems_of(Load load) {
   return {};
 }
 
-/// A folder with examples, to be edited: what a file says that the configuration names.
+/// A folder with examples, in which files named by the configuration can be edited.
 class ExampleFolder {
  public:
   /// @param files  the configuration first
@@ -77,8 +77,7 @@ class ExampleFolder {
   void write(const std::string& file, const std::string& text) const {
     std::ofstream(path_ / file, std::ios::binary) << text;
   }
-  /// Puts these paths where the configuration names its history and its state, and beside them
-  /// links of all kinds.
+  /// Sets the configuration's paths of history and state, and creates links of all kinds.
   void name_files(const std::string& history, const std::string& state) const {
     namespace fs = std::filesystem;
     edit(config_, "/var/lib/thermocomp/state.json", state);
@@ -92,7 +91,7 @@ class ExampleFolder {
     REQUIRE(::mkfifo((path_ / "pipe").c_str(), 0600) == 0);
   }
   [[nodiscard]] DaemonConfig load() const { return load_daemon_config(path_ / config_); }
-  /// All problems, one a line, without the folder.
+  /// All problems, one per line, without the folder.
   [[nodiscard]] std::string told() const {
     std::string text;
     for (const Problem& problem : problems_of([&] { return load(); })) {
@@ -106,17 +105,17 @@ class ExampleFolder {
   std::filesystem::path path_;
 };
 
-/// One way of breaking a good text and what has to be said about it.
+/// An edit that breaks a valid text, and the expected problem.
 struct Broken {
   std::string what;
   std::string from;
   std::string to;
-  std::string at;    ///< a snippet of the line that is blamed; empty: `to` begins there
-  std::string key;   ///< of the problem, in full
-  std::string rule;  ///< a part of it
+  std::string at;    ///< a snippet of the reported line; empty: the line of `to`
+  std::string key;   ///< full key of the problem
+  std::string rule;  ///< part of the rule
 };
 
-/// The edit's only problem is the expected one, with file, line, key, value and rule.
+/// Checks that the edit has only the expected problem, with file, line, key, value and rule.
 template <class Parse>
 void check_refused(const Broken& broken, const std::string& good, const std::string& file,
                    Parse parse) {

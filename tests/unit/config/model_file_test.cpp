@@ -235,7 +235,7 @@ TEST_CASE("all problems of a model are reported at once", "[config][model]") {
   CHECK(problems_of([&] { return parse_model(text, "m"); }).size() == 5);
 }
 
-TEST_CASE("a model is what its file says", "[config][model]") {
+TEST_CASE("a model is loaded as in its file", "[config][model]") {
   const ThermalModel model = parse_model(good, "model.toml");
   CHECK(model.inputs == std::vector<std::string>{"a_degC", "b_degC"});
   CHECK(model.reference_degC == std::vector<double>{20, 21});
@@ -249,7 +249,7 @@ TEST_CASE("a model is what its file says", "[config][model]") {
   CHECK(parse_model(edited(good, "[20.0, 21.0]", "\"first_sample\""), "m").reference_degC.empty());
 }
 
-TEST_CASE("writing then reading a model changes no bit", "[config][model]") {
+TEST_CASE("writing then reading a model preserves every bit", "[config][model]") {
   ThermalModel model = parse_model(with_more_terms, "model.toml");
   REQUIRE(model.terms.size() == 11);
   model.matrix_um_per_K = {{1.0 / 3.0, -0.0}, {5e-324, 1.7976931348623157e308}};
@@ -308,7 +308,7 @@ const char* const with_course =
 
 }  // namespace
 
-TEST_CASE("a model that costs the daemon too much is refused", "[config][model]") {
+TEST_CASE("a model that is too expensive for the daemon is refused", "[config][model]") {
   std::string text = good;
   for (int i = 0; i < 2000; ++i)
     text +=
@@ -320,7 +320,7 @@ TEST_CASE("a model that costs the daemon too much is refused", "[config][model]"
   CHECK(many.front().value == "2003 terms");
   CHECK(many.front().rule == "must be at most 2000");
 
-  // Of 16 time constants and 256 columns each, with gains for both outputs.
+  // 16 time constants and 256 columns each, with gains for both outputs.
   text = good;
   std::string columns;
   std::string rows;
@@ -371,7 +371,8 @@ TEST_CASE("a broken course is named by key and rule", "[config][model]") {
   CHECK_THROWS_WITH(parse_model(text, "model.toml"), Catch::Contains(said));
 }
 
-TEST_CASE("how estimates grow uncertain is read and written bit for bit", "[config][model]") {
+TEST_CASE("the uncertainty growth of estimates is read and written bit for bit",
+          "[config][model]") {
   const std::string text =
       "format = 1\ninputs = [\"a_degC\", \"b_degC\"]\noutputs = [\"z_um\"]\n"
       "reference = \"first_sample\"\nmatrix_um_per_K = [[1.0, 2.0]]\n[covariance]\n"
@@ -388,7 +389,7 @@ TEST_CASE("how estimates grow uncertain is read and written bit for bit", "[conf
   CHECK(back.covariance_growth.scatter_time_s == 71.3);
 }
 
-TEST_CASE("a covariance that is only just semidefinite is accepted", "[config][model]") {
+TEST_CASE("a barely semidefinite covariance is accepted", "[config][model]") {
   CHECK_NOTHROW(parse_model(edited(good, "[[4.0, 1.0], [1.0, 9.0]]", "[[4, 6], [6, 9]]"), "m"));
   CHECK_NOTHROW(parse_model(edited(good, "[[4.0, 1.0], [1.0, 9.0]]", "[[0, 0], [0, 0]]"), "m"));
 }

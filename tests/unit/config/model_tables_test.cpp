@@ -101,7 +101,7 @@ TEST_CASE("each broken bank or made_from is refused with file, line, key and rul
   }
 }
 
-TEST_CASE("a bank of nothing is refused", "[config][model]") {
+TEST_CASE("an empty bank is refused", "[config][model]") {
   const ModelReading reading = read_model_text(
       "format = 1\ninputs = [\"a_degC\"]\noutputs = [\"z_um\"]\nreference = \"first_sample\"\n"
       "matrix_um_per_K = [[1.0]]\n[[term]]\nkind = \"lag_bank\"\nsubjects = []\ntau_s = [0.0]\n"
@@ -129,9 +129,9 @@ TEST_CASE("a bank and what a model was made from are read and written bit for bi
   CHECK(write_model(back) == write_model(model));
 }
 
-TEST_CASE("a model is compared where each output has errors on rows left out", "[config][model]") {
+TEST_CASE("a model is compared if each output has errors on rows left out", "[config][model]") {
   ThermalModel model = parse_model(good, "model.toml");
-  CHECK_FALSE(is_compared(model));  // nothing is said of the second output
+  CHECK_FALSE(is_compared(model));  // no data on the second output
   model.made_from->outputs["c_urad"] = {};
   CHECK(is_compared(model));
   model.made_from.reset();  // an example, or computed from a structure
@@ -145,7 +145,7 @@ TEST_CASE("the commented example of a bank of lags loads", "[config][model]") {
   CHECK(model.made_from->columns.size() == 3);
 }
 
-TEST_CASE("runs of the same file overlap where rows are in both", "[config][run]") {
+TEST_CASE("runs of the same file overlap if they have common rows", "[config][run]") {
   const std::string text = "time_s,a_degC\n0,1\n1,1\n2,1\n3,1\n";
   const auto run = [&](const char* name, double from_s, double to_s) {
     RunSelection selection;

@@ -16,7 +16,7 @@ std::string nested(std::size_t depth) {
 
 }  // namespace
 
-TEST_CASE("JSON from outside is taken up to its limits and refused beyond", "[json]") {
+TEST_CASE("JSON from outside is accepted up to its limits and refused beyond", "[json]") {
   CHECK(parse_outer_json(nested(16)).is_array());
   CHECK_THROWS_WITH(parse_outer_json(nested(17)), Contains("at most 16 deep"));
   CHECK_THROWS_AS(parse_outer_json(nested(2'000'000)), JsonError);
@@ -30,7 +30,7 @@ TEST_CASE("JSON from outside is taken up to its limits and refused beyond", "[js
     CHECK_THROWS_WITH(parse_outer_json(bad), Contains("JSON in UTF-8"));
 }
 
-TEST_CASE("brackets in strings neither count nor hide others", "[json]") {
+TEST_CASE("brackets in strings are not counted and do not hide others", "[json]") {
   const std::string brackets = "\"" + std::string(100, '[') + "\\\"" + std::string(100, ']') + "\"";
   CHECK(parse_outer_json(brackets).is_string());
   CHECK_THROWS_AS(parse_outer_json("[" + brackets + "," + nested(100) + "]"), JsonError);

@@ -32,10 +32,10 @@ TEST_CASE("a key of the middle one of three tables hides the lowest one's") {
   const TomlTable table = top.root().over(middle.root()).over(low.root());
   CHECK(table.integer("a", 0, 9) == 2);
   CHECK(table.integer("b", 0, 9) == 4);
-  CHECK(low.all_problems().empty());  // a is known, though nobody saw its value
+  CHECK(low.all_problems().empty());  // a is known, although its value was not used
 }
 
-TEST_CASE("every preset that is delivered gives every channel for every type it knows") {
+TEST_CASE("every installed preset has every channel for each of its types") {
   const std::filesystem::path folder =
       std::filesystem::path(THERMOCOMP_SOURCE) / "config" / "devices";
   Presets presets({folder});
@@ -68,11 +68,11 @@ TEST_CASE("every preset that is delivered gives every channel for every type it 
   CHECK(channels > 80);
   for (const Problem& problem : presets.problems()) {
     INFO(to_string(problem));
-    CHECK(problem.rule == "unknown key");  // of the protocols that were left out here
+    CHECK(problem.rule == "unknown key");  // of the other protocols
   }
 }
 
-TEST_CASE("base_address moves the registers of a device, but no bits, and must not pass the last") {
+TEST_CASE("base_address moves the registers of a device, not its bits, within the address range") {
   const TomlDocument device = TomlDocument::from_text(
       "table = \"input\"\nencoding = \"int16\"\nbase_address = 100\n", "device.toml");
   const TomlDocument sensor = TomlDocument::from_text(
@@ -85,7 +85,7 @@ TEST_CASE("base_address moves the registers of a device, but no bits, and must n
   CHECK(far.all_problems().size() == 1);
 }
 
-TEST_CASE("a code of a signed number may be given as its bits") {
+TEST_CASE("a code of a signed number may be given as its bit pattern") {
   const TomlDocument device = TomlDocument::from_text(
       "table = \"input\"\nencoding = \"int16\"\nopen_circuit_codes = [0x8000, 0x7FFF, 0xFFFF]\n"
       "error_codes = [-1]\n",
@@ -96,18 +96,18 @@ TEST_CASE("a code of a signed number may be given as its bits") {
   CHECK(channel.sentinels[0].code == -32768);
   CHECK(channel.sentinels[1].code == 32767);
   CHECK(channel.sentinels[2].code == -1);
-  REQUIRE(device.all_problems().size() == 1);  // 0xFFFF and -1 are the same
+  REQUIRE(device.all_problems().size() == 1);  // 0xFFFF and -1 are equal
   CHECK(device.all_problems()[0].key == "error_codes");
 }
 
-TEST_CASE("without folders no preset is looked for and none is a problem") {
+TEST_CASE("without folders presets are not searched for, and missing ones are not a problem") {
   Presets presets({});
   const TomlDocument device = TomlDocument::from_text("preset = \"wago_750_458\"\n", "d.toml");
   CHECK(presets.of_device(device.root()) == nullptr);
   CHECK(device.all_problems().empty());
 }
 
-TEST_CASE("a configuration kept with a history loads without the presets it names") {
+TEST_CASE("a configuration in a history loads without its presets") {
   const std::string text = R"(format = 1
 [model]
 file = "m.toml"

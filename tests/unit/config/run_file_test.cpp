@@ -36,7 +36,7 @@ struct BadRun {
 
 }  // namespace
 
-TEST_CASE("a room is known by the beginning of a word", "[runs]") {
+TEST_CASE("a room temperature is recognised by the beginning of a word", "[runs]") {
   for (const char* name :
        {"room_degC", "t_room_degC", "Raumluft_degC", "ambient2_degC", "roomtemp"})
     CHECK(is_called_like_a_room(name));
@@ -67,7 +67,7 @@ TEST_CASE("line ends, byte order mark, blanks and empty last lines do not matter
   CHECK(parse("time_s\n0\n1").rows() == 2);
 }
 
-TEST_CASE("each bad run file is refused with file, line, column and rule", "[config][run]") {
+TEST_CASE("each invalid run file is refused with file, line, column and rule", "[config][run]") {
   const std::vector<BadRun> table = {
       {"nothing", "", 0, "", "no header"},
       {"comments only", "# a\n# b\n", 0, "", "no header"},
@@ -107,15 +107,14 @@ TEST_CASE("each bad run file is refused with file, line, column and rule", "[con
   }
 }
 
-TEST_CASE("several problems of a run file are reported at once, but not without end",
-          "[config][run]") {
+TEST_CASE("several problems of a run file are reported at once, up to a limit", "[config][run]") {
   CHECK(problems_of([] { return parse("time_s,a,b\n0,x,y\n0,1\n-1,2,3\n"); }).size() == 4);
   std::string text = "time_s,a\n";
   for (int i = 0; i < 1000; ++i) text += std::to_string(i) + ",x\n";
   CHECK(problems_of([&] { return parse(text); }).size() == 100);
 }
 
-TEST_CASE("writing then reading a run changes no bit", "[config][run]") {
+TEST_CASE("writing then reading a run preserves every bit", "[config][run]") {
   RunFile run;
   run.columns = {"time_s", "a"};
   run.values = {{0.1, 1.0 / 3.0, 1e9}, {-0.0, std::nan(""), 5e-324}};
@@ -128,8 +127,7 @@ TEST_CASE("writing then reading a run changes no bit", "[config][run]") {
   CHECK(write_run(back) == write_run(run));
 }
 
-TEST_CASE("a number is read as the double nearest to it, however it is written",
-          "[config][run][property]") {
+TEST_CASE("a number in any form is read as the nearest double", "[config][run][property]") {
   std::vector<std::string> texts{"0",
                                  "-0",
                                  "7",
@@ -178,7 +176,7 @@ TEST_CASE("a number is read as the double nearest to it, however it is written",
   }
 }
 
-TEST_CASE("what only begins like a number is refused", "[config][run]") {
+TEST_CASE("a field that only begins with a number is refused", "[config][run]") {
   for (const char* text : {"-", "1-", "1.2.3", "1.5x", "12 3", "1,", "--1", "1.e", "0x10"}) {
     INFO(text);
     CHECK_THROWS_AS(parse(std::string("time_s,z_um\n0,").append(text).append("\n")),
@@ -203,13 +201,13 @@ TEST_CASE("a selection is a half-open interval of time, and the run stays whole"
   CHECK(selected("run.csv@-5:1e9") == std::pair<std::size_t, std::size_t>(0, 3));
 }
 
-TEST_CASE("the file's name may hold an @", "[config][run]") {
+TEST_CASE("the file's name may contain an @", "[config][run]") {
   CHECK(parse_selection("a@b.csv").file == "a@b.csv");
   CHECK(parse_selection("a@b.csv@1:2").file == "a@b.csv");
   CHECK(parse_selection("c:/runs/a@b.csv").file == "c:/runs/a@b.csv");
 }
 
-TEST_CASE("selections that mean nothing are refused", "[config][run]") {
+TEST_CASE("invalid selections are refused", "[config][run]") {
   for (const char* argument : {"", "run.csv@x:", "run.csv@1:y", "run.csv@5:5", "run.csv@6:5",
                                "run.csv@nan:5", "run.csv@0:inf", "@1:2"}) {
     INFO(argument);
@@ -221,7 +219,7 @@ TEST_CASE("selections that mean nothing are refused", "[config][run]") {
   CHECK_THAT(problems.front().rule, Catch::Contains("selects no row"));
 }
 
-TEST_CASE("a column that is asked for and missing is named with its file", "[config][run]") {
+TEST_CASE("a missing column is named with its file", "[config][run]") {
   const RunFile run = parse(good);
   const auto problems = problems_of([&] { return run.column("t9_degC"); });
   REQUIRE(problems.size() == 1);

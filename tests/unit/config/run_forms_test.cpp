@@ -1,4 +1,4 @@
-// Run files as people have them: what is understood, line by line, and what is asked for.
+// Run files of other programs: how they are read, and which ambiguities are reported.
 #include <cmath>
 
 #include "config/run_forms/column_map.hpp"
@@ -142,7 +142,7 @@ struct Unclear {
 
 }  // namespace
 
-TEST_CASE("files as people have them are read, and what was understood is reported line by line",
+TEST_CASE("files of other programs are read, and their interpretation is reported line by line",
           "[config][run]") {
   for (const Form& form : forms) {
     INFO(form.what);
@@ -161,7 +161,7 @@ TEST_CASE("files as people have them are read, and what was understood is report
   }
 }
 
-TEST_CASE("what programs write is read as ever, and nothing is reported", "[config][run]") {
+TEST_CASE("our own form is read without a report", "[config][run]") {
   const std::string own = "time_s,t1_degC,z_um,door\n0,20.5,1,0\n";
   CHECK(read(own).understood.empty());
   CHECK(read(own, "[columns]\n\"T1\" = \"t1_degC\"\n").understood.empty());
@@ -175,7 +175,7 @@ TEST_CASE("what programs write is read as ever, and nothing is reported", "[conf
   }
 }
 
-TEST_CASE("what may mean two things is asked for, with the line to write", "[config][run]") {
+TEST_CASE("an ambiguity is reported with the line to write", "[config][run]") {
   const std::vector<Unclear> table = {
       {"no unit", "time_s;T1\n0;20,5\n", 1, "\"T1\" = \"T1_degC\""},
       {"an unknown unit", "time_s;p [bar]\n0;20,5\n", 1, "\"p [bar]\" = \"p_bar\""},
@@ -250,14 +250,13 @@ TEST_CASE("a map is read strictly", "[config][run]") {
   }
 }
 
-TEST_CASE("a map may say its format, as every other file", "[config][run]") {
+TEST_CASE("a map may have a format, like every other file", "[config][run]") {
   CHECK(parse_column_map("format = 1\nignore = [\"x\"]", "map.toml").ignored ==
         std::vector<std::string>{"x"});
   CHECK(problems_of([] { return parse_column_map("format = 2", "map.toml"); }).size() == 1);
 }
 
-TEST_CASE("a displacement that nobody measured is said to be missing, with what to do",
-          "[config][run]") {
+TEST_CASE("a missing displacement is reported with a remedy", "[config][run]") {
   const auto rule_of = [](const std::string& more) {
     const auto problems = problems_of(
         [&] { return read("time_s,bed_degC,z_offset_um" + more + "\n0,20,1,2\n").column("z_um"); });
@@ -268,7 +267,7 @@ TEST_CASE("a displacement that nobody measured is said to be missing, with what 
   CHECK_THAT(rule_of(",x_um"), !Catch::Contains("thermocomp measured"));
 }
 
-TEST_CASE("a map that leaves a unit out is reported the name with it", "[config][run]") {
+TEST_CASE("a map with a missing unit is reported with the full name", "[config][run]") {
   const auto problems = problems_of([&] {
     return read("Time [s];Temp. t1 [°C];Temp. t7 [°C]\n0;20,5;21\n",
                 "[columns]\n\"Temp. t7\" = \"t7_degC\"");
@@ -277,14 +276,14 @@ TEST_CASE("a map that leaves a unit out is reported the name with it", "[config]
   CHECK_THAT(problems.front().rule, Catch::Contains("'Temp. t7 [°C]' is"));
 }
 
-TEST_CASE("a displacement that is asked for and stands there in mm is told of", "[config][run]") {
+TEST_CASE("a requested displacement that exists in mm is reported", "[config][run]") {
   const RunFile run = read("Time [s];z (mm)\n0;0,5\n");
   const auto problems = problems_of([&] { return run.column("z_um"); });
   REQUIRE(problems.size() == 1);
   CHECK_THAT(problems.front().rule, Catch::Contains("z_mm") && Catch::Contains("--columns"));
 }
 
-TEST_CASE("the commented example of a map is read, and reads", "[config][run]") {
+TEST_CASE("the commented example of a map loads and works", "[config][run]") {
   const ColumnMap map =
       load_column_map(std::filesystem::path(THERMOCOMP_EXAMPLES) / "columns.toml");
   const RunFile run = parse_run(

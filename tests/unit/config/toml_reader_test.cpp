@@ -28,7 +28,7 @@ std::vector<std::string> told(const TomlDocument& read) {
 
 }  // namespace
 
-TEST_CASE("what is read in full has no problem", "[config][toml]") {
+TEST_CASE("a completely read document has no problem", "[config][toml]") {
   const TomlDocument read = document(
       "a = 1\nb = 2.5\nc = \"x\"\nd = true\ne = [1, 2.0]\nf = [\"p\"]\ng = [3]\n"
       "m = [[1, 2], [3, 4]]\n[t]\nu = 7\n[[l]]\nname = \"first\"\n[[l]]\nname = \"second\"\n");
@@ -66,7 +66,7 @@ TEST_CASE("each problem names file, line, key, value and rule", "[config][toml]"
                                  "a.toml:4: speling = 1: unknown key; did you mean \"spelling\"?"});
 }
 
-TEST_CASE("numbers that are none, or beyond their range, are refused", "[config][toml]") {
+TEST_CASE("values that are not numbers, or out of range, are refused", "[config][toml]") {
   for (const char* value :
        {"nan", "inf", "-inf", "true", "\"1\"", "[1]", "-0.5", "3.5", "1979-05-27"}) {
     INFO(value);
@@ -82,7 +82,7 @@ TEST_CASE("numbers that are none, or beyond their range, are refused", "[config]
   }
 }
 
-TEST_CASE("an excluded bound is excluded and the other is not", "[config][toml]") {
+TEST_CASE("an excluded bound is refused and the other is accepted", "[config][toml]") {
   CHECK_FALSE(Range::above(0, 500).contains(0));
   CHECK(Range::above(0, 500).contains(500));
   CHECK(Range::above(0, 500).rule() == "must be in (0, 500]");
@@ -91,7 +91,7 @@ TEST_CASE("an excluded bound is excluded and the other is not", "[config][toml]"
   CHECK_FALSE(Range::any().contains(std::numeric_limits<double>::quiet_NaN()));
 }
 
-TEST_CASE("every bad element of a list is reported and the count stays", "[config][toml]") {
+TEST_CASE("every invalid element of a list is reported and the count is kept", "[config][toml]") {
   const TomlDocument read = document("a = [1, \"x\", 3, nan]\nb = [\"p\", 5]\nm = [[1], [1, 2]]\n");
   CHECK(read.root().numbers("a").size() == 4);
   CHECK(read.root().texts("b").size() == 2);
@@ -99,7 +99,7 @@ TEST_CASE("every bad element of a list is reported and the count stays", "[confi
   CHECK(told(read).size() == 4);
 }
 
-TEST_CASE("nothing is said about the inside of a table that is missing", "[config][toml]") {
+TEST_CASE("no problems are reported inside a missing table", "[config][toml]") {
   const TomlDocument read = document("other = 5\n");
   const TomlTable absent = read.root().table("needed");
   CHECK_FALSE(absent);
@@ -109,31 +109,30 @@ TEST_CASE("nothing is said about the inside of a table that is missing", "[confi
   CHECK(told(read) == std::vector<std::string>{"a.toml:1: needed = (missing): must be given"});
 }
 
-TEST_CASE("a section that may be left out still requires its keys", "[config][toml]") {
+TEST_CASE("an optional section still requires its keys", "[config][toml]") {
   const TomlDocument read = document("");
   CHECK(read.root().table_or_empty("section").text("x").empty());
   CHECK(told(read).size() == 1);
 }
 
-TEST_CASE("nothing is suggested where nothing is near", "[config][toml]") {
+TEST_CASE("no suggestion without a near name", "[config][toml]") {
   CHECK(nearest_name("prot", {"host", "port", "unit"}) == "port");
   CHECK(nearest_name("temperature", {"host", "port"}).empty());
   CHECK(nearest_name("x", {"y"}).empty());
-  // Either may have been meant.
+  // Ambiguous.
   CHECK(nearest_name("NearTheSpindle", {"NearTheSp_01", "NearTheSp_02"}).empty());
   CHECK(nearest_name("Temp_3", {"Temp_1", "Temp_2"}).empty());
   CHECK(nearest_name("Tmp_01", {"Temp_01", "Temp_02"}) == "Temp_01");
 }
 
-TEST_CASE("numbers are written so that they read back to the same bits", "[config]") {
+TEST_CASE("numbers are written so that they parse to the same bits", "[config]") {
   for (const double value : {0.1, 1.0 / 3.0, 5e-324, 1.7976931348623157e308, -0.0, 1e22}) {
     CHECK(std::strtod(number_text(value).c_str(), nullptr) == value);
   }
   CHECK(number_text(-std::numeric_limits<double>::quiet_NaN()) == "nan");
 }
 
-TEST_CASE("a problem stays on its line whatever its names hold, and shows an empty name",
-          "[config][toml]") {
+TEST_CASE("a problem stays on one line for any names, and shows an empty name", "[config][toml]") {
   const TomlDocument read = document("\"a\\nb\\u001b[2J\" = 1\nname = \"x\"\n");
   read.root().problem("name", "", "is no name");
   const std::vector<std::string> lines = told(read);
@@ -144,8 +143,7 @@ TEST_CASE("a problem stays on its line whatever its names hold, and shows an emp
   CHECK(lines[1] == "a.toml:2: name = \"\": is no name");
 }
 
-TEST_CASE("what is nested too deep is refused with its line, before it is parsed",
-          "[config][toml]") {
+TEST_CASE("too deep nesting is refused with its line, before parsing", "[config][toml]") {
   const auto repeated = [](const std::string& part, int count) {
     std::string text;
     for (int i = 0; i < count; ++i) text += part;
@@ -170,7 +168,7 @@ TEST_CASE("what is nested too deep is refused with its line, before it is parsed
   }
 }
 
-TEST_CASE("what is not nested is not counted as such", "[config][toml]") {
+TEST_CASE("brackets and dots without nesting are not counted", "[config][toml]") {
   CHECK_NOTHROW(document(
       "a = \"[[[[[[[[[[[[[[[[[[[[ a.b.c.d.e.f.g.h.i.j.k.l.m.n.o.p.q.r \\\" [\"\n# "
       "[[[[[[[[[[[[[[[[[\n"
@@ -180,7 +178,7 @@ TEST_CASE("what is not nested is not counted as such", "[config][toml]") {
       "[[t.u]]\n[[t.u]]\n[t.v.w]\nx.y = [[1], [2], [3]]\n"));
 }
 
-TEST_CASE("too many keys and elements are refused before they are parsed", "[config][toml]") {
+TEST_CASE("too many keys and elements are refused before parsing", "[config][toml]") {
   std::string keys;
   for (int i = 0; i < 50'001; ++i) keys.append("k").append(std::to_string(i)).append(" = 1\n");
   CHECK_THROWS_WITH(document(keys), Catch::Contains("a.toml:50001: must have at most 50000 keys"));
@@ -188,7 +186,7 @@ TEST_CASE("too many keys and elements are refused before they are parsed", "[con
                     Catch::Contains("at most 1000000 elements"));
 }
 
-TEST_CASE("of many problems a hundred are reported and the rest is counted", "[config][toml]") {
+TEST_CASE("a hundred problems are reported and the rest is counted", "[config][toml]") {
   std::string text;
   for (int i = 0; i < 400; ++i) {
     text.append("unknown_").append(std::to_string(i)).append(" = 1\n");
@@ -201,8 +199,7 @@ TEST_CASE("of many problems a hundred are reported and the rest is counted", "[c
   CHECK(lines.back() == "a.toml: and 300 more problems");
 }
 
-TEST_CASE("names that command a terminal are refused, and never told as they are",
-          "[config][toml]") {
+TEST_CASE("names with control codes are refused, and never printed as they are", "[config][toml]") {
   const std::string odd = GENERATE(as<std::string>(), "\\u001b[2J", "\xE2\x80\xAE", "\\u2066",
                                    "\\u0085", "\\u200b", "\\uFEFF");
   const TomlDocument read =
@@ -215,7 +212,7 @@ TEST_CASE("names that command a terminal are refused, and never told as they are
   for (const std::string& line : lines) CHECK(is_printable(line));
 }
 
-TEST_CASE("a key as long as the file does not make the error so long", "[config][toml]") {
+TEST_CASE("a very long key does not make the error very long", "[config][toml]") {
   const TomlDocument read = document(std::string(100'000, 'k') + " = 1\n");
   CHECK(!read.root().has("known"));
   const auto lines = told(read);

@@ -24,7 +24,7 @@ TEST_CASE("a column without a registered suffix is a signal without unit", "[con
   }
 }
 
-TEST_CASE("names that a run file cannot carry are not column names", "[config][units]") {
+TEST_CASE("names that a run file cannot contain are not column names", "[config][units]") {
   for (const char* name : {"t1_degC", "oil temperature_degC", "\xC3\xB6l_degC"}) {
     CHECK(is_column_name(name));
   }
