@@ -178,7 +178,7 @@ TEST_CASE("a dry run is possible with any controller", "[config]") {
     CHECK(config.estimator.correction.measured == MeasuredMeaning::total);
     CHECK(restart_needed(real, config) == std::vector<std::string>{"dry_run of the controller"});
   }
-  CHECK(load_daemon_config(examples / "modbus_rtu.toml").dry_run);  // it has no controller
+  CHECK(load_daemon_config(examples / "modbus_rtu.toml").dry_run);  // the kind without a controller
 }
 
 TEST_CASE("without an applied offset the controller has no read-back", "[config]") {
