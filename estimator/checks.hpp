@@ -1,5 +1,5 @@
-/// The two ways of refusing: `ensure` for bugs of ours (aborts with the expression), `require` for
-/// a value somebody chose (throws with name, value and rule).
+/// The two kinds of checks: THERMOCOMP_ENSURE for bugs (aborts with the expression), `require` for
+/// bad input (throws with name, value and rule).
 #pragma once
 
 #include <stdexcept>
@@ -24,8 +24,8 @@ class InvalidValue : public std::invalid_argument {
 /// @throws InvalidValue unless `holds`
 void require(bool holds, const char* key, double value, const char* rule);
 
-/// A number of the configuration in one place: its key, its member and its range. The reader of the
-/// file, the check and the message come from there.
+/// Key, member and range of a number of the configuration, for the reader of the file, the check
+/// and the message.
 template <class Config>
 struct NumberKey {
   const char* key{nullptr};
@@ -41,11 +41,10 @@ struct NumberKey {
   }
 };
 
-/// @throws InvalidValue unless `value` is in [min, max], or in (min, max]; its rule is "must be in
-///         (0, 1e6]"
+/// @throws InvalidValue unless `value` is in [min, max], or (min, max]; rule: "must be in (0, 1e6]"
 void require_in(double value, const char* key, double min, double max, bool min_excluded);
 
-/// @throws InvalidValue at the first of Config::numbers() that is not in its range
+/// @throws InvalidValue at the first of Config::numbers() outside its range
 template <class Config>
 void require_numbers(const Config& config) {
   for (const NumberKey<Config>& each : Config::numbers())
@@ -56,6 +55,6 @@ void require_numbers(const Config& config) {
 
 }  // namespace thermocomp
 
-/// Always on: a broken promise of our own code ends the program with the expression.
+/// Always on: aborts with the expression if it is false.
 #define THERMOCOMP_ENSURE(expression) \
   ((expression) ? static_cast<void>(0) : ::thermocomp::abort_with(#expression, __FILE__, __LINE__))

@@ -1,4 +1,4 @@
-/// What the estimator is built from: plain structures, filled by config/ or by a test.
+/// Configuration of the estimator, filled by config/ or by a test.
 #pragma once
 
 #include <algorithm>
@@ -22,35 +22,35 @@ enum class CorrectionForm {
   off,
   two_phase,
   recursive,
-  constant  ///< Ci of the publication's earlier form, Ki (A - B) - Ci; the gains stay
+  constant  ///< Ci of the earlier form Ki (A - B) - Ci; the gains stay
 };
-/// two_phase, phase 1 (Teratani et al. 1995).
+/// First gain of two_phase (Teratani et al. 1995).
 enum class FirstGain {
-  consistent,  ///< the estimate becomes what was measured
-  eq_34,       ///< measured / predicted: right only while the tie is cold
-  eq_31        ///< measured / the heat source's share: right only while the tie is cold
+  consistent,  ///< the estimate becomes the measured value
+  eq_34,       ///< measured / predicted: valid only while the tie is cold
+  eq_31        ///< measured / the heat source's share: valid only while the tie is cold
 };
-/// What an operator's or a probe's `measured` is: what remains at the tool with the offset in
-/// effect, or the displacement as it would be without any.
+/// Meaning of a `measured` value: displacement that remains at the tool with the offset in effect,
+/// or the displacement without any offset.
 enum class MeasuredMeaning { remaining, total };
 
 struct CorrectionConfig {
   CorrectionForm form{CorrectionForm::off};
-  /// Inputs that share a gain. two_phase: two groups, the heat source's and the tie's.
+  /// Inputs that share a gain. two_phase: two groups, heat source and tie.
   std::vector<std::vector<std::string>> groups;
   MeasuredMeaning measured{MeasuredMeaning::remaining};
   FirstGain first_gain{FirstGain::consistent};
-  double noise_um{1.0};  ///< standard deviation of a probing
-  double turn_um{3.0};   ///< two_phase: phase 2 begins once it has come back by this much
-  double contribution_um_min{3.0};  ///< a smaller one cannot tell its gain
+  double noise_um{1.0};             ///< standard deviation of a probing
+  double turn_um{3.0};              ///< two_phase: return from the extreme that begins phase 2
+  double contribution_um_min{3.0};  ///< a smaller one does not determine its gain
   double gain_min{0.3};
   double gain_max{3.0};
-  double step_um_max{10.0};  ///< one probing moves the estimate by no more
-  double gain_sd{0.3};       ///< recursive: what a gain may be off by before any probing
+  double step_um_max{10.0};  ///< largest change of the estimate by one probing
+  double gain_sd{0.3};       ///< recursive: standard deviation of a gain before any probing
   double gain_drift_per_sqrt_h{0.1};
   double bias_drift_um_per_sqrt_h{0.0};  ///< 0: no bias is learned
   double outlier_sigma{4.0};
-  double probe_sd_um{3.0};  ///< beyond, a new probing is worth it
+  double probe_sd_um{3.0};  ///< beyond this a new probing is requested
 
   static constexpr auto numbers() {
     using Key = NumberKey<CorrectionConfig>;
@@ -73,16 +73,16 @@ struct CorrectionConfig {
   bool operator==(const CorrectionConfig&) const = default;
 };
 
-/// Which readings are refused before they can do harm.
+/// Limits of the screening of readings.
 struct ScreeningConfig {
   double temp_degC_min{-30.0};
   double temp_degC_max{200.0};
-  double stale_after_s{5.0};     ///< age beyond which a reading is stale
-  double rate_K_per_s_max{0.5};  ///< fastest believable slew
-  double rate_allowance_K{1.0};  ///< what noise may add to a step [K]
-  double outage_K_max{10.0};     ///< largest change over an outage, and 10 K/h more
-  double settle_s{10.0};         ///< how long a value must last before it counts; 0: at once
-  double stuck_after_s{0.0};     ///< the same value for this long is a fault; 0: never
+  double stale_after_s{5.0};
+  double rate_K_per_s_max{0.5};  ///< fastest accepted slew
+  double rate_allowance_K{1.0};  ///< allowance for noise in a step [K]
+  double outage_K_max{10.0};     ///< largest change over an outage, plus 10 K/h
+  double settle_s{10.0};         ///< time that a value must last before it counts; 0: at once
+  double stuck_after_s{0.0};     ///< a value unchanged for longer is a fault; 0: never
 
   static constexpr auto numbers() {
     using Key = NumberKey<ScreeningConfig>;
@@ -112,7 +112,7 @@ struct SmoothingConfig {
   SmoothingHistory history{SmoothingHistory::screened};
   double period_s{60.0};     ///< one value of the sensor per period; 0: every reading
   std::size_t samples{6};    ///< n, values in a line (3..32)
-  std::size_t blocks{3};     ///< line_of_lines: lines that the expected one follows (1..6)
+  std::size_t blocks{3};     ///< line_of_lines: number of lines extrapolated from (1..6)
   double half_width_K{0.3};  ///< w, half the band
   double outage_s{5.0};      ///< a gap longer than this and than two periods restarts the history
 
@@ -130,25 +130,25 @@ struct SmoothingConfig {
 
 struct SensorConfig {
   std::string name;
-  std::string module{};                         ///< the device that reads it; "": one of its own
+  std::string module{};  ///< the device that reads it; "": a device of its own
   std::optional<std::size_t> reference_sensor;  ///< the value is the difference to this sensor
   ScreeningConfig screening;
   SmoothingConfig smoothing;
 };
 
-/// A part of the structure that has one temperature: the mean of its sensors.
+/// A part of the structure with one temperature, the mean of its sensors.
 struct BlockConfig {
   std::string name;
   std::string input;                 ///< temperature column of the model
   std::vector<std::size_t> sensors;  ///< indices, at least one
 };
 
-/// No axis may be given a larger bound.
+/// Largest bound that any axis may be given.
 inline constexpr double offset_um_max_of_any_axis = 500.0;
 
 struct LimiterConfig {
-  double offset_um_max{50.0};     ///< bound on |offset| of an axis [um]
-  double rate_um_per_s_max{1.0};  ///< slew bound of an axis [um/s]
+  double offset_um_max{50.0};
+  double rate_um_per_s_max{1.0};
 
   static constexpr auto numbers() {
     using Key = NumberKey<LimiterConfig>;
@@ -161,27 +161,26 @@ struct LimiterConfig {
   void validate() const { require_numbers(*this); }  ///< @throws InvalidValue
 };
 
-/// What the controller makes of the offsets at the nodes of an axis' travel.
+/// How the controller interpolates the offsets along an axis' travel.
 enum class TravelForm : std::uint8_t {
-  line,  ///< two nodes, the ends: the straight line between them, the nearest to the curve
-  table  ///< straight from node to node
+  line,  ///< straight line between two nodes, the ends, fitted to the curve
+  table  ///< linear from node to node
 };
 
-/// A place of an axis' travel that has an offset of its own: the controller interpolates between
-/// the nodes by the position that it has itself. What is bounded and slew-limited at each node is
-/// so everywhere between them.
+/// A position of an axis' travel with an offset of its own. The controller interpolates between the
+/// nodes by its own position, so bound and slew limit of the nodes hold everywhere between them.
 struct TravelNode {
-  std::string axis;      ///< whose travel: "x"; its nodes stand next to each other, by position
+  std::string axis;  ///< axis of the travel, "x"; its nodes are adjacent and in order of position
   std::string position;  ///< position signal of the model, "x_mm"
   double position_mm{0.0};
   TravelForm form{TravelForm::table};
 };
 
-/// An axis (or rotary axis: um reads urad) that takes an offset, or one node of its travel.
+/// An axis with an offset (for a rotary axis, um reads urad), or one node of its travel.
 struct AxisConfig {
   std::string name;    ///< "z"
   std::string output;  ///< output of the model whose negative is sent
-  double sign{1.0};    ///< +1, or -1 where the controller counts the offset the other way
+  double sign{1.0};    ///< -1 where the controller counts the offset with the opposite sign
   LimiterConfig limiter;
   std::optional<TravelNode> node{};
 };
@@ -189,18 +188,18 @@ struct AxisConfig {
 enum class LossPolicy { hold, ramp_to_zero };
 enum class StopPolicy { hold, ramp_to_zero };
 
-/// What happens to the offset while the machine is outside what its model was made from.
+/// The offset while the machine is outside the model's domain.
 enum class OutsidePolicy {
-  warn,   ///< it follows the model; status and history say so
-  hold,   ///< it stays
-  shrink  ///< it follows the part of the displacement that is still believed
+  warn,  ///< follows the model; reported in status and history
+  hold,
+  shrink  ///< follows a share of the displacement, see ModelDomain::believed_share()
 };
 
-/// What happens to a sensor whose good values its neighbours contradict.
+/// Treatment of a sensor whose good values its neighbours contradict.
 enum class SuspectedPolicy {
-  off,        ///< nobody looks
-  warn,       ///< it is used; status and history say so
-  weigh_down  ///< its blocks do without it, where what is left is certain enough
+  off,
+  warn,       ///< it is used; reported in status and history
+  weigh_down  ///< excluded from its blocks while the estimate without it is certain enough
 };
 
 enum class UpdateRule {
@@ -212,29 +211,29 @@ struct CompensationConfig {
   UpdateRule update{UpdateRule::continuous};
   std::string cycle_end_signal;        ///< "cycle_end_on", "cycles"; empty: by command only
   std::uint64_t cycles_per_update{1};  ///< each_cycle: an update at every n-th cycle end
-  double cycle_ahead{0.0};             ///< each_cycle: share of the last change to extrapolate by
+  double cycle_ahead{0.0};  ///< each_cycle: extrapolation by this share of the last change
   LossPolicy on_loss{LossPolicy::hold};
   double hold_s{600.0};                  ///< ramp_to_zero: hold this long first
-  StopPolicy on_stop{StopPolicy::hold};  ///< where the daemon leaves the offsets when it is stopped
+  StopPolicy on_stop{StopPolicy::hold};  ///< offsets when the daemon is stopped
   double stop_ramp_s_max{120.0};         ///< ramp_to_zero: given up after this long
-  /// Without a state to go on from; false: nothing moves before an operator enables it.
+  /// Without a saved state; false: nothing moves before an operator enables it.
   bool enabled_at_first_start{false};
   bool hold_while_cutting{false};  ///< the offset changes only while cutting_signal is 0
   std::string cutting_signal;      ///< "cutting_on"; empty: none
   std::string disable_signal;      ///< "compensation_off_on": 1 disables; empty: none
   double controller_stale_after_s{2.0};
-  double mismatch_um{2.0};       ///< applied and sent may differ by this much
-  double mismatch_after_s{3.0};  ///< ... by more, for no longer than this
-  /// Without read-back and readable registers: how far the first offset after a power cut may lie
-  /// from the one sent last [um], and so how far the offset goes from the one that is saved.
+  double mismatch_um{2.0};       ///< tolerated difference between applied and sent
+  double mismatch_after_s{3.0};  ///< ... and how long a larger one is tolerated
+  /// Without read-back and readable registers: largest distance of the first offset after a power
+  /// cut from the one sent last [um], and so of the offset from the saved one.
   double restart_leap_um_max{1.0};
-  /// A block without a good sensor is estimated where the model has a covariance.
+  /// Estimates a block without a good sensor where the model has a covariance.
   bool estimate_lost_blocks{true};
-  double offset_sd_um_max{5.0};  ///< of any axis; beyond, an estimate does not serve: hold
-  OutsidePolicy outside_domain{OutsidePolicy::warn};  ///< of a model with [made_from]
-  /// Where the model has a covariance.
+  double offset_sd_um_max{5.0};  ///< of any axis; an estimate beyond it is not used: hold
+  OutsidePolicy outside_domain{OutsidePolicy::warn};  ///< for a model with [made_from]
+  /// For a model with a covariance.
   SuspectedPolicy suspected_sensors{SuspectedPolicy::warn};
-  double warm_um{5.0};  ///< warm is a machine of which no axis is to move farther than this
+  double warm_um{5.0};  ///< the machine counts as warm while no axis is to move farther than this
   double prove_um_max{10.0};
   double prove_hold_s{3.0};
 
@@ -261,9 +260,9 @@ struct CompensationConfig {
 struct EstimatorConfig {
   std::vector<SensorConfig> sensors;
   std::vector<BlockConfig> blocks;
-  std::vector<std::string> signals;  ///< what the controller reports, order of ControllerState
+  std::vector<std::string> signals;  ///< reported by the controller, order of ControllerState
   std::vector<AxisConfig> axes;
-  bool controller_reads_back{true};  ///< applied_um is reported
+  bool controller_reads_back{true};  ///< the controller reports applied_um
   CompensationConfig compensation;
   CorrectionConfig correction;
 };
@@ -276,12 +275,11 @@ struct AxisSpan {
   bool operator==(const AxisSpan&) const = default;
 };
 
-/// The name that an operator calls it by.
+/// Name in commands and reports: a node has that of its axis.
 [[nodiscard]] inline const std::string& axis_name(const AxisConfig& axis) noexcept {
   return axis.node ? axis.node->axis : axis.name;
 }
 
-/// The names of all entries.
 [[nodiscard]] inline std::vector<std::string> entry_names(const std::vector<AxisConfig>& axes) {
   std::vector<std::string> names;
   names.reserve(axes.size());
@@ -289,7 +287,7 @@ struct AxisSpan {
   return names;
 }
 
-/// In the order of the axes; together they are all entries.
+/// In the order of the axes; the spans cover all entries.
 [[nodiscard]] inline std::vector<AxisSpan> axis_spans(const std::vector<AxisConfig>& axes) {
   std::vector<AxisSpan> spans;
   for (std::size_t i = 0; i < axes.size(); ++i) {
@@ -303,15 +301,15 @@ struct AxisSpan {
   return spans;
 }
 
-/// The span that an entry is in. @pre entry < axes.size()
+/// Span that contains the entry. @pre entry < axes.size()
 [[nodiscard]] inline AxisSpan span_of(const std::vector<AxisConfig>& axes, std::size_t entry) {
   for (const AxisSpan& span : axis_spans(axes))
     if (entry < span.end()) return span;
   return {entry, 1};
 }
 
-/// What a controller that interpolates makes of the values of a travel's nodes: straight between
-/// two of them, the end's beyond the ends. No allocation.
+/// Offset at a position, as a controller interpolates it from the nodes of a travel: linear between
+/// two nodes, constant beyond the ends. No allocation.
 /// @param nodes  entries of one span, each with a node
 [[nodiscard]] inline double value_on_travel(std::span<const AxisConfig> nodes,
                                             std::span<const double> values,

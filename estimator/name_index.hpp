@@ -1,4 +1,4 @@
-/// Names to indices, once, when something is built.
+/// Mapping of names to indices, done once at construction.
 #pragma once
 
 #include <algorithm>
@@ -13,7 +13,7 @@
 namespace thermocomp {
 
 /// @return the index of `name` in `names`
-/// @throws InvalidValue with `key` and `rule` when it does not
+/// @throws InvalidValue with `key` and `rule` if it is missing
 [[nodiscard]] inline std::size_t index_of(const std::vector<std::string>& names,
                                           const std::string& name, const char* key,
                                           const char* rule) {
@@ -22,7 +22,7 @@ namespace thermocomp {
   return static_cast<std::size_t>(found - names.begin());
 }
 
-/// The index of each of our names among theirs; -1: not among them.
+/// Index of each of our names among theirs; -1: missing.
 [[nodiscard]] inline std::vector<int> plan_names(const std::vector<std::string>& ours,
                                                  const std::vector<std::string>& theirs) {
   std::vector<int> plan;
@@ -33,7 +33,7 @@ namespace thermocomp {
   return plan;
 }
 
-/// Ours are replaced by what stands under the same name.
+/// Replaces our values by theirs of the same name.
 template <class T>
 void take_by_plan(const std::vector<int>& plan, const std::vector<T>& from,
                   std::vector<T>& to) noexcept {
@@ -41,7 +41,7 @@ void take_by_plan(const std::vector<int>& plan, const std::vector<T>& from,
     if (plan[i] >= 0) to[i] = from[static_cast<std::size_t>(plan[i])];
 }
 
-/// What stands under the name, where it is a finite number.
+/// Takes the value of the name if it is finite.
 inline void take_if_finite(const std::map<std::string, double>& from, const std::string& name,
                            double& to) {
   const auto found = from.find(name);

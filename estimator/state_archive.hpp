@@ -1,4 +1,4 @@
-/// How the estimator's parts list their inner state once and get saving, loading and counting.
+/// Saving, loading and counting of the estimator's inner state, which each part lists once.
 #pragma once
 
 #include <array>
@@ -14,11 +14,11 @@
 
 namespace thermocomp {
 
-/// A part has `void visit_state(StateArchive& archive) { archive(a_, b_, c_); }`. Only numbers,
-/// enums, durations and vectors or arrays of them: no padding, so equal states are equal bytes.
+/// A part defines `void visit_state(StateArchive& archive) { archive(a_, b_, c_); }`. Only numbers,
+/// enums, durations and vectors or arrays of them: no padding, so equal states have equal bytes.
 class StateArchive {
  public:
-  /// Counts the bytes that the visited state needs.
+  /// Counts the bytes of the visited state.
   StateArchive() = default;
   /// Saves into `out`, which must be large enough (checked). Never allocates, never throws.
   explicit StateArchive(std::span<std::byte> out) : mode_(Mode::save), out_(out) {}
@@ -50,7 +50,7 @@ class StateArchive {
   void visit(std::vector<T>& values) {
     std::size_t size = values.size();
     raw(&size, sizeof size);
-    // The size is fixed by construction; another one is another layout.
+    // Sizes are fixed at construction; another size is another layout.
     if (size != values.size()) throw std::runtime_error("estimator state of another layout");
     for (T& value : values) visit(value);
   }

@@ -11,7 +11,7 @@ void add_once(std::vector<std::string>& names, const std::string& name) {
   if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
 }
 
-/// Adds those of the term's columns that are temperatures (or those that are none).
+/// Adds the temperature columns of the term, or its other columns.
 void add_columns(std::vector<std::string>& names, const TermSpec& term, bool temperatures) {
   const TermKind* kind = find_term_kind(term.kind, term.subject);
   if (kind == nullptr || kind->subject == TermSubject::output) return;

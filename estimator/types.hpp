@@ -1,6 +1,5 @@
-/// The types that drivers, estimator and daemon share: what a reading is, what the controller
-/// reported, what is sent to it. Everything here is plain data of fixed size, so that it can be
-/// copied through wait-free slots on the real-time thread.
+/// Types shared by drivers, estimator and daemon. All are plain data of fixed size, so that they
+/// can be copied through wait-free slots on the real-time thread.
 #pragma once
 
 #include <array>
@@ -27,54 +26,54 @@ inline constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 inline constexpr std::size_t axes_max = 16;     ///< axes of one controller
 inline constexpr std::size_t signals_max = 48;  ///< signals read from one controller
 
-/// Why a reading must not be used; `none` is the only good one.
+/// Reason why a reading has no usable value; `none`: the reading is good.
 enum class Fault : std::uint8_t {
   none,
-  never_read,     ///< nothing has arrived since the start
-  stale,          ///< not renewed within its time
-  open_circuit,   ///< the device says the thermocouple is broken
-  short_circuit,  ///< the device says the thermocouple is shorted
+  never_read,     ///< nothing received since the start
+  stale,          ///< not renewed within its time limit
+  open_circuit,   ///< the device reports a broken thermocouple
+  short_circuit,  ///< the device reports a shorted thermocouple
   out_of_range,   ///< outside the device's or the configured range, or not a finite number
-  too_fast,       ///< changed faster than the structure can
-  stuck,          ///< the very same value for too long
+  too_fast,       ///< changed faster than the structure can change
+  stuck,          ///< unchanged for too long
   no_answer,      ///< the unit does not answer or the bus is down
   bad_frame,      ///< the answer was garbled or of the wrong length
-  device_busy,    ///< the device answered "busy"
-  device_error,   ///< the device answered with an exception, or its status register says fault
-  unconfirmed     ///< contradicts the past, or is too new, and nothing confirms it yet
+  device_busy,
+  device_error,  ///< the device answered with an exception, or its status register shows a fault
+  unconfirmed    ///< contradicts earlier readings, or is too new, and not yet confirmed
 };
 inline constexpr std::size_t faults_count = 13;
 
-/// The fault's name as it stands in JSON, history and logs.
+/// Name of the fault in JSON, history and logs.
 [[nodiscard]] std::string_view to_string(Fault fault) noexcept;
 
-/// A value, when it was taken and whether it may be believed. Times are CLOCK_MONOTONIC.
+/// A temperature with its time (CLOCK_MONOTONIC) and fault.
 struct Reading {
   double temp_degC{not_a_number};
   nanoseconds taken_at{};
   Fault fault{Fault::never_read};
 };
 
-/// An epoch of a link numbers in its low bits the link itself (connected, reconnected, offsets
-/// taken again) and above them the pauses of one and the same link: something was read back that
-/// nothing sent explains, a write was refused, or the cycle stood still.
+/// A link epoch holds the number of the link in its low bits (new after a connection, a
+/// reconnection, or when offsets are taken again) and above them the number of pauses of that link
+/// (unexplained read-back, refused write, stalled cycle).
 inline constexpr std::uint32_t epochs_of_a_link = 1u << 20;
 
-/// Whether two epochs are of one link, so that what was sent in one still counts in the other.
+/// True if both epochs belong to one link, so that offsets sent in one still count in the other.
 [[nodiscard]] constexpr bool is_same_link(std::uint32_t a, std::uint32_t b) noexcept {
   return a % epochs_of_a_link == b % epochs_of_a_link;
 }
 
-/// What the controller last reported. Values it does not report are NaN.
+/// Newest report of the controller; NaN where it reports no value.
 struct ControllerState {
   nanoseconds taken_at{};
-  /// Changes each time the link is (re)established or pauses: a command of another epoch was
-  /// computed without knowing what is applied now. 0: never connected.
+  /// Changes when the link is established, re-established or paused: a command of another epoch was
+  /// computed without knowing the offset applied now. 0: never connected.
   std::uint32_t link_epoch{0};
-  std::uint64_t look{0};  ///< the link's number of this read-back, counted up
+  std::uint64_t look{0};  ///< sequence number of this read-back
   bool online{false};
-  /// A write of the newest offsets was confirmed within the last few periods of the link: answered
-  /// on Modbus, sent on CAN, taken by the bridge.
+  /// The newest offsets were confirmed within the last few periods of the link: answered on Modbus,
+  /// sent on CAN, taken by the bridge.
   bool written{false};
   std::array<double, axes_max> applied_um{};  ///< offset in effect, order of the axes [um]
   std::array<double, signals_max> signals{};  ///< order of the configuration, unit of the name
@@ -85,21 +84,21 @@ struct ControllerState {
   }
 };
 
-/// What the cycle wants the controller to apply.
+/// Offsets that the cycle sends to the controller.
 struct OffsetCommand {
   std::array<double, axes_max> offset_um{};  ///< absolute, order of the axes [um]
   std::array<bool, axes_max> valid{};        ///< false: this axis must not be driven
-  /// The link epoch these offsets belong to; a controller link never sends offsets of another one.
+  /// Link epoch of these offsets; a controller link sends only offsets of its own epoch.
   std::uint32_t link_epoch{0};
-  /// The ControllerState they were computed from: an axis is not driven away from where it was seen
-  /// last by what did not know of it.
+  /// ControllerState::look that they were computed from; the link does not use them to move an axis
+  /// away from a newer read-back.
   std::uint64_t look{0};
 };
 
-/// What an operator (or the CNC program) asks of the estimator, or the daemon that is about to end
-/// (`stop`: offsets to zero and nowhere else; the operator's switch stays as it is). `release` ends
-/// a latched mismatch of an axis, or an unknown start; `accept` confirms the unconfirmed reading of
-/// a sensor; `saved`: a state with this offset of the axis is on disk.
+/// Commands of an operator or of the CNC program. `stop` comes from the daemon before it ends:
+/// offsets to zero; the operator's switch keeps its state. `release` ends a latched mismatch or an
+/// unknown start of an axis; `accept` confirms the unconfirmed reading of a sensor; `saved`: a
+/// state with this offset of the axis is on disk.
 enum class CommandKind : std::uint8_t {
   enable,
   disable,
@@ -115,36 +114,35 @@ enum class CommandKind : std::uint8_t {
 inline constexpr std::size_t command_kinds_count = 10;
 [[nodiscard]] std::string_view to_string(CommandKind kind) noexcept;
 
-/// Where a `measured` comes from.
+/// Origin of a `measured` value.
 enum class MeasuredSource : std::uint8_t {
   probe,  ///< a probe or indicator on the machine
-  part,   ///< a part that was measured
-  wear    ///< the same, and the operator has entered its negative at the controller already
+  part,   ///< a measured part
+  wear    ///< a measured part, and its negative is already entered at the controller
 };
 inline constexpr std::size_t measured_sources_count = 3;
 [[nodiscard]] std::string_view to_string(MeasuredSource source) noexcept;
 
 struct Command {
   CommandKind kind{CommandKind::enable};
-  std::uint32_t axis{
-      0};  ///< `measured`, `prove`, `release`, `saved`: index of the axis; `accept`: of the sensor
-  double value_um{0.0};  ///< for `measured`, `prove` and `saved` [um]
-  // Of `measured`:
+  std::uint32_t axis{0};  ///< index of the axis; `accept`: of the sensor
+  double value_um{0.0};   ///< of `measured`, `prove` and `saved` [um]
+  // Only for `measured`:
   std::uint32_t sd_nm{0};  ///< standard deviation; 0: as configured
-  std::uint32_t ago_s{0};  ///< so long ago the tool was where it was measured
+  std::uint32_t ago_s{0};  ///< time since the tool was in the measured state
   MeasuredSource source{MeasuredSource::probe};
 };
 
-/// What an axis' first offset on a link was known by, the best evidence first.
+/// Source of an axis' first offset on a link; after `unknown` the best first.
 enum class StartEvidence : std::uint8_t {
-  unknown,    ///< nothing; the axis is not driven
-  read_back,  ///< the controller shows what it applies
-  registers,  ///< the registers that are written were read when the link began
-  record,     ///< the last-sent record of the process before
-  corridor,   ///< the state file, which the offset sent stays beside
-  released    ///< an operator has set the offset to zero at the controller
+  unknown,    ///< none; the axis is not driven
+  read_back,  ///< the controller reports the offset that it applies
+  registers,  ///< the written registers, read when the link began
+  record,     ///< the last-sent record of the previous process
+  corridor,   ///< the state file, in a corridor around which the sent offset stayed
+  released    ///< zero, set by an operator at the controller
 };
-/// As it stands in JSON.
+/// Name in JSON.
 [[nodiscard]] std::string_view to_string(StartEvidence evidence) noexcept;
 
 }  // namespace thermocomp

@@ -85,8 +85,8 @@ void AxisBank::prove(std::size_t axis, double move_um) noexcept {
 void AxisBank::release(std::size_t axis) noexcept {
   const AxisSpan span = span_of_[axis];
   const std::span nodes = std::span(axes_).subspan(span.first, span.end() - span.first);
-  // Where nothing tells what was sent last, the operator has set the whole axis to zero: of a
-  // travel also the nodes whose offset is known.
+  // For an unknown start the operator has set the whole axis to zero, including the nodes of a
+  // travel whose offset is known.
   const bool at_zero = std::any_of(nodes.begin(), nodes.end(),
                                    [](const AxisChannel& node) { return node.start_unknown(); });
   for (AxisChannel& node : nodes) {

@@ -18,34 +18,34 @@ void Limiter::step(double target_um, double dt_s) noexcept {
   if (!(dt_s > 0)) return;
   const double step_um_max = rate_um_per_s_ * std::min(dt_s, dt_s_max);
   const double way_um = bounded_um - offset_um_;
-  // Lands on the target exactly, so that a settled offset equals it to the last bit.
+  // Lands exactly on the target, so that a settled offset equals it to the last bit.
   offset_um_ = std::abs(way_um) <= step_um_max ? bounded_um
                                                : offset_um_ + std::copysign(step_um_max, way_um);
 }
 
 namespace {
 
-/// What a read-back may lie outside our bound because registers are rounded.
+/// Tolerance of a read-back outside our bound, for rounded registers.
 constexpr double register_rounding_um = 0.1;
 
-/// One unexplained read-back outweighs so many good ones; a second one within them latches.
+/// Good read-backs that outweigh one unexplained one; a second one within them latches.
 constexpr std::uint8_t suspicion_of_one = 16;
 
 /// The one that comes with a new epoch, the one before its first command is written, and the one
-/// that shows that it was.
+/// that shows it written.
 constexpr std::uint8_t read_backs_until_written = 3;
 
-/// What is read back on a link that was away for less may be a value on the way to the one sent
-/// last; set from the slowest read-backs that were tried (0.5 s) and the pauses of a reconnection.
+/// On a link that was away for less, a read-back may be on its way to the offset sent last; set
+/// from the slowest read-backs tested (0.5 s) and the pauses of a reconnection.
 constexpr nanoseconds lag_max = std::chrono::milliseconds(1500);
 
 /// WriteGate::patience() of links with periods up to 0.6 s.
 constexpr nanoseconds unwritten_max = std::chrono::seconds(3);
 
-/// WriteGate::epoch() of the first link: no other one was there since the daemon's start.
+/// WriteGate::epoch() of the first link since the daemon's start.
 constexpr std::uint32_t first_epoch = 1;
 
-/// Two read-backs after a release that are no further apart say the same.
+/// Two read-backs after a release agree within this.
 constexpr double same_read_back_um = 0.3;
 
 }  // namespace
@@ -82,8 +82,8 @@ void AxisChannel::move(const AxisInput& input) noexcept {
   state_.driven_at = input.now;
   state_.target_um = input.target_um;
   if (proving()) state_.target_um = prove_target_um(input.now);
-  // Without a read-back to start from again, nothing moves that is not known to reach the
-  // controller: what is sent first on a link is what was sent last.
+  // Without read-back the offset moves only while writes are confirmed: the first offset sent on a
+  // new link must be the one applied last.
   const bool reaches = (input.online && input.written) || reads_back_;
   if (input.may_change && state_.stands_for == 0 && reaches)
     limiter_.step(in_corridor() ? within_corridor(state_.target_um) : state_.target_um, input.dt_s);
@@ -95,7 +95,7 @@ double AxisChannel::within_corridor(double target_um) noexcept {
   const double low_um = std::min({start_.saved_um, start_.low_um[0], start_.low_um[1]});
   const double high_um = std::max({start_.saved_um, start_.high_um[0], start_.high_um[1]});
   start_.held = target_um < high_um - corridor_um_ || target_um > low_um + corridor_um_;
-  // NaN, to stay, stays so.
+  // NaN (stay) stays NaN.
   return std::clamp(target_um, high_um - corridor_um_, low_um + corridor_um_);
 }
 
@@ -104,16 +104,16 @@ void AxisChannel::widen_corridor() noexcept {
   start_.high_um[0] = std::max(start_.high_um[0], limiter_.offset_um());
 }
 
-/// No state with this offset has been on its way to the disk yet.
+/// No state with the present offset has been written to disk yet.
 void AxisChannel::begin_corridor(StartEvidence by) noexcept {
   start_ = {by, false, true, not_a_number};
   start_.low_um.fill(limiter_.offset_um());
   start_.high_um.fill(limiter_.offset_um());
 }
 
-/// A pause of the same link changes nothing by itself: what is read back is compared as ever. But
-/// what was sent last may not have been written (a controller that refuses it pauses the link each
-/// time), so the offset does not go on before a command of the new epoch has been.
+/// A pause of the same link does not change the comparison of read-backs. But the last offset may
+/// not have been written (a controller that refuses a write pauses the link each time), so the
+/// offset does not move on before a command of the new epoch is written.
 void AxisChannel::take_epoch(std::uint32_t epoch) noexcept {
   if (is_same_link(epoch, state_.epoch))
     state_.stands_for = read_backs_until_written;
@@ -143,7 +143,7 @@ void AxisChannel::start_without_read_back(const AxisInput& input, nanoseconds aw
   const double register_um = input.applied_um;
   if (!std::isfinite(register_um)) {
     if (!start_.no_registers) begin_corridor(start_.by);
-    // Whether it restarted, and what it applies since, is not known any more.
+    // It is unknown whether the controller restarted and what it applies since.
     if (!is_same_link(state_.epoch, first_epoch) && away > lag_max)
       start_.by = StartEvidence::unknown;
     start_.unknown = start_.by == StartEvidence::unknown;
@@ -160,8 +160,8 @@ void AxisChannel::start_without_read_back(const AxisInput& input, nanoseconds aw
   start_from(input.now, std::clamp(register_um, -state_.trusted_um, state_.trusted_um));
 }
 
-/// The offset may have gone on for as long as a write may stay out before it counts as none. That
-/// does not hold for 0, which is also what registers show that hold nothing.
+/// The offset may have moved on for as long as a write may be unconfirmed. This does not hold for
+/// 0, which empty registers show too.
 bool AxisChannel::can_be_ours(double register_um) const noexcept {
   return std::abs(register_um) > same_read_back_um &&
          std::abs(register_um - limiter_.offset_um()) <=
@@ -173,15 +173,15 @@ void AxisChannel::compare(const AxisInput& input) noexcept {
   state_.out_of_bound = is_out_of_bound(input.applied_um);
   const nanoseconds before = state_.read_back_at;
   const bool fresh = input.taken_at != before;
-  // What a new link shows beyond the bound is nothing that was sent, however long it shows it.
+  // A value beyond the bound on a new link was never sent, however long it is read back.
   const bool nonsense = state_.starting && !state_.latched && state_.out_of_bound;
   if (!nonsense) state_.read_back_at = input.taken_at;
   if (state_.latched) {
-    state_.starting = false;  // a release decides where to start
+    state_.starting = false;  // release() decides where to start
     state_.agreed_since = input.now;
     if (state_.releasing && fresh) check_release(input);
   } else if (state_.starting) {
-    // Away for longer than a controller may lag, it shows none of the values on the way any more.
+    // Away for longer than the largest lag, the controller no longer shows a value on the way.
     if (input.taken_at - before > lag_max) check_.restart(input.now, limiter_.offset_um());
     start_on_link(input, fresh);
   } else if (check_.agrees(input.applied_um)) {
@@ -191,9 +191,9 @@ void AxisChannel::compare(const AxisInput& input) noexcept {
   }
 }
 
-/// The axis is not driven until the controller itself is within the bound. A controller that was
-/// away may have lost its offset; one that comes back with another is not believed. One that shows
-/// what was sent lately has it still, and only tells it late: the value sent stays the axis' own.
+/// The axis is not driven until the read-back is within the bound. A controller that was away may
+/// have lost its offset; any other unexplained value is refused. One that shows an offset sent
+/// lately has kept it and reports late: the offset continues from the value sent.
 void AxisChannel::start_on_link(const AxisInput& input, bool fresh) noexcept {
   if (state_.out_of_bound) return;
   if (state_.driven_once && !check_.agrees_after_absence(input.applied_um))
@@ -206,7 +206,7 @@ void AxisChannel::start_on_link(const AxisInput& input, bool fresh) noexcept {
     return;
   }
   state_.unwritten_for = read_backs_until_written;
-  // Nothing sent and nothing read: nothing is added there.
+  // A zero offset that reads back as zero shows that no constant is added.
   if (!state_.driven_once && std::abs(input.applied_um) <= same_read_back_um)
     state_.pairs.note(0.0, input.applied_um);
   start_from(input.now, std::clamp(input.applied_um, -state_.trusted_um, state_.trusted_um));
@@ -218,7 +218,7 @@ void AxisChannel::note_explained(const AxisInput& input, bool fresh) noexcept {
     state_.mismatch = false;
   if (!fresh) return;
   if (state_.suspicion > 0) --state_.suspicion;
-  // Until the first command has been written it is not ours that is read back.
+  // Before the first command is written, the read-back is not our offset.
   if (state_.unwritten_for > 0)
     --state_.unwritten_for;
   else if (state_.driven_once)
@@ -252,8 +252,7 @@ void AxisChannel::begin_at_zero() noexcept {
 
 void AxisChannel::release() noexcept {
   if (start_unknown()) return begin_at_zero();
-  // Said again while read-backs are awaited it must not make them begin anew: with a slow link and
-  // an impatient operator they would never be enough.
+  // A repeated release must not restart the wait for read-backs: on a slow link it would never end.
   if (!state_.latched || state_.releasing) return;
   state_.releasing = true;
   state_.released_um = not_a_number;
@@ -291,7 +290,7 @@ void AxisChannel::end_latch() noexcept {
   state_.suspicion = 0;
 }
 
-/// What was sent last has been written, and nothing is on its way.
+/// The last offset is written and no other is on its way.
 bool AxisChannel::is_applied(const AxisInput& input) const noexcept {
   return std::abs(input.applied_um - limiter_.offset_um()) <= register_rounding_um;
 }
@@ -351,7 +350,7 @@ void AxisChannel::adopt(const AxisChannel& previous) noexcept {
   state_ = previous.state_;
   state_.trusted_um = std::max(limiter_.bound_um(), previous.state_.trusted_um);
   start_ = previous.start_;
-  state_.prove = {};  // an indicator waits for nothing that another configuration allowed
+  state_.prove = {};  // a proving move under another configuration is not continued
 }
 
 }  // namespace thermocomp

@@ -11,23 +11,22 @@
 
 namespace thermocomp {
 
-/// offset += clamp(clamp(target, +-bound) - offset, +-rate dt). An offset that starts outside the
-/// bound (a smaller bound after a reload) comes in at the rate.
+/// offset += clamp(clamp(target, +-bound) - offset, +-rate dt). An offset outside the bound (a
+/// smaller bound after a reload) returns at the slew limit.
 class Limiter {
  public:
   explicit Limiter(const LimiterConfig& config);  ///< @throws InvalidValue
 
-  /// @param target_um  where to go; NaN or infinite: stay
-  /// @param dt_s       time since the last step; used up to 1 s, so that a cycle that comes back
-  ///                   after a long overrun makes no leap
+  /// @param target_um  NaN or infinite: stay
+  /// @param dt_s       time since the last step; used up to 1 s, so that an overrun causes no jump
   void step(double target_um, double dt_s) noexcept;
-  /// Starts from what is applied; the only way the offset may jump, because the axis is there.
+  /// Starts from the applied offset: the only permitted jump, since the axis is already there.
   void start_from(double offset_um) noexcept { offset_um_ = offset_um; }
 
   [[nodiscard]] double offset_um() const noexcept { return offset_um_; }
   [[nodiscard]] double bound_um() const noexcept { return bound_um_; }
   [[nodiscard]] double rate_um_per_s() const noexcept { return rate_um_per_s_; }
-  /// Whether the last target lay outside the bound.
+  /// True if the last target was outside the bound.
   [[nodiscard]] bool at_bound() const noexcept { return at_bound_; }
   void visit_state(StateArchive& archive) { archive(offset_um_, at_bound_); }
 
@@ -38,96 +37,94 @@ class Limiter {
   bool at_bound_{false};
 };
 
-/// What one step of an axis needs to know.
 struct AxisInput {
   nanoseconds now{};
   double dt_s{0.0};
   double target_um{0.0};  ///< NaN: stay
-  bool may_change{true};  ///< false: surface-aware hold
+  bool may_change{true};  ///< false: hold_while_cutting holds the offset
   std::uint32_t link_epoch{0};
   bool online{false};   ///< the controller's values below are fresh
   bool written{false};  ///< ControllerState::written
   double applied_um{not_a_number};
-  nanoseconds taken_at{};  ///< when applied_um was read back
+  nanoseconds taken_at{};
 };
 
-/// What is known of the offset that was sent before the first step; NaN: nothing.
+/// Offsets known from before the first step; NaN: unknown.
 struct SentBefore {
-  double saved_um{not_a_number};     ///< by the state file
-  bool is_corridor{false};           ///< the offset sent had to stay beside it
-  double recorded_um{not_a_number};  ///< by the last-sent record
+  double saved_um{not_a_number};     ///< from the state file
+  bool is_corridor{false};           ///< the sent offset had to stay near it
+  double recorded_um{not_a_number};  ///< from the last-sent record
 };
 
-/// A read-back is evidence, not a command. The offset starts from it in three cases only: at the
-/// first contact with a controller; on a new link, where it is nothing, or between that and what
-/// was sent lately; and when an operator releases a mismatch. In all other cases the value sent
-/// stays the axis' own.
+/// The offset starts from a read-back in three cases only: at the first contact with a controller;
+/// on a new link whose read-back is zero, or between zero and the offsets sent lately; and when an
+/// operator releases a mismatch. Otherwise it continues from the value sent.
 ///
-/// A read-back that nothing sent lately explains pauses the axis; a second one, before sixteen good
-/// ones have followed, latches the mismatch: the axis is not driven until release().
+/// An unexplained read-back pauses the axis; a second one within the next sixteen good ones latches
+/// the mismatch: the axis is not driven until release().
 ///
-/// Without read-back the offset goes on, on each new link, from the one sent last. It is known, in
-/// this order, by the registers as they stood when the link began (they come in place of the
-/// read-back), by what was sent until then, by the record, by the state file. Registers that
-/// contradict what else is known, and a link that was away for longer than a controller needs to
-/// restart and has no registers to read, make it unknown: the axis is not driven until release(),
-/// which starts from 0. While no registers can be read, the offset stays within restart_leap_um_max
-/// of every one that may be on disk, so that it waits where the disk does not follow.
+/// Without read-back the offset continues, on each new link, from the one sent last. Its sources,
+/// in this order: the registers read when the link began (in place of the read-back), the offset
+/// sent until then, the last-sent record, the state file. If the registers contradict the other
+/// sources, or if the link was away for longer than a controller needs to restart and no registers
+/// can be read, the start is unknown: the axis is not driven until release(), which starts from 0.
+/// While no registers can be read, the offset stays within restart_leap_um_max of every offset that
+/// may be on disk, and waits for the disk.
 class AxisChannel {
  public:
   AxisChannel(const AxisConfig& config, const CompensationConfig& compensation, bool reads_back);
 
-  /// What the controller tells: may it be driven?
+  /// Compares the controller's report with the offsets sent.
   void observe(const AxisInput& input) noexcept;
-  /// Nothing is sent in this step: what was sent last stays, and in time is all that was.
+  /// Step without sending: the offset stays, and the window of sent offsets narrows to it.
   void stand(nanoseconds now) noexcept;
-  /// Towards the target. @pre driven(), and the offset is sent
+  /// Steps towards the target. @pre driven(), and the offset is sent
   void move(const AxisInput& input) noexcept;
-  /// Moves by `move_um` and back; the compensation of this axis waits meanwhile. Ignored unless
+  /// Moves by `move_um` and back; the compensation of this axis pauses meanwhile. Ignored if not
   /// driven, or beyond prove_um_max.
   void prove(double move_um) noexcept;
   void end_prove() noexcept { state_.prove.phase = ProvePhase::none; }
-  /// An operator says that what caused a latched mismatch is mended. The next read-backs decide:
-  /// explained by the same factor, sign or constant that was latched, or no two of them alike, it
-  /// stays latched; else the axis starts from what is read back, once it could have got there at
-  /// its slew rate from what was sent last. Of an unknown start: begin_at_zero().
+  /// Releases a latched mismatch whose cause an operator has removed. It stays latched if the next
+  /// read-backs still fit the latched factor, sign or constant, or if no two of them agree; else
+  /// the axis starts from the read-back, once its distance from the offset sent last is within
+  /// reach at the slew limit. With an unknown start: begin_at_zero().
   void release() noexcept;
-  /// An operator has set the offset at the controller to 0.
+  /// An operator has set the offset to 0 at the controller.
   void begin_at_zero() noexcept;
-  /// A state with this offset is on disk. One from before a release means nothing any more.
+  /// A state with this offset is on disk. Ignored outside the corridor (from before a release).
   void saved(double offset_um) noexcept;
 
   [[nodiscard]] double offset_um() const noexcept { return limiter_.offset_um(); }
   [[nodiscard]] double target_um() const noexcept { return state_.target_um; }
-  /// As read back last; NaN where the controller does not tell.
+  /// Last read-back; NaN without read-back.
   [[nodiscard]] double applied_um() const noexcept { return state_.applied_um; }
   [[nodiscard]] bool synced() const noexcept { return state_.synced; }
-  /// Whether the offset may be sent: synced, started, and nothing read back is unexplained.
+  /// True if the offset may be sent: synchronised, started, no unexplained read-back.
   [[nodiscard]] bool driven() const noexcept {
     return state_.synced && !state_.starting && !state_.in_doubt && !state_.latched &&
            !start_.unknown && !(in_corridor() && std::isnan(start_.saved_um));
   }
-  /// What the offset goes on from is not known.
+  /// The offset to continue from is not known.
   [[nodiscard]] bool start_unknown() const noexcept { return state_.synced && start_.unknown; }
   [[nodiscard]] StartEvidence start() const noexcept {
     return start_.unknown ? StartEvidence::unknown : start_.by;
   }
-  /// Nothing is known of what was sent last, whether or not a link is there.
+  /// The last sent offset is not known, with or without a link.
   [[nodiscard]] bool forgotten() const noexcept {
     return !reads_back_ && start_.by == StartEvidence::unknown;
   }
-  /// How far the offset goes from the one that is on disk; NaN: as far as it likes.
+  /// Largest distance of the offset from the one on disk; NaN: not limited.
   [[nodiscard]] double corridor_um() const noexcept {
     return in_corridor() ? corridor_um_ : not_a_number;
   }
-  /// It would go on if a newer state were on disk.
+  /// The offset would move on if a newer state were on disk.
   [[nodiscard]] bool waits_for_disk() const noexcept {
     return in_corridor() && (start_.held || !std::isfinite(start_.saved_um));
   }
   [[nodiscard]] bool mismatch() const noexcept { return state_.mismatch; }
   [[nodiscard]] bool latched() const noexcept { return state_.latched; }
   [[nodiscard]] bool releasing() const noexcept { return state_.releasing; }
-  /// What was sent and read when the newest latch came.
+  /// Offset sent and read-back at the newest latch.
   [[nodiscard]] const Mismatch& latched_mismatch() const noexcept {
     return state_.latched_mismatch;
   }
@@ -135,9 +132,9 @@ class AxisChannel {
   [[nodiscard]] bool at_bound() const noexcept { return limiter_.at_bound(); }
   [[nodiscard]] bool proving() const noexcept { return state_.prove.phase != ProvePhase::none; }
 
-  /// Before the first step. What lies beyond the bound is not taken.
+  /// Before the first step. Offsets beyond the bound are ignored.
   void restore(const SentBefore& before) noexcept;
-  /// After a reload: goes on from the other's offset and agreement.
+  /// After a reload: continues from the offset and agreement of `previous`.
   void adopt(const AxisChannel& previous) noexcept;
 
   void visit_state(StateArchive& archive) { archive(limiter_, check_, state_, start_); }
@@ -158,11 +155,11 @@ class AxisChannel {
     double target_um{0.0};
     double applied_um{not_a_number};
     std::uint32_t epoch{0};
-    /// Largest |offset| that can come from us: the bound, or what an earlier bound allowed.
+    /// Largest |offset| that can be ours: the bound, or that of an earlier configuration.
     double trusted_um{0.0};
     bool synced{false};
-    bool starting{false};     ///< a new link's first believable read-back is waited for
-    bool driven_once{false};  ///< by this program, so what is applied is ours
+    bool starting{false};     ///< waits for the first plausible read-back of a new link
+    bool driven_once{false};  ///< by this program, so the applied offset is ours
     bool out_of_bound{false};
     bool mismatch{false};
     nanoseconds agreed_since{};
@@ -170,14 +167,13 @@ class AxisChannel {
     std::uint8_t suspicion{0};
     bool latched{false};
     bool releasing{false};
-    double released_um{not_a_number};  ///< read back since release(), to be confirmed
+    double released_um{not_a_number};  ///< read-back since release(), to be confirmed
     Mismatch latched_mismatch;
     SentAndRead pairs;
-    /// After a pause of the link: read-backs until a command of the new epoch has surely been
-    /// written.
+    /// After a pause of the link: read-backs until a command of the new epoch is surely written.
     std::uint8_t stands_for{0};
-    std::uint8_t unwritten_for{0};  ///< read-backs until what is read back is surely ours
-    nanoseconds seen_at{};          ///< of the newest read-back, also of one without offsets
+    std::uint8_t unwritten_for{0};  ///< read-backs until they surely show our offset
+    nanoseconds seen_at{};          ///< of the newest report, with or without offsets
     nanoseconds read_back_at{};
     nanoseconds driven_at{};
     Prove prove;
@@ -188,13 +184,13 @@ class AxisChannel {
   };
 
   struct Start {
-    StartEvidence by{StartEvidence::unknown};  ///< what is known of the offset sent last
+    StartEvidence by{StartEvidence::unknown};  ///< source of the offset sent last
     bool unknown{false};                       ///< on this link
-    bool no_registers{false};                  ///< on this link, so that only the disk remembers
-    double saved_um{not_a_number};             ///< in the newest state that is on disk
-    bool held{false};                          ///< by the corridor, in the last step
-    /// Where the offset has been since the last saved(), and between the two before: a state that
-    /// is on its way to the disk was taken then.
+    bool no_registers{false};       ///< on this link, so that only the disk keeps the offset
+    double saved_um{not_a_number};  ///< in the newest state on disk
+    bool held{false};               ///< limited by the corridor in the last step
+    /// Range of the offset since the last saved(), and between the two before: a state still being
+    /// written was taken then.
     std::array<double, 2> low_um{};
     std::array<double, 2> high_um{};
     void visit_state(StateArchive& archive) {

@@ -49,24 +49,24 @@ bool AppliedCheck::agrees_after_absence(double applied_um) const noexcept {
 
 namespace {
 
-/// Registers are rounded and an offset that moves is read back a moment late.
+/// Rounding of registers and delay of a moving offset.
 constexpr double noise_um = 0.3;
-/// Pairs nearer to one another tell nothing new.
+/// Closer pairs count as one.
 constexpr double apart_um = 0.2;
-/// Of a mismatch: how far off the older pairs may lie from what explains the newest; and for being
-/// sure of it, for a release is not believed as long as what is sure explains what is read.
+/// Largest deviation of the older pairs from the cause of the newest, as a share of the mismatch;
+/// and the limit for a sure cause, which prevents a release while it still explains the read-backs.
 constexpr double share_of_mismatch = 0.35;
 constexpr double sure_share_of_mismatch = 0.1;
-/// Below so little sent a factor says nothing.
+/// Smallest offset sent that gives a factor.
 constexpr double sent_um_min = 0.2;
-/// A sign that flips while running is no coincidence from here on.
+/// An exact negative of at least this much is no coincidence.
 constexpr double negative_um_min = 3.0;
-/// What was sent must have changed by so much, and by so much of the mismatch, before a factor is
-/// no coincidence.
+/// The offset sent must have changed by this much, and by this share of the mismatch, before a
+/// factor is no coincidence.
 constexpr double spread_um_min = 0.5;
 constexpr double spread_share_min = 0.2;
 
-/// Factors that people make: units, decimal places, radius and diameter.
+/// Factors of common mistakes: units, decimal places, radius and diameter.
 bool is_usual(double factor) noexcept {
   constexpr std::array usual{2.0, 0.5, 10.0, 0.1, 100.0, 0.01, 1000.0, 0.001, 25.4, 1.0 / 25.4};
   return std::any_of(usual.begin(), usual.end(), [factor](double each) {
@@ -171,7 +171,6 @@ double SentAndRead::spread_um(std::size_t pairs, double sent_um) const noexcept 
 bool SentAndRead::stands_still(double sent_um, double read_um) const noexcept {
   double apart = 0.0;
   for (std::size_t i = 0; i < kept(); ++i) {
-    // Where the offset was at rest it need not have moved: only what the newest were sent counts.
     apart = std::max(apart, std::abs(read_um_[i] - read_um));
   }
   return apart <= noise_um && spread_um(kept(), sent_um) > 3.0 * noise_um;
@@ -182,7 +181,7 @@ Mismatch SentAndRead::judge(double sent_um, double read_um) const noexcept {
   if (found.likely != MismatchCause::changes_alone) return found;
   const std::size_t since_it_began = disagreeing();
   Mismatch lately = judge_newest(since_it_began, sent_um, read_um);
-  // Another writer would hardly hit the negative of what is sent.
+  // Another writer would hardly hit the exact negative.
   const bool is_negative =
       lately.likely == MismatchCause::opposite_sign && std::abs(sent_um) >= negative_um_min;
   if (is_negative && std::abs(read_um + sent_um) <= noise_um) lately.sure = true;
@@ -206,7 +205,7 @@ Mismatch SentAndRead::judge_newest(std::size_t pairs, double sent_um,
   const double constant_um = read_um - sent_um;
   const double of_factor_um = worst_um(pairs, factor, 0.0);
   const double of_constant_um = worst_um(pairs, 1.0, constant_um);
-  // Negated comparisons would take NaN, the factor of next to nothing, for a good one.
+  // A negated comparison would accept NaN, the factor of an offset near 0.
   const bool factor_fits = std::isfinite(factor) && of_factor_um <= allowed_um;
   const bool constant_fits = of_constant_um <= allowed_um;
   found.sure = spread_um(pairs, sent_um) >

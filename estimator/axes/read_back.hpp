@@ -1,5 +1,5 @@
-/// Whether the controller applies what it was sent, allowing for delays of the link; and why it may
-/// apply something else, judged by what was sent and read back.
+/// Comparison of the applied offset with the offsets sent, allowing for the delay of the link, and
+/// the likely cause of a mismatch.
 #pragma once
 
 #include <array>
@@ -12,20 +12,20 @@
 
 namespace thermocomp {
 
-/// What is applied now must be something that was sent within the last window: between the smallest
-/// and the largest offset sent in it, a tolerance apart at most.
+/// The applied offset must be between the smallest and the largest offset sent within the last
+/// window, within a tolerance.
 class AppliedCheck {
  public:
   AppliedCheck(double tolerance_um, nanoseconds window);
 
-  /// Forgets everything; the axis now stands at `offset_um`.
+  /// Forgets all offsets sent; the axis is at `offset_um`.
   void restart(nanoseconds now, double offset_um) noexcept;
   void sent(nanoseconds now, double offset_um) noexcept;
   [[nodiscard]] bool agrees(double applied_um) const noexcept;
-  /// Whether a controller that was away can apply this of its own accord: what was sent to it,
-  /// nothing (0), or anything in between on its way back.
+  /// True if a controller that was away may apply this by itself: an offset sent to it, 0, or a
+  /// value between on its way back.
   [[nodiscard]] bool agrees_after_absence(double applied_um) const noexcept;
-  /// After a reload: what `previous` has sent counts as sent by this one.
+  /// After a reload: offsets sent by `previous` count as sent.
   void adopt(const AppliedCheck& previous) noexcept { state_ = previous.state_; }
 
   void visit_state(StateArchive& archive) { archive(state_); }
@@ -35,7 +35,7 @@ class AppliedCheck {
   [[nodiscard]] double lowest_um() const noexcept;
   [[nodiscard]] double highest_um() const noexcept;
 
-  // Old offsets leave in slots of a quarter window: cheap, and the window is kept to 25 %.
+  // Offsets expire in slots of a quarter window: cheap, and the window is exact to 25 %.
   static constexpr std::size_t slots = 5;
   struct State {
     std::array<double, slots> min_um{};
@@ -54,44 +54,44 @@ class AppliedCheck {
 
 enum class MismatchCause : std::uint8_t {
   none,
-  factor,         ///< reads back a multiple of what is sent
+  factor,         ///< reads back a multiple of the offset sent
   opposite_sign,  ///< reads back its negative
   constant,       ///< reads back more by the same amount each time
   stands_still,   ///< reads back the same whatever is sent
-  changes_alone   ///< the read-back changes where what is sent does not
+  changes_alone   ///< the read-back changes while the offset sent does not
 };
 
-/// What a latched axis was sent and read back, and what that looks like.
+/// Offset sent and read-back of a latched axis, with the likely cause.
 struct Mismatch {
   double sent_um{not_a_number};
   double read_um{not_a_number};
   MismatchCause likely{MismatchCause::none};
-  double size{not_a_number};  ///< factor: times what is sent; constant: [um]
-  /// More than one value sent says the same, so the factor, sign or constant is no coincidence.
+  double size{not_a_number};  ///< factor: read / sent; constant: read - sent [um]
+  /// More than one offset sent confirms the factor, sign or constant.
   bool sure{false};
-  /// A factor that might as well be a constant: too little has been sent to tell them apart.
+  /// A constant fits as well as the factor: too little was sent to distinguish them.
   bool or_constant{false};
 
-  /// Whether the same factor, sign or constant still explains a pair.
+  /// True if the same factor, sign or constant still explains a pair.
   [[nodiscard]] bool explains(double of_sent_um, double of_read_um) const noexcept;
   void visit_state(StateArchive& archive) {
     archive(sent_um, read_um, likely, size, sure, or_constant);
   }
 };
 
-/// "reads back twice what is sent: check scale", with the other possibility where that is not sure;
-/// empty where there is nothing to say. Allocates.
+/// "reads back twice what is sent: check scale", with the alternative if that is not sure; empty if
+/// there is no likely cause. Allocates.
 [[nodiscard]] std::string likely_text(const Mismatch& mismatch);
 
-/// The last values sent, each with what was read back: only those that differ, so that a slow
-/// offset does not fill the memory with one pair.
+/// The last pairs of offset sent and read-back, only distinct ones, so that a slow offset does not
+/// fill the memory with one pair.
 class SentAndRead {
  public:
   void note(double sent_um, double read_um) noexcept;
-  /// The likeliest cause of a pair that does not agree. A factor or constant is taken from that
-  /// pair and must hold for the older ones too, allowing for the lag of a moving offset. A constant
-  /// may have begun lately: then for those since a pair last agreed, at least two. So may an
-  /// opposite sign, which this pair alone shows where it is the exact negative.
+  /// The likeliest cause of a pair that disagrees. A factor or constant is taken from that pair and
+  /// must hold for the older ones too, allowing for the lag of a moving offset. A constant or an
+  /// opposite sign may be recent: then it must hold for the pairs since the last agreement, at
+  /// least two; an exact negative is shown by this pair alone.
   [[nodiscard]] Mismatch judge(double sent_um, double read_um) const noexcept;
 
   void visit_state(StateArchive& archive) { archive(sent_um_, read_um_, count_); }
@@ -103,11 +103,11 @@ class SentAndRead {
   [[nodiscard]] std::size_t index_of(std::size_t age) const noexcept {
     return (count_ - 1 - age) % length;
   }
-  /// How many of the newest differ from what was sent.
+  /// Number of newest pairs that disagree.
   [[nodiscard]] std::size_t disagreeing() const noexcept;
   [[nodiscard]] Mismatch judge_newest(std::size_t pairs, double sent_um,
                                       double read_um) const noexcept;
-  // Of the newest `pairs`:
+  // Over the newest `pairs`:
   /// largest |read - (factor sent + constant)|
   [[nodiscard]] double worst_um(std::size_t pairs, double factor,
                                 double constant_um) const noexcept;

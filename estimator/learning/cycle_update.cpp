@@ -81,7 +81,7 @@ void CycleHold::adopt(const CycleHold& previous, const std::vector<int>& columns
   state_.holds = state_.holds && previous.state_.holds;
 }
 
-/// From here on `signals` are held; a state with a hole in it is none.
+/// Holds `signals` from here on; a state with an unknown value is not held.
 void CycleHold::hold(std::span<const double> signals) noexcept {
   THERMOCOMP_ENSURE(signals.size() == state_.held_signals.size());
   state_.holds = std::all_of(state_.held_degC.begin(), state_.held_degC.end(), is_finite);
@@ -130,7 +130,7 @@ void CycleUpdate::evaluate(const Displacement& displacement, const ReferenceStat
   displacement_at(signals.of_model, held_um_);
   for (std::size_t i = 0; i < rise_K_.size(); ++i)
     rise_K_[i] = hold_.temps_degC()[i] - reference.temps_degC[i];
-  // Held like the temperatures; after a restart it is not known any more.
+  // Held like the temperatures; unknown after a restart.
   const double share = std::isfinite(state_.share) ? state_.share : displacement.believed_share;
   for (std::size_t i = 0; i < axis_output_.size(); ++i)
     state_.axis_um[i] = share * ((places_[i].is_node ? node_um_[i] : held_um_[axis_output_[i]]) -

@@ -1,5 +1,5 @@
-/// Correction once per machining cycle: between two cycle ends the compensation goes by the state
-/// that the machine had at the last one (JP7689460B2; Teratani et al. 1995, eq. 33 to 38).
+/// Update once per machining cycle: between two cycle ends the compensation uses the machine's
+/// state at the last one (JP7689460B2; Teratani et al. 1995, eq. 33 to 38).
 #pragma once
 
 #include <cmath>
@@ -19,21 +19,21 @@
 
 namespace thermocomp {
 
-/// Counts cycle ends from commands and from a signal of the controller, and says when they are due.
+/// Counts cycle ends from commands and from a signal of the controller.
 class CycleEnds {
  public:
-  /// @param every      a correction at every n-th cycle end
-  /// @param is_switch  the signal is 0 or 1, and ends a cycle by rising; else any change does
+  /// @param every      an update at every n-th cycle end
+  /// @param is_switch  the signal is 0 or 1, and a rising edge ends a cycle; else any change does
   CycleEnds(std::uint64_t every, bool is_switch) : every_(every), is_switch_(is_switch) {}
 
   struct State {
     std::uint64_t count{0};
-    double last{not_a_number};  ///< of the signal
+    double last{not_a_number};  ///< last value of the signal
     bool due{false};
   };
 
   void command() noexcept { ended(); }
-  /// @param value  NaN: not known, which ends nothing
+  /// @param value  NaN: unknown, ends no cycle
   void signal(double value) noexcept {
     if (!std::isfinite(value)) return;
     if (std::isfinite(state_.last) &&
@@ -41,15 +41,14 @@ class CycleEnds {
       ended();
     state_.last = value;
   }
-  /// Whether the correction is due; once only. @param can  predictions are there to be taken
+  /// True once for each update that is due. @param can  predictions are available
   [[nodiscard]] bool take(bool can) noexcept {
     const bool now = state_.due && can;
     if (now) state_.due = false;
     return now;
   }
   [[nodiscard]] std::uint64_t count() const noexcept { return state_.count; }
-  /// @param same_signal  of the other's configuration and of ours: an edge during the reload
-  ///                     counts; what another signal showed last says nothing
+  /// @param same_signal  of both configurations: an edge during the reload counts
   void adopt(const CycleEnds& previous, bool same_signal) noexcept {
     const double last = same_signal ? previous.state_.last : state_.last;
     state_ = previous.state_;
@@ -70,15 +69,15 @@ class CycleEnds {
   State state_;
 };
 
-/// What is held is a state, never a displacement: block temperatures, operating signals and the
-/// terms' past, one interval ahead if wanted:
+/// The held quantity is a state, not a displacement: block temperatures, operating signals and the
+/// states of the terms, extrapolated by a share of an interval:
 ///   T_held = T_n + ahead (T_n - T_(n-1))
-/// The displacement is evaluated from them whenever it is asked for, at the axes' present positions
-/// (signals in mm) and with the gains of the moment. So a moving slide, a gain that a probing has
-/// corrected and a matrix that has been reloaded count at once, and none of them is extrapolated.
+/// The displacement is evaluated from it at the present positions (signals in mm) and with the
+/// present gains, so that a moving slide, a corrected gain and a reloaded matrix act at once and
+/// are not extrapolated.
 class CycleHold {
  public:
-  /// @param ahead  in [0, 1]; 1: a whole interval ahead by linear extrapolation
+  /// @param ahead  in [0, 1]; 1: linear extrapolation by a whole interval
   /// @throws InvalidValue when the model's shapes do not fit each other
   CycleHold(const ThermalModel& model, double ahead);
 
@@ -88,25 +87,24 @@ class CycleHold {
   /// @param live        the same model, stepped to `now` with these values
   void cycle_end(nanoseconds now, std::span<const double> temps_degC,
                  std::span<const double> signals, const DisplacementModel& live) noexcept;
-  /// A new reference has been taken: the machine is straight in this state, and there is no change
-  /// to go by yet.
+  /// A new reference: displacement is zero in this state, with no cycle end to extrapolate from.
   void restart(nanoseconds now, std::span<const double> temps_degC,
                std::span<const double> signals) noexcept;
 
-  /// Whether there is a state to go by: a cycle has ended, or one was restored.
+  /// True if a state is held: a cycle has ended, or a state was restored.
   [[nodiscard]] bool holds() const noexcept { return state_.holds; }
   [[nodiscard]] std::span<const double> temps_degC() const noexcept { return state_.held_degC; }
-  /// NaN for a position: those are never held.
+  /// NaN for positions, which are never held.
   [[nodiscard]] double signal(std::size_t index) const noexcept {
     return is_position_[index] ? not_a_number : state_.held_signals[index];
   }
   /// The model at the held state. @pre holds()
-  /// @param signals          now; only positions are taken from them
+  /// @param signals          present values; only positions are used
   /// @param displacement_um  shape (outputs); overwritten
   void displacement(std::span<const double> reference_degC, std::span<const double> signals,
                     std::span<double> displacement_um) noexcept;
 
-  /// Before the first step: what was held before the restart, NaN where it is not known.
+  /// Before the first step: the state held before the restart, NaN where unknown.
   void restore(std::span<const double> temps_degC, std::span<const double> signals) noexcept;
   /// After a reload; plans from plan_names() and plan_terms().
   void adopt(const CycleHold& previous, const std::vector<int>& columns,
@@ -116,10 +114,10 @@ class CycleHold {
  private:
   struct State {
     bool holds{false};
-    nanoseconds at{};  ///< the moment of the held state; may lie ahead
+    nanoseconds at{};  ///< time of the held state; may be in the future
     std::vector<double> held_degC;
     std::vector<double> held_signals;
-    bool ended{false};  ///< there was a cycle end to count the next change from
+    bool ended{false};  ///< a cycle has ended, from which the next change counts
     nanoseconds ended_at{};
     std::vector<double> ended_degC;
     void visit_state(StateArchive& archive) {
@@ -130,19 +128,18 @@ class CycleHold {
   void hold(std::span<const double> signals) noexcept;
 
   const double ahead_;
-  std::vector<bool> is_position_;  ///< of the signals
+  std::vector<bool> is_position_;  ///< one per signal
   DisplacementModel model_;        ///< at the held state
 
   State state_;
 };
 
-/// update = "each_cycle": the displacement at the state that was held when the last cycle ended,
-/// evaluated at the present positions and with the gains of the moment; "continuous": that of the
-/// moment.
+/// update = "each_cycle": displacement of the state held since the last cycle end, at the present
+/// positions and with the present gains; "continuous": the present displacement.
 class CycleUpdate {
  public:
   struct State {
-    double share{not_a_number};   ///< of the model that was believed when the cycle ended
+    double share{not_a_number};   ///< share of the model in use when the cycle ended
     std::vector<double> axis_um;  ///< one per axis, of the held state
   };
 
@@ -152,15 +149,14 @@ class CycleUpdate {
 
   /// @param compensating  a cycle end may be taken
   /// @param live          the model, stepped with these values
-  /// @return one per axis: what is compensated
+  /// @return one per axis: the displacement to compensate
   [[nodiscard]] std::span<const double> step(nanoseconds now, const Displacement& displacement,
                                              bool compensating, const Temperatures& temps,
                                              const ReferenceState& reference,
                                              const Signals& signals, const DisplacementModel& live,
                                              const Probings& learned) noexcept;
-  /// An operator's command: a cycle has ended.
+  /// An operator's command that a cycle has ended.
   void command() noexcept { ends_.command(); }
-  /// A new reference has been taken in this state.
   void restart(nanoseconds now, std::span<const double> temps_degC,
                std::span<const double> signals) noexcept;
 
@@ -168,7 +164,7 @@ class CycleUpdate {
   [[nodiscard]] const CycleHold& hold() const noexcept { return hold_; }
   [[nodiscard]] double held_um(std::size_t axis) const noexcept { return state_.axis_um[axis]; }
 
-  /// Before the first step: what was held before the restart, NaN where it is not known.
+  /// Before the first step: the state held before the restart, NaN where unknown.
   void restore(std::span<const double> temps_degC, std::span<const double> signals) noexcept {
     hold_.restore(temps_degC, signals);
   }
@@ -196,7 +192,7 @@ class CycleUpdate {
   TravelCurves curves_;
   const std::vector<NodePlace> places_;
   std::vector<double> held_um_;  ///< scratch, one per output: the model at the held state
-  std::vector<double> node_um_;  ///< scratch, one per axis: that at its node
+  std::vector<double> node_um_;  ///< scratch, one per axis: the model at its node
   std::vector<double> rise_K_;   ///< scratch, one per column
 };
 

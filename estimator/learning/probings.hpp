@@ -1,5 +1,5 @@
-/// What displacements measured at the tool teach: a correction per axis, and how far the model was
-/// off; and whether one that a person gives contradicts what the model claims of itself.
+/// Displacements measured at the tool: correction learned per axis, error of the model, and the
+/// check of a manually entered value against the model's claimed error.
 #pragma once
 
 #include <algorithm>
@@ -22,7 +22,7 @@
 
 namespace thermocomp {
 
-/// Mean square over the last probings: of all up to 20, then each new one counts for 1/20.
+/// Mean square of the last probings: of all up to 20, then with weight 1/20 for each new one.
 class ProbedError {
  public:
   void take(double error_um) noexcept {
@@ -42,20 +42,19 @@ class ProbedError {
   double mean_square_um2_{0.0};
 };
 
-/// Which slip explains a displacement that contradicts what the model claims of itself.
+/// Input error that explains a value which contradicts the model's claimed error.
 enum class Slip : std::uint8_t {
-  none,     ///< it agrees
+  none,     ///< the value agrees
   sign,     ///< its negative agrees
   tenfold,  ///< a tenth of it agrees
   tenth,    ///< ten times it agrees
   unexplained
 };
 
-/// Beyond so many standard deviations a person is asked.
+/// Standard deviations beyond which the operator is asked.
 inline constexpr double question_sigma = 3.0;
 
-/// @param sd_um  of their difference: the model's claim and the measurement; NaN: nothing is
-/// claimed
+/// @param sd_um  of the difference between model and measurement; NaN: no claimed error
 [[nodiscard]] inline Slip slip_of(double value_um, double expected_um, double sd_um) noexcept {
   if (!std::isfinite(sd_um) || !std::isfinite(expected_um)) return Slip::none;
   const auto agrees = [&](double value) {
@@ -84,15 +83,15 @@ inline constexpr double question_sigma = 3.0;
   return "perhaps another axis or another tool";
 }
 
-/// What operators have entered at the controller since the reference, as displacement of the axis.
-/// It stands there: what the correction learns of it must not be taken out a second time.
+/// Offsets entered at the controller since the reference, as displacement of the axis. They stay
+/// there, so the correction must not compensate the same displacement again.
 struct OperatorOffset {
   double entered_um{0.0};
-  double absorbed_um{0.0};  ///< by the correction in use
-  double learned_um{0.0};   ///< ... and by what waits for the end of a cut
+  double absorbed_um{0.0};  ///< part of the correction in use
+  double learned_um{0.0};   ///< ... with the part that waits for the end of a cut
 };
 
-/// Where the axis was at a time gone by, for what is measured later on a part.
+/// State of an axis at an earlier time, for a part that is measured later.
 struct PastMoment {
   nanoseconds at{};
   double compensated_um{not_a_number};
@@ -101,9 +100,9 @@ struct PastMoment {
   RunningCorrection::Contributions contributions_um{};
 };
 
-/// A displacement that was measured at the tool.
+/// A displacement measured at the tool.
 struct MeasuredValue {
-  double value_um{0.0};  ///< as [correction] measured says: what remained, or all of it
+  double value_um{0.0};  ///< remaining or total displacement, see [correction] measured
   double sd_um{0.0};     ///< 0: as configured
   MeasuredSource source{MeasuredSource::probe};
 };
@@ -118,11 +117,10 @@ class Probings {
   Probings(const EstimatorConfig& config, const ThermalModel& model,
            const std::vector<std::size_t>& axis_output);
 
-  /// @param may_change  false: what was learned waits for the end of the cut
+  /// @param may_change  false: learned values wait for the end of the cut
   void step(nanoseconds now, const Temperatures& temps, const ReferenceState& reference,
             bool may_change) noexcept;
-  /// By how much the axis' displacement differs from the model's, less what stands at the
-  /// controller already [um].
+  /// Correction of the model's displacement, less the part entered at the controller [um].
   [[nodiscard]] double correction_um(std::size_t axis) const noexcept {
     return corrections_[axis].correction_um() - operator_um_[axis].absorbed_um;
   }
@@ -132,32 +130,32 @@ class Probings {
     return corrections_[axis].correction_um(rise_K) - operator_um_[axis].absorbed_um;
   }
 
-  /// Of a measured value: the displacement as it would have been without any offset [um].
+  /// Displacement without any offset, from a measured value [um].
   [[nodiscard]] double without_offset_um(double value_um, const PastMoment& moment) const noexcept {
     return meaning_ == MeasuredMeaning::remaining
                ? value_um - moment.compensated_um + moment.entered_um
                : value_um;
   }
 
-  /// A value from an operator or a probe, whether or not anything can be learned from it.
+  /// Records a value from an operator or a probe, also if nothing can be learned from it.
   void note(std::size_t axis, double value_um) noexcept { measured_um_[axis] = value_um; }
-  /// @param now  compensation and model at the moment of the measurement; see `past`
+  /// @param moment  state of the axis at the time of the measurement; see past()
   void learn(std::size_t axis, const MeasuredValue& measured, const PastMoment& moment) noexcept;
-  /// The present one, whose contributions and entered offset are filled in here.
+  /// Present state of the axis, with contributions and entered offset.
   [[nodiscard]] PastMoment present(std::size_t axis, double compensated_um,
                                    double model_um) const noexcept;
-  /// Nearest to `at`; nullptr: it is not remembered.
+  /// Kept state nearest to `at`; nullptr: none near.
   [[nodiscard]] const PastMoment* past(std::size_t axis, nanoseconds at) const noexcept;
   [[nodiscard]] bool must_remember(nanoseconds now) const noexcept {
     return is_on_ && now - remembered_at_ >= past_pitch;
   }
-  /// How far back `past` reaches, where nothing was unknown in between.
+  /// Reach of past(), if no state was unknown in between.
   [[nodiscard]] std::chrono::minutes remembered() const noexcept {
     return past_pitch * static_cast<int>(remembered_);
   }
-  /// Once for each axis, with one time.
+  /// Once for each axis, with the same time.
   void remember(std::size_t axis, const PastMoment& moment) noexcept;
-  /// Counts a value that nothing can be learned from.
+  /// Counts a value from which nothing can be learned.
   void refuse(std::size_t axis) noexcept { corrections_[axis].refuse(); }
   /// A new reference: displacements count from here.
   void restart() noexcept;
@@ -191,9 +189,9 @@ class Probings {
   std::vector<ProbedError> errors_;
   std::vector<double> measured_um_;
   std::vector<OperatorOffset> operator_um_;
-  std::vector<PastMoment> past_;  ///< rings of past_moments, one an axis; none where nothing learns
+  std::vector<PastMoment> past_;  ///< rings of past_moments, one per axis; empty: no correction
   std::size_t next_past_{0};
-  std::size_t remembered_{0};  ///< moments of each axis
+  std::size_t remembered_{0};  ///< kept moments of each axis
   nanoseconds remembered_at_{-past_pitch};
   std::vector<double> rise_K_;  ///< scratch, one per column
 };

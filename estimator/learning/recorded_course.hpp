@@ -1,5 +1,5 @@
-/// Where a machine stands in the course of its heat, and the gains of a correction from a record of
-/// probed courses, where nothing is probed.
+/// Phase of a machine's heating or cooling, and correction gains from a record of probed courses
+/// for times without probing.
 #pragma once
 
 #include <array>
@@ -14,22 +14,22 @@
 
 namespace thermocomp {
 
-/// heating: what the heat source contributes grows; turned: it still grows, but the displacement
-/// has come back from its extreme; cooling: it shrinks. A direction has changed when the value has
-/// come back by `back_um`, and then since the moment of its extreme. Never allocates, never throws.
-/// Source: Teratani et al. 1995, section 5 (the course of the heat tells how the tie has answered).
+/// heating: the heat source's contribution grows; turned: it still grows, but the displacement has
+/// come back from its extreme; cooling: it shrinks. A direction changes when the value has come
+/// back by `back_um`, with effect from the time of its extreme. Never allocates, never throws.
+/// Source: Teratani et al. 1995, section 5 (response of the tie in the course of the heat).
 class HeatPhase {
  public:
-  /// @param back_um  larger than what noise moves, > 0
+  /// @param back_um  > 0, larger than the noise
   explicit HeatPhase(double back_um) noexcept : back_um_(back_um) {}
 
   /// @param heat_um          contribution of the heat source, of either sign
   /// @param displacement_um  of the whole model
   void step(nanoseconds now, double heat_um, double displacement_um) noexcept;
   [[nodiscard]] CoursePhase phase() const noexcept;
-  /// Since the heat last came or went [s]; 0 before the first step.
+  /// Since heating or cooling began [s]; 0 before the first step.
   [[nodiscard]] double since_s() const noexcept;
-  /// The next step is the beginning of a heating.
+  /// The next step begins a heating phase.
   void restart() noexcept { state_ = {}; }
 
   void visit_state(StateArchive& archive) { archive(state_); }
@@ -41,10 +41,10 @@ class HeatPhase {
     bool turned{false};
     nanoseconds now{};
     nanoseconds changed_at{};
-    double heat_extreme_um{0.0};  ///< largest since heating began, least since cooling did
+    double heat_extreme_um{0.0};  ///< maximum since heating began, minimum since cooling began
     nanoseconds extreme_at{};
     double began_um{0.0};  ///< displacement when heating began
-    double away_um{0.0};   ///< furthest from there
+    double away_um{0.0};   ///< largest distance from there
     void visit_state(StateArchive& archive) {
       auto& [a, b, c, d, e, f, g, h, i] = *this;
       archive(a, b, c, d, e, f, g, h, i);
@@ -55,22 +55,22 @@ class HeatPhase {
   State state_;
 };
 
-/// One value per group of the correction, with standard deviation.
+/// Gain and standard deviation of each group of the correction.
 struct RecordedGains {
   std::array<double, correction_groups_max> gain{};
   std::array<double, correction_groups_max> sd{};
 };
 
-/// The record's local mean at a state of the machine. With the distance d_j of the state from point
-/// j of the same phase, each quantity (time since the heat changed, rises of the inputs) in units
-/// of its spread over the points,
+/// Local mean of the record at a machine state. With the distance d_j of the state from point j of
+/// the same phase, each quantity (time in the phase, rises of the inputs) in units of its spread
+/// over the points,
 ///   w_j = exp(-d_j^2 / (2 h^2)),  R = (sum w_j R_j + w_0) / (sum w_j + w_0),
-/// h the course's bandwidth and w_0 the weight of a point three bandwidths away: so far from any
-/// point nothing is known, R goes back to 1 and its spread to gain_sd.
+/// h: bandwidth of the course, w_0: weight of a point three bandwidths away. Far from all points R
+/// returns to 1 and its standard deviation to gain_sd.
 /// Source: Teratani et al. 1995, section 5.
 class CourseLookup {
  public:
-  /// @param gain_sd  spread of a gain of which nothing is known
+  /// @param gain_sd  standard deviation of an unknown gain
   /// @throws InvalidValue when the points do not fit the model
   CourseLookup(const RecordedCourse& course, const ThermalModel& model, std::size_t output,
                double gain_sd);

@@ -12,9 +12,9 @@
 namespace thermocomp {
 namespace {
 
-/// Two refused probings that differ by less than so many standard deviations agree.
+/// Two refused probings within this many standard deviations of each other agree.
 constexpr double agreeing_sigma = 3.0;
-/// A record is asked so often: gains change within minutes.
+/// Period of the look-up; gains change within minutes.
 constexpr std::chrono::seconds look_up_period{1};
 
 bool has_course(const ThermalModel& model, std::size_t output) {
@@ -25,7 +25,7 @@ std::string gain_key(std::size_t group) {
   return std::string("gain").append(std::to_string(group + 1));
 }
 
-/// Of "axis.key" the values of one axis, by key.
+/// Values of one axis from those named "axis.key", by key.
 std::map<std::string, double> of_axis(const std::map<std::string, double>& values,
                                       const std::string& axis) {
   std::map<std::string, double> own;
@@ -112,7 +112,7 @@ RunningCorrection::Gains RunningCorrection::joint_gains() const noexcept {
   for (std::size_t g = 0; g < groups_; ++g) {
     const double recorded = record_.says.sd[g] * record_.says.sd[g];
     const double learned = learned_variance(g);
-    double share = 0.0;  // of what was learned
+    double share = 0.0;  // of the learned gain
     if (std::isfinite(learned))
       share = recorded + learned > 0 ? recorded / (recorded + learned) : 1;
     gains[g] = std::clamp(record_.says.gain[g] + share * (gains[g] - record_.says.gain[g]),
@@ -130,7 +130,7 @@ void RunningCorrection::go_on_from_joint() noexcept {
     record_.probed_sd[g] = std::sqrt(joint_variance(g));
   }
   state_.learned = joint_gains();
-  state_.probed_at = state_.now;  // the time since then is in the variances
+  state_.probed_at = state_.now;  // the variances include the time since the last one
   for (std::size_t i = 0; i <= groups_; ++i)
     for (std::size_t j = 0; j <= groups_; ++j) state_.covariance[i][j] *= scale[i] * scale[j];
 }
@@ -198,7 +198,7 @@ void RunningCorrection::learn_two_phases(double displacement_um, double model_um
   // Without the correction the model is d = rest + p1 + p2.
   const bool by_model = state_.phase == 1 && config_.first_gain == FirstGain::eq_34;
   const double denominator_um = state_.phase == 2 ? p2_um : by_model ? model_um : p1_um;
-  // A gain does not follow from next to nothing.
+  // A small contribution does not determine its gain.
   if (!(std::abs(denominator_um) >= config_.contribution_um_min)) {
     ++state_.refused;
     return;
@@ -292,7 +292,7 @@ void RunningCorrection::move_to(Gains wanted) noexcept {
       std::abs(change_um) > config_.step_um_max ? config_.step_um_max / std::abs(change_um) : 1.0;
   for (std::size_t i = 0; i <= groups_; ++i)
     state_.learned[i] += share * (wanted[i] - state_.learned[i]);
-  for (std::size_t g = 0; g < groups_; ++g)  // a share of the way can round beyond its end
+  for (std::size_t g = 0; g < groups_; ++g)  // rounding may exceed the end
     state_.learned[g] = std::clamp(state_.learned[g], config_.gain_min, config_.gain_max);
   ++state_.taken;
 }
@@ -329,7 +329,7 @@ CorrectionReport RunningCorrection::report() const noexcept {
 std::map<std::string, double> RunningCorrection::persistent(const CorrectionReport& report) {
   std::map<std::string, double> values;
   for (std::size_t g = 0; g < correction_groups_max; ++g) {
-    if (report.gain[g] == 0.0 && report.gain_sd[g] == 0.0) continue;  // there is no such group
+    if (report.gain[g] == 0.0 && report.gain_sd[g] == 0.0) continue;  // no such group
     values[gain_key(g)] = report.gain[g];
     values[gain_key(g).append("_sd")] = report.gain_sd[g];
     if (report.gain_used[g] != report.gain[g])
@@ -356,15 +356,15 @@ void RunningCorrection::restore(const std::map<std::string, double>& of_all_axes
     const double gain = find(gain_key(g), 1.0);
     if (!is_gain(gain)) continue;
     state_.learned[g] = state_.used[g] = gain;
-    // What was learned mid-cut waits for its end in the next life too.
+    // Values learned during a cut wait for its end after a restart too.
     const double gain_used = find(gain_key(g).append("_used"), gain);
     if (is_gain(gain_used)) state_.used[g] = gain_used;
-    // The past of the machine is not known any more: at least as sure as at a first start, never
-    // surer than before it.
+    // The past is unknown after a restart: at most the standard deviation of a first start, never
+    // less than before the restart.
     const double sd = find(gain_key(g).append("_sd"), config_.gain_sd);
     if (sd >= 0 && sd <= config_.gain_sd) state_.covariance[g][g] = sd * sd;
   }
-  // Several probings together may have taught more than one step.
+  // Several probings may add up to more than one step.
   const auto is_bias = [](double value) { return std::abs(value) <= offset_um_max_of_any_axis; };
   const double bias_um = find("bias_um", 0.0);
   if (groups_ > 0 && is_bias(bias_um)) {

@@ -1,4 +1,4 @@
-/// Gains of the model that are corrected while it runs, from a displacement measured now and then.
+/// Online correction of the model's gains from occasional displacement measurements.
 #pragma once
 
 #include <array>
@@ -18,21 +18,21 @@
 
 namespace thermocomp {
 
-/// The state of one axis' correction, for people.
+/// State of one axis' correction, for reports.
 struct CorrectionReport {
   std::array<double, correction_groups_max> gain{};       ///< learned, one per group
-  std::array<double, correction_groups_max> gain_used{};  ///< in use: mid-cut those from before it
+  std::array<double, correction_groups_max> gain_used{};  ///< in use; mid-cut those from before it
   std::array<double, correction_groups_max> gain_sd{};    ///< as of the last probing
   double bias_um{0.0};
   double bias_used_um{0.0};
-  double sd_um{0.0};           ///< of the corrected displacement now, as far as gains go
+  double sd_um{0.0};           ///< of the corrected displacement now, from the gains
   bool probing_wanted{false};  ///< sd_um is above probe_sd_um
   std::uint8_t phase{1};       ///< two_phase: 1 or 2
   std::uint64_t taken{0};      ///< probings that changed the gains
-  std::uint64_t refused{0};    ///< outliers, and those that could say nothing
+  std::uint64_t refused{0};    ///< outliers, and probings without information
   bool has_record{false};      ///< the model has a course of this axis; then also:
-  std::array<double, correction_groups_max> recorded{};     ///< what it says of the gains now
-  std::array<double, correction_groups_max> recorded_sd{};  ///< and how surely
+  std::array<double, correction_groups_max> recorded{};     ///< recorded gains at the present state
+  std::array<double, correction_groups_max> recorded_sd{};  ///< ... and their standard deviations
 };
 
 /// One axis. With contributions p_g = sum over the inputs of group g of matrix * rise, and model
@@ -42,22 +42,21 @@ struct CorrectionReport {
 ///   phase 1   R_1 = (d_ex - d + p_1) / p_1        R_2 = 1
 ///             or as printed: R_1 = d_ex / d (eq. 34), R_1 = d_ex / p_1 (eq. 31)
 ///   phase 2   R_1 stays, R_2 = (d_ex - d + p_2 - (R_1 - 1) p_1) / p_2
-/// Phase 2 begins when the measured displacement has turned by turn_um. A p below
+/// Phase 2 begins when the measured displacement has come back by turn_um. A p below
 /// contribution_um_min changes nothing.
 ///
-/// constant: the form before that, d = Ki (A - B) - Ci: bias = d_ex - d, the gains stay.
+/// constant: the earlier form d = Ki (A - B) - Ci: bias = d_ex - d, the gains stay.
 ///
-/// recursive: a Kalman filter whose state is the gains (and a bias), which wander with
-/// gain_drift_per_sqrt_h; a probing further off than outlier_sigma is refused, unless the next one
-/// agrees with it.
+/// recursive: a Kalman filter whose state is the gains (and a bias) as random walks of
+/// gain_drift_per_sqrt_h; a probing beyond outlier_sigma is refused unless the next one agrees.
 ///
-/// With a recorded course (`[course]` of the model) the gains in use are the mean of what was
-/// learned and of what the record says at the present state, weighted by their variances; what was
-/// learned grows uncertain with gain_drift_per_sqrt_h, from noise_um / |p_g| at the last probing
-/// (two_phase) or by the filter (recursive). A probing goes on from the gains in use.
+/// With a recorded course (`[course]` of the model) the gains in use are the mean of the learned
+/// and the recorded gains at the present state, weighted by their variances. The variance of a
+/// learned gain grows with gain_drift_per_sqrt_h, from noise_um / |p_g| at the last probing
+/// (two_phase) or from the filter (recursive). A probing starts from the gains in use.
 ///
 /// A probing moves the estimate by at most step_um_max, the gains stay in [gain_min, gain_max], and
-/// nothing that was learned is used before `may_change`.
+/// learned values are not used before `may_change`.
 class RunningCorrection {
  public:
   using Contributions = std::array<double, correction_groups_max>;
@@ -66,27 +65,27 @@ class RunningCorrection {
   RunningCorrection(const CorrectionConfig& config, const ThermalModel& model, std::size_t output);
 
   /// @param rise_K      of the model's temperature columns
-  /// @param may_change  false while cutting: what was learned waits
+  /// @param may_change  false while cutting: learned values wait
   void step(nanoseconds now, std::span<const double> rise_K, bool may_change) noexcept;
-  /// By how much the corrected displacement differs from the model's [um].
+  /// Corrected displacement less the model's [um].
   [[nodiscard]] double correction_um() const noexcept { return correction_of(state_.used); }
   /// The same at another state of the machine.
   [[nodiscard]] double correction_um(std::span<const double> rise_K) const noexcept {
     return correction_of(state_.used, contributions_um(rise_K));
   }
   struct Measured {
-    double displacement_um{0.0};  ///< measured, as it would be without any offset
-    double model_um{0.0};         ///< the model's at the same moment, without correction
+    double displacement_um{0.0};  ///< measured, without any offset
+    double model_um{0.0};         ///< of the model at the same time, without correction
     double sd_um{0.0};            ///< 0: noise_um
-    std::optional<Contributions> contributions_um{};  ///< of that moment; none: this one
+    std::optional<Contributions> contributions_um{};  ///< at that time; none: now
   };
   void measured(const Measured& measured) noexcept;
-  /// Counts a probing that could say nothing.
+  /// Counts a probing without information.
   void refuse() noexcept { ++state_.refused; }
   [[nodiscard]] const Contributions& contributions_um() const noexcept {
     return state_.contributions_um;
   }
-  /// The displacement's correction with all that was learned, in use or not yet [um].
+  /// Correction with all learned values, in use or not yet [um].
   [[nodiscard]] double learned_um() const noexcept { return correction_of(joint_gains()); }
   /// A new reference: displacements count from here. Gains stay as they are.
   void restart() noexcept;
@@ -96,7 +95,7 @@ class RunningCorrection {
   [[nodiscard]] static std::map<std::string, double> persistent(const CorrectionReport& report);
   /// Before the first step, from "AXIS.gain1" and so on. Values that cannot be gains are ignored.
   void restore(const std::map<std::string, double>& of_all_axes, const std::string& axis);
-  /// After a reload, where the groups are the same.
+  /// After a reload, if form and groups are the same.
   void adopt(const RunningCorrection& previous) noexcept;
 
   void visit_state(StateArchive& archive) {
@@ -126,27 +125,26 @@ class RunningCorrection {
     }
   };
 
-  /// State of the look-up; only with a course, so that the states of other machines stay as they
-  /// are.
+  /// State of the look-up; archived only with a course, so that other states keep their layout.
   struct Record {
     explicit Record(double back_um) : phase(back_um) {}
     HeatPhase phase;
     RecordedGains says{};
     bool looked{false};
     nanoseconds looked_at{};
-    Contributions probed_sd{};  ///< of what was learned, at the last probing
+    Contributions probed_sd{};  ///< standard deviation of the learned gains at the last probing
     void visit_state(StateArchive& archive) {
       archive(phase, says.gain, says.sd, looked, looked_at, probed_sd);
     }
   };
 
   void look_up(std::span<const double> rise_K) noexcept;
-  /// Variance of a learned gain now; infinite before the first probing of this life.
+  /// Variance of a learned gain now; infinite before the first probing since the start.
   [[nodiscard]] double learned_variance(std::size_t group) const noexcept;
-  /// Variance of the gain in use: that of the surer of the two, since what was learned went on from
-  /// the record and does not add to it.
+  /// Variance of the gain in use: the smaller of the two, since learning started from the record
+  /// and is not independent of it.
   [[nodiscard]] double joint_variance(std::size_t group) const noexcept;
-  /// What was learned, joined with what the course says, if there is one.
+  /// Learned gains, joined with those of the course if there is one.
   [[nodiscard]] Gains joint_gains() const noexcept;
   void go_on_from_joint() noexcept;
   [[nodiscard]] Contributions contributions_um(std::span<const double> rise_K) const noexcept;

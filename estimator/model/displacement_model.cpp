@@ -33,14 +33,14 @@ Matrix matrix_from(const std::vector<std::vector<double>>& rows, std::size_t cou
   return matrix;
 }
 
-/// Rows of one guideway: at each position one row for each of its outputs.
+/// Rows of one guideway, one per position and output.
 struct Guideway {
   std::size_t signal{0};
   std::vector<double> positions_mm;
   std::vector<std::size_t> outputs;
-  std::vector<Matrix> rows_um_per_K;  ///< one an output, shape (positions, inputs)
+  std::vector<Matrix> rows_um_per_K;  ///< one per output, shape (positions, inputs)
 
-  /// The two positions around `position_mm` and the share of the second one.
+  /// Index of the position below `position_mm`, and the share of the one above.
   [[nodiscard]] std::pair<Eigen::Index, double> place(double position_mm) const noexcept {
     const auto above = std::upper_bound(positions_mm.begin(), positions_mm.end(), position_mm);
     if (above == positions_mm.begin()) return {0, 0.0};
@@ -70,8 +70,8 @@ Guideway guideway_from(const GuidewaySpec& spec, const ThermalModel& model,
   return guideway;
 }
 
-/// By all that a term's state depends on. Gains do not live in the state, so a term with new gains
-/// keeps its past.
+/// Orders by all that a term's state depends on. Gains are not part of the state, so a term with
+/// new gains keeps it.
 struct ByState {
   bool operator()(const TermSpec* a, const TermSpec* b) const {
     const auto key = [](const TermSpec& term) {
@@ -202,7 +202,7 @@ void DisplacementModel::copy_states(const DisplacementModel& same) noexcept {
 
 std::vector<int> DisplacementModel::plan_terms(const DisplacementModel& other) const {
   const std::vector<TermSpec>& theirs = other.equation_->term_specs;
-  std::map<const TermSpec*, int, ByState> known;  // of two that are the same the first
+  std::map<const TermSpec*, int, ByState> known;  // the first of duplicates
   for (std::size_t i = 0; i < theirs.size(); ++i)
     known.try_emplace(&theirs[i], static_cast<int>(i));
   std::vector<int> plan;
@@ -215,7 +215,7 @@ std::vector<int> DisplacementModel::plan_terms(const DisplacementModel& other) c
 
 void DisplacementModel::adopt_terms(const DisplacementModel& other,
                                     std::span<const int> plan) noexcept {
-  std::vector<std::byte>& state = equation_->states;  // a planned term's is as large as ours
+  std::vector<std::byte>& state = equation_->states;  // as large as ours for each planned term
   for (std::size_t i = 0; i < plan.size(); ++i) {
     if (plan[i] < 0) continue;
     StateArchive save{std::span<std::byte>(state)};

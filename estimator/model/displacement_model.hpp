@@ -1,4 +1,4 @@
-/// delta = P (T - T_ref), rows of guideways at the present position, and the extension terms.
+/// delta = P (T - T_ref), with rows of guideways at the present position and extension terms.
 #pragma once
 
 #include <memory>
@@ -21,7 +21,7 @@ class DisplacementModel {
   DisplacementModel(DisplacementModel&&) noexcept;
   DisplacementModel& operator=(DisplacementModel&&) noexcept;
 
-  /// Lags start anew at the next step, each at its input's value (as if it had stood there long).
+  /// Lags restart at the next step, in the steady state of their inputs.
   void restart() noexcept;
 
   /// @param now              time of the values; must not run backwards
@@ -36,8 +36,8 @@ class DisplacementModel {
             std::span<double> displacement_um) noexcept;
 
   /// The derivative of an output with respect to the temperatures, at these rises and positions:
-  /// matrix, guideway rows and terms. Where a term acts with a lag, the larger of its effect at
-  /// first and in the end.
+  /// matrix, guideway rows and terms. For a lagged term, the larger of its initial and its final
+  /// effect.
   /// @param rise_K          shape (temperature_columns)
   /// @param signals         shape (signal_columns)
   /// @param slope_um_per_K  shape (temperature_columns); overwritten

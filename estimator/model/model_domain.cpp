@@ -14,7 +14,7 @@ namespace thermocomp {
 namespace {
 
 constexpr nanoseconds between_looks = std::chrono::seconds(1);
-/// What a single run has not shown of the machine, as a share of the displacement without a model.
+/// Behaviour that a single run has not shown, as a share of the displacement without a model.
 constexpr double unseen_share = 0.3;
 
 bool is_input(const MadeFrom& made_from, std::size_t column) {
@@ -72,7 +72,7 @@ struct ModelDomain::Metric {
   std::vector<double> mean;
   std::vector<double> lower;  ///< L^-1, row by row
   double distance_max{0.0};
-  std::array<std::vector<double>, 2> spread_um;  ///< inside and outside; one an output
+  std::array<std::vector<double>, 2> spread_um;  ///< inside and outside; one per output
   struct State {
     bool started{false};
     nanoseconds looked_at{};
@@ -85,7 +85,7 @@ struct ModelDomain::Metric {
   };
   State state;
   std::vector<double> feature;  ///< scratch
-  std::vector<double> values;   ///< one a column; scratch
+  std::vector<double> values;   ///< one per column; scratch
 
   void follow(double step_s) noexcept {
     for (std::size_t j = 0; j < taus_s.size(); ++j) {
@@ -188,7 +188,7 @@ std::size_t ModelDomain::furthest_column() const {
     off[i] = metric.feature[at] - metric.mean[at];
     for (Eigen::Index j = 0; j <= i; ++j) inverse(i, j) = *value++;
   }
-  // d^2 is the sum of these.
+  // The parts add up to d^2.
   const Eigen::VectorXd parts = off.cwiseProduct(inverse.transpose() * (inverse * off));
   std::vector<double> of_column(metric.columns.size(), 0.0);
   Eigen::Index at = 0;
@@ -224,7 +224,7 @@ bool ModelDomain::alike(const ModelDomain& other) const {
 }
 
 void ModelDomain::adopt(const ModelDomain& other) noexcept {
-  metric_->state = other.metric_->state;  // same sizes: copies into what is there
+  metric_->state = other.metric_->state;  // same sizes: no allocation
 }
 
 }  // namespace thermocomp

@@ -1,5 +1,4 @@
-/// How far the machine is from where its model was made, and for which share of the last day it was
-/// outside.
+/// Distance of the machine from the data of its model, and the share of the last day spent outside.
 #pragma once
 
 #include <array>
@@ -15,11 +14,10 @@
 
 namespace thermocomp {
 
-/// Hours of a day, each with the time that was looked at and the part of it that was outside. The
-/// hour that is 24 h old is dropped as a new one begins.
+/// Observed time and time outside in each of the last 24 hours; a new hour replaces the oldest.
 class OutsideShare {
  public:
-  /// @param now  must not run backwards; a gap of more than a minute counts as not looked at
+  /// @param now  must not run backwards; a gap of more than a minute counts as not observed
   void step(nanoseconds now, bool outside) noexcept {
     const double gap_s = std::chrono::duration<double>(now - at_).count();
     const bool first = !started_;
@@ -36,7 +34,6 @@ class OutsideShare {
     if (outside) outside_s_[hour_] += gap_s;
   }
 
-  /// 0 before anything was looked at.
   [[nodiscard]] double share() const noexcept {
     double looked_s = 0.0;
     double outside_s = 0.0;
@@ -61,23 +58,23 @@ class OutsideShare {
   std::array<double, hours> outside_s_{};
 };
 
-/// What a prediction may be off by [um, 1 sd]:
+/// Standard deviation of a prediction's error [um]:
 ///
 ///     hypot(left_out_rms_um, 0.3 no_model_rms_um / sqrt(runs)).
 ///
-/// The second part is what the runs have not shown; outside the domain they count as one. Further
-/// growth with the distance is not in measured machines (docs/measurements.md).
+/// The second part is for behaviour that the runs have not shown; outside the domain runs = 1.
+/// Measured machines show no further growth with the distance (docs/measurements.md).
 [[nodiscard]] double spread_um(const MadeFrom& made_from, const MadeFrom::Output& output,
                                bool outside);
 
-/// The distance of what the model reads from the rows that it was made from, in the metric of their
+/// Distance of the model's inputs from the rows that it was made from, in the metric of their
 /// covariance S,
 ///
 ///     d^2 = (x - m)^T S^-1 (x - m) / n,
 ///
 /// x: levels of the temperatures [degC], then, after each low pass of the domain, rises of the
-/// temperatures and signals; n: their number. About 1 where the model was made; large in directions
-/// that were never excited. Evaluated once a second, since temperatures do not move faster.
+/// temperatures and signals; n: their number. About 1 within the rows; large in directions that
+/// were never excited. Evaluated once a second, since temperatures change slowly.
 class ModelDomain {
  public:
   /// @param model  with `made_from`. @throws InvalidValue when shapes or names do not fit
@@ -86,25 +83,23 @@ class ModelDomain {
   ModelDomain(ModelDomain&&) noexcept;
   ModelDomain& operator=(ModelDomain&&) noexcept;
 
-  /// Low passes start anew at the next step.
+  /// Low passes restart at the next step.
   void restart() noexcept;
-  /// The arguments of DisplacementModel::step(). Never throws, never allocates; once a second
-  /// O(n^2).
+  /// Arguments as DisplacementModel::step(). Never throws, never allocates; O(n^2) once a second.
   void step(nanoseconds now, std::span<const double> temps_degC,
             std::span<const double> reference_degC, std::span<const double> signals) noexcept;
 
   [[nodiscard]] double distance() const noexcept;  ///< d; 0 before the first step
   [[nodiscard]] bool outside() const noexcept;     ///< d > distance_max
-  /// Which of `made_from.columns` most of d^2 is of, its level and its past together; O(n^2).
+  /// Index in `made_from.columns` of the largest part of d^2, over level and low passes; O(n^2).
   [[nodiscard]] std::size_t furthest_column() const;
-  /// The share of the model's displacement that is still believed: 1 inside, (distance_max / d)^2
-  /// outside.
+  /// Share of the model's displacement in use: 1 inside, (distance_max / d)^2 outside.
   [[nodiscard]] double believed_share() const noexcept;
-  /// spread_um() of an output here; NaN: nothing is known about it.
+  /// spread_um() of an output at the present distance; NaN: unknown.
   [[nodiscard]] double sd_um(std::size_t output) const noexcept;
 
   void visit_state(StateArchive& archive);
-  /// Whether `other` keeps the same states.
+  /// True if `other` has the same states.
   [[nodiscard]] bool alike(const ModelDomain& other) const;
   /// @pre alike(other)
   void adopt(const ModelDomain& other) noexcept;
@@ -114,8 +109,7 @@ class ModelDomain {
   std::unique_ptr<Metric> metric_;
 };
 
-/// Number of features of a domain: levels of the temperatures, then (temperatures + signals) times
-/// low passes.
+/// Number of features: temperatures + (temperatures + signals) x low passes.
 [[nodiscard]] std::size_t domain_features(const MadeFrom& made_from);
 
 }  // namespace thermocomp

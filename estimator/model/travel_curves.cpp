@@ -12,12 +12,12 @@
 namespace thermocomp {
 namespace {
 
-/// Three points in order, and the line that has them at equal distances on alternating sides.
+/// A line at equal distances from three ordered points, on alternating sides.
 struct Levelled {
   std::array<std::size_t, 3> at{};
   double base{0.0};  ///< at the first point of the curve
   double slope{0.0};
-  double level{0.0};  ///< of the middle one above the line; the outer ones are below by as much
+  double level{0.0};  ///< of the middle point above the line; the outer ones are below by as much
 
   Levelled(std::span<const double> x, std::span<const double> y,
            const std::array<std::size_t, 3>& points)
@@ -34,7 +34,7 @@ struct Levelled {
   }
 };
 
-/// The point takes the place of the one beside it that lies on the same side of the line.
+/// The point replaces its neighbour on the same side of the line.
 std::array<std::size_t, 3> exchanged(const Levelled& line, std::size_t point, double above) {
   const auto [a, b, c] = line.at;
   const bool like_middle = std::signbit(above) == std::signbit(line.level);
@@ -52,7 +52,7 @@ CurveLine minimax_line(std::span<const double> x, std::span<const double> y) noe
   for (const double value : y)
     if (!std::isfinite(value)) return {not_a_number, not_a_number, not_a_number};
   if (last == 1) return {y[0], y[1], 0.0};
-  // Each exchange raises the level; the count is a bound for values that are no numbers.
+  // Each exchange raises the level; the count is a bound in case rounding prevents that.
   const std::size_t exchanges_max = 4 * x.size();
   std::array<std::size_t, 3> points{0, last / 2, last};
   for (std::size_t exchanges = 0;; ++exchanges) {
@@ -71,7 +71,7 @@ CurveLine minimax_line(std::span<const double> x, std::span<const double> y) noe
 
 namespace {
 
-/// Beside the kinks, for terms that are no straight lines between them.
+/// In addition to the kinks, for terms that are not linear between them.
 constexpr std::size_t even_samples = 9;
 
 void check_order(const std::vector<AxisConfig>& axes, const AxisSpan& span) {

@@ -1,5 +1,5 @@
-/// The displacement along the travel of axes whose controller interpolates by itself, and what it
-/// is at the nodes that the controller gets.
+/// Displacement along the travel of axes whose controller interpolates, and its values at the nodes
+/// sent to the controller.
 #pragma once
 
 #include <cstddef>
@@ -14,38 +14,37 @@ namespace thermocomp {
 
 /// y = at_first + (at_last - at_first) (x - x_first) / (x_last - x_first)
 struct CurveLine {
-  double at_first{0.0};   ///< value at the first point
-  double at_last{0.0};    ///< value at the last point
+  double at_first{0.0};
+  double at_last{0.0};
   double deviation{0.0};  ///< largest |y_i - line(x_i)|
 };
 
-/// The line whose largest deviation from the points is the least possible: it passes between three
-/// of them at equal distances, on alternating sides, and no other point lies further off.
+/// The line with the smallest maximum deviation from the points: it passes three of them at equal
+/// distances on alternating sides, and no other point is further off. NaN if a value is not finite.
 /// @param x  strictly increasing, two points at least
 /// @param y  shape (x)
-/// Never throws, never allocates. A value that is no number gives a line that is none.
+/// Never throws, never allocates.
 /// Source: E. Ya. Remez, exchange algorithm for a polynomial of the first degree on a finite set.
 [[nodiscard]] CurveLine minimax_line(std::span<const double> x, std::span<const double> y) noexcept;
 
-/// Where the curve of an output along a position is looked at: its kinks (positions of guideways)
-/// and `even` places from end to end, both ends among them; increasing.
+/// Sample positions of an output's curve: its kinks (positions of guideways) and `even` equidistant
+/// places, both ends among them; increasing.
 [[nodiscard]] std::vector<double> travel_samples_mm(const ThermalModel& model,
                                                     const std::string& position, double low_mm,
                                                     double high_mm, std::size_t even);
 
-/// At each node of a table the curve itself; at both ends of a line the straight line whose largest
-/// deviation from the curve is the least possible.
+/// Offsets at the nodes: of a table the curve itself, of a line the ends of its minimax line.
 class TravelCurves {
  public:
-  /// @throws InvalidValue for a position that is no signal of the model or nodes out of order
+  /// @throws InvalidValue for a position that is not a signal of the model, or nodes out of order
   TravelCurves(const EstimatorConfig& config, const ThermalModel& model);
 
   [[nodiscard]] bool empty() const noexcept { return travels_.empty(); }
 
-  /// @param evaluate  (signals, displacement_um of the outputs): the model at this moment with the
-  ///                  slides at these positions; must not move on by being asked
-  /// @param signals   shape (signal_columns), of the moment
-  /// @param axis_um   one an axis; of nodes overwritten, the others are left as they are
+  /// @param evaluate  (signals, displacement_um of the outputs): the model at this time with the
+  ///                  slides at these positions; must not change its state
+  /// @param signals   shape (signal_columns), present values
+  /// @param axis_um   one per axis; only nodes are overwritten
   /// Never allocates.
   template <class Evaluate>
   void step(Evaluate&& evaluate, std::span<const double> signals,
@@ -78,13 +77,13 @@ class TravelCurves {
   std::vector<double> outputs_um_;  ///< scratch, shape (outputs)
 };
 
-/// Where an axis' entry stands for a place: the signal that says so, and its value there.
+/// Position of a node along its travel: the signal and its value there.
 struct NodePlace {
   bool is_node{false};
   std::size_t signal{0};
   double position_mm{0.0};
 };
-/// One an axis. @throws InvalidValue as TravelCurves
+/// One per axis. @throws InvalidValue as TravelCurves
 [[nodiscard]] std::vector<NodePlace> node_places(const EstimatorConfig& config,
                                                  const ThermalModel& model);
 

@@ -85,8 +85,8 @@ std::vector<Command> saved_commands(const EstimatorConfig& config, const Persist
 
 namespace {
 
-/// The machine is straight now. All or nothing: a reference of two moments would be no state that
-/// the machine was ever in.
+/// Takes the reference only if all inputs are good: values of two moments would be a state in which
+/// the machine never was.
 void take_reference(Stages& stages) noexcept {
   if (!stages.sensing.all_good()) return;
   const std::span<const double> temps_degC = stages.sensing.blocks().temps_degC();
@@ -97,7 +97,7 @@ void take_reference(Stages& stages) noexcept {
   stages.cycle_update.restart(stages.record.now, temps_degC, stages.signals.of_model());
 }
 
-/// What the tool is offset by now, as a displacement: of a travel between its nodes.
+/// Offset of the tool now, as a displacement; for a travel interpolated between its nodes.
 double compensated_now_um(const Stages& stages, std::size_t axis) noexcept {
   const AxisSpan span = stages.axes.span(axis);
   if (span.count == 1) return stages.axes.compensated_um(axis);
@@ -114,7 +114,7 @@ PastMoment present(const Stages& stages, std::size_t axis) noexcept {
                                 stages.prediction.output_um(stages.axis_output[axis]));
 }
 
-/// The moment of which a `measured` command speaks; none: it is not remembered.
+/// State at the time of a `measured` command; none: not kept.
 std::optional<PastMoment> moment_of(const Stages& stages, const Command& command,
                                     std::size_t axis) noexcept {
   if (command.ago_s == 0) return present(stages, axis);
@@ -123,12 +123,12 @@ std::optional<PastMoment> moment_of(const Stages& stages, const Command& command
   return then != nullptr ? std::optional(*then) : std::nullopt;
 }
 
-/// What was measured where the slide stands teaches all nodes of its travel.
+/// A value measured at the slide's position corrects all nodes of the travel.
 void take_measured(Stages& stages, const Command& command) noexcept {
   Probings& learned = stages.learned;
   const AxisSpan span = stages.axes.span(command.axis);
   for (std::size_t i = span.first; i < span.end(); ++i) learned.note(i, command.value_um);
-  if (!stages.record.displacement_known) return;  // nothing to compare it with
+  if (!stages.record.displacement_known) return;  // nothing to compare with
   const MeasuredValue value{command.value_um, 1e-3 * command.sd_nm, command.source};
   for (std::size_t i = span.first; i < span.end(); ++i) {
     if (const std::optional<PastMoment> then = moment_of(stages, command, i))
@@ -138,7 +138,7 @@ void take_measured(Stages& stages, const Command& command) noexcept {
   }
 }
 
-/// Where each axis is now, for parts that are measured later.
+/// Keeps the present state of each axis for parts measured later.
 void remember(Stages& stages) noexcept {
   if (!stages.record.displacement_known || !stages.learned.must_remember(stages.record.now)) return;
   for (std::size_t i = 0; i < stages.axes.size(); ++i) {
@@ -148,7 +148,7 @@ void remember(Stages& stages) noexcept {
   }
 }
 
-/// What was held between two cycle ends; a temperature that no sensor can show was not.
+/// Restores the state held between two cycle ends, as far as its temperatures can be measured.
 void restore_held(Stages& stages, const PersistentState& state) {
   const std::vector<std::string> columns = stages.model.temperature_columns();
   const std::vector<std::string> names = stages.model.signal_columns();

@@ -102,10 +102,10 @@ TargetRule::TargetRule(const EstimatorConfig& config)
 Targets TargetRule::step(Mode mode, std::span<const double> axis_um,
                          const Displacement& displacement, const Signals& signals) noexcept {
   Targets targets{targets_um_};
-  // Only a clear "not cutting" lets the offset change.
+  // Only a definite "not cutting" lets the offset change.
   targets.may_change = !hold_while_cutting_ || signals.surely_not_cutting();
   targets.waits_for_cut = mode == Mode::ramping_to_zero && signals.may_be_cutting();
-  // Before the first cycle end there is nothing to go to: where it stands is the target.
+  // Before the first cycle end there is no target: an axis keeps its offset.
   targets.stand_where_unknown = mode == Mode::compensating;
   const bool to_zero =
       mode == Mode::disabled || (mode == Mode::ramping_to_zero && !targets.waits_for_cut);

@@ -1,5 +1,4 @@
-/// What the estimator does in a step, why it does not simply compensate, and where each axis is to
-/// go.
+/// Mode and reasons of a step, and the targets of the axes.
 #pragma once
 
 #include <cstddef>
@@ -16,41 +15,40 @@
 namespace thermocomp {
 
 enum class Mode : std::uint8_t {
-  starting,  ///< not all inputs have had a value yet; offsets stay where they were
-  disabled,  ///< by an operator or the controller's switch; offsets at or on the way to zero
+  starting,  ///< never compensated since the start; offsets stay
+  disabled,  ///< by an operator or the controller's switch; offsets at zero or on the way
   compensating,
   holding,         ///< data lost: offsets stay
-  ramping_to_zero  ///< data lost for longer than hold_s and the policy says so
+  ramping_to_zero  ///< daemon stopping, or data lost for hold_s and on_loss = ramp_to_zero
 };
 [[nodiscard]] std::string_view to_string(Mode mode) noexcept;
 
-/// Why the estimator does not simply compensate; a set of bits.
+/// Reasons and warnings of a step; a set of bits.
 enum class Reason : std::uint32_t {
   operator_disabled = 1u << 0,
   controller_disabled = 1u << 1,  ///< disable_signal is 1
-  block_lost = 1u << 2,           ///< no good sensor left in a block the model needs
-  signal_lost = 1u << 3,          ///< a position or operating signal the model needs is missing
+  block_lost = 1u << 2,           ///< no good sensor in a block that the model needs
+  signal_lost = 1u << 3,  ///< a position or operating signal that the model needs is missing
   no_reference = 1u << 4,
   controller_offline = 1u << 5,
-  not_synced = 1u << 6,  ///< what the controller applies is not known yet
+  not_synced = 1u << 6,  ///< the applied offset is not known yet
   mismatch = 1u << 7,    ///< applied and sent differ
   cutting = 1u << 8,     ///< hold_while_cutting holds the offset
   at_bound = 1u << 9,
-  applied_out_of_bound = 1u << 10,  ///< read-back beyond any bound of ours: axis is not driven
-  block_estimated = 1u << 11,       ///< a warning: compensating, with an estimate for a lost block
-  mismatch_latched =
-      1u << 12,               ///< read-backs that nothing sent explains: not driven until released
-  no_target = 1u << 13,       ///< the model's answer is not a finite number
-  outside_domain = 1u << 14,  ///< the machine is where its model was never made or judged
+  applied_out_of_bound = 1u << 10,  ///< read-back beyond all our bounds: axis is not driven
+  block_estimated = 1u << 11,       ///< a warning: compensating with an estimate of a lost block
+  mismatch_latched = 1u << 12,      ///< unexplained read-backs: not driven until released
+  no_target = 1u << 13,             ///< the model's displacement is not finite
+  outside_domain = 1u << 14,
   sensor_suspected = 1u << 15,    ///< a warning: good values that the neighbours contradict
-  not_written = 1u << 16,         ///< the controller answers, but no write of offsets is confirmed
-  sensor_unconfirmed = 1u << 17,  ///< a reading contradicts the past and nothing confirms it
-  start_unknown = 1u << 18        ///< nothing tells the offset that the controller was sent last
+  not_written = 1u << 16,         ///< the controller answers, but confirms no write of offsets
+  sensor_unconfirmed = 1u << 17,  ///< an unconfirmed reading contradicts the earlier ones
+  start_unknown = 1u << 18        ///< the last sent offset is not known
 };
 inline constexpr std::size_t reasons_count = 19;
 [[nodiscard]] std::string_view to_string(Reason reason) noexcept;
 
-/// Whether a set of reasons (Report::reasons) holds one.
+/// True if a set of reasons (Report::reasons) holds `reason`.
 [[nodiscard]] constexpr bool has_reason(std::uint32_t reasons, Reason reason) noexcept {
   return (reasons & static_cast<std::uint32_t>(reason)) != 0;
 }
@@ -59,27 +57,27 @@ struct ModeInput {
   StepTime time;
   bool displacement_known{false};
   bool controller_online{false};
-  bool axes_synced{false};          ///< what the controller applies is known of each axis
-  bool controller_written{false};   ///< offsets that were sent lately are known to have been taken
+  bool axes_synced{false};          ///< the applied offset of each axis is known
+  bool controller_written{false};   ///< the newest writes of offsets are confirmed
   bool controller_disables{false};  ///< by its switch, as last reported
 };
 
-/// The rule, the first that holds:
+/// The mode is the first that holds:
 ///
 ///     disabled          by the operator or the controller
-///     ramping_to_zero   the daemon is about to end, or nothing worked for longer than hold_s and
-///                       on_loss says so
-///     compensating      displacement, controller and what it applies are known, and the offsets
+///     ramping_to_zero   the daemon is stopping, or nothing worked for longer than hold_s and
+///                       on_loss is ramp_to_zero
+///     compensating      displacement, controller and applied offsets are known, and the offsets
 ///                       are written ("works")
 ///     holding           it worked before
-///     starting          it never did
+///     starting          it has never worked
 class ModeDecision {
  public:
   struct State {
     bool ever_worked{false};
     nanoseconds lost_since{};  ///< the last step that worked, or the first one
     bool enabled{true};        ///< the operator's switch
-    bool stopping{false};      ///< the daemon is about to end: nowhere but to zero
+    bool stopping{false};      ///< the daemon is stopping: offsets to zero
     Mode mode{Mode::starting};
     nanoseconds mode_since{};
   };
@@ -106,16 +104,16 @@ class ModeDecision {
   State state_;
 };
 
-/// Compensating: the negative of the displacement, times the axis' sign. Disabled or on the way to
+/// Compensating: the negative of the displacement, times the axis' sign. Disabled or ramping to
 /// zero: zero. Otherwise: stay.
 ///
-/// Lost data never clear an offset mid-cut, nor where it is not known whether the machine is
-/// cutting: it is held as in Mode::holding, so that one outside a smaller bound still comes in.
+/// Loss of data never clears an offset during a cut, or where cutting is unknown: the offset is
+/// held as in Mode::holding, so that one outside a smaller bound still returns into it.
 class TargetRule {
  public:
   explicit TargetRule(const EstimatorConfig& config);
 
-  /// @param axis_um  one per axis: what is compensated
+  /// @param axis_um  one per axis: the displacement to compensate
   [[nodiscard]] Targets step(Mode mode, std::span<const double> axis_um,
                              const Displacement& displacement, const Signals& signals) noexcept;
 

@@ -7,8 +7,8 @@
 namespace thermocomp {
 namespace {
 
-/// An estimate that became too uncertain serves again below this share of the limit: at the limit
-/// itself a moving slide would switch it on and off.
+/// Share of the limit below which an uncertain estimate is used again, so that a moving slide does
+/// not switch it on and off.
 constexpr double certain_again = 0.9;
 
 }  // namespace
@@ -100,7 +100,7 @@ Displacement Prediction::step(nanoseconds now, const Temperatures& temps,
     predict(now, temps, reference, signals);
     learned.step(now, temps, reference, !signals.may_be_cutting());
     for (std::size_t i = 0; i < axis_um_.size(); ++i) axis_um_[i] = axis_um(i, learned);
-    // Inputs that are good and a model that is may still give no number together.
+    // Good inputs and a valid model may still give a result that is not finite.
     found.known = std::all_of(axis_um_.begin(), axis_um_.end(),
                               [](double value_um) { return std::isfinite(value_um); });
     found.not_finite = !found.known;
@@ -127,7 +127,7 @@ void Prediction::predict(nanoseconds now, const Temperatures& temps,
   if (!curves_.empty()) look_along_travels(now, temps, reference, signals);
 }
 
-/// At this moment once more, so that no lag moves on.
+/// At the same time again, so that no lag advances.
 void Prediction::look_along_travels(nanoseconds now, const Temperatures& temps,
                                     const ReferenceState& reference,
                                     const Signals& signals) noexcept {

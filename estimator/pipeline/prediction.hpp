@@ -1,5 +1,5 @@
-/// From temperatures, reference and signals to the displacement of each axis, and whether the
-/// estimates of lost blocks are good enough to compensate by.
+/// Displacement of each axis from temperatures, reference and signals, and the decision whether
+/// estimates of lost blocks are accurate enough.
 #pragma once
 
 #include <cstddef>
@@ -18,15 +18,15 @@
 
 namespace thermocomp {
 
-/// Standard deviation that the estimated temperatures give each axis,
+/// Standard deviation of each axis from the estimated temperatures,
 ///
-///     sd = sqrt(g^T V g),   g: slope of the axis' output, V: LostBlocks,
+///     sd = sqrt(g^T V g),   g: slope of the axis' output, V: covariance of LostBlocks,
 ///
-/// of a node of a travel with the slide there, against compensation.offset_sd_um_max.
+/// for a node of a travel with the slide there, compared with compensation.offset_sd_um_max.
 class Certainty {
  public:
   struct State {
-    std::vector<double> offset_sd_um;  ///< one per axis; 0 where all is measured
+    std::vector<double> offset_sd_um;  ///< one per axis; 0 if all is measured
     bool uncertain{false};
   };
 
@@ -34,11 +34,11 @@ class Certainty {
   Certainty(const EstimatorConfig& config, const ThermalModel& model,
             const std::vector<std::size_t>& axis_output);
 
-  /// @return whether each column is measured, or estimated well enough. Without signals or a
-  ///         reference nothing is compensated, and nothing new can be said.
+  /// @return true if each column is measured, or estimated well enough. Without signals or a
+  ///         reference the last answer holds.
   [[nodiscard]] bool step(const LostBlocks& lost, const DisplacementModel& model,
                           const ReferenceState& reference, const Signals& signals) noexcept;
-  /// Whether step() would say so, with room for another step: asked before anything is given up.
+  /// Answer of step() with a margin, for use before a sensor is excluded.
   [[nodiscard]] bool would_serve(const LostBlocks& lost, const DisplacementModel& model,
                                  const ReferenceState& reference, const Signals& signals) noexcept;
   [[nodiscard]] double offset_sd_um(std::size_t axis) const noexcept {
@@ -69,17 +69,17 @@ class Certainty {
 
 /// displacement of an axis = share (model now - model at the reference state) + correction,
 ///
-/// share: how far the model is believed outside its domain (outside_domain = "shrink"), else 1.
-/// What was learned by probing stays believed: it is the model that left its domain.
+/// share: part of the model used outside its domain (outside_domain = "shrink"), else 1. The
+/// correction learned from probings is used in full.
 ///
-/// At a node of a travel the model is asked as if the slide stood there; lags have lived through
-/// where it really was.
+/// At a node of a travel the model is evaluated with the slide there; lags follow the real
+/// positions.
 class Prediction {
  public:
   struct State {
     bool zero_known{false};
-    std::vector<double> model_um;  ///< of the outputs, as the model says
-    std::vector<double> zero_um;   ///< of the outputs: the model at the reference state
+    std::vector<double> model_um;  ///< per output
+    std::vector<double> zero_um;   ///< per output: the model at the reference state
   };
 
   /// @param axis_output  axis -> output of the model
@@ -88,25 +88,25 @@ class Prediction {
              const std::vector<std::size_t>& axis_output);
 
   /// @param lost      stepped with `temps`
-  /// @param learned   stepped here, where there is something to correct
+  /// @param learned   stepped here if there is a displacement to correct
   [[nodiscard]] Displacement step(nanoseconds now, const Temperatures& temps,
                                   const ReferenceState& reference, const Signals& signals,
                                   const LostBlocks& lost, Probings& learned) noexcept;
-  /// Whether the estimates are good enough to do without sensors that are not believed.
+  /// True if the estimates are accurate enough without the suspected sensors.
   [[nodiscard]] bool would_serve(const LostBlocks& lost, const ReferenceState& reference,
                                  const Signals& signals) noexcept {
     return certainty_.would_serve(lost, model_, reference, signals);
   }
-  /// A new reference: lags start anew.
+  /// A new reference: lags restart.
   void restart() noexcept;
 
   /// Displacement of an output since the reference; NaN before the first.
   [[nodiscard]] double output_um(std::size_t output) const noexcept {
     return state_.model_um[output] - state_.zero_um[output];
   }
-  /// Where an axis' entry stands for a place of its travel.
+  /// Position of a node along its travel.
   [[nodiscard]] const NodePlace& place(std::size_t axis) const noexcept { return places_[axis]; }
-  /// Displacement of an axis by the model alone; of a node as if the slide stood there.
+  /// Displacement of an axis by the model alone; of a node with the slide there.
   [[nodiscard]] double model_um(std::size_t axis) const noexcept {
     if (!places_[axis].is_node) return output_um(axis_output_[axis]);
     return node_um_[axis] - state_.zero_um[axis_output_[axis]];
@@ -117,25 +117,24 @@ class Prediction {
   [[nodiscard]] double offset_sd_um(std::size_t axis) const noexcept {
     return certainty_.offset_sd_um(axis);
   }
-  /// What the model says of itself, standard deviation [um]; NaN: it says nothing.
+  /// Claimed error of the model, standard deviation [um]; NaN: none.
   [[nodiscard]] double claimed_sd_um(std::size_t axis) const noexcept {
     return domain_ ? domain_->sd_um(axis_output_[axis]) : not_a_number;
   }
   [[nodiscard]] const std::optional<ModelDomain>& domain() const noexcept { return domain_; }
   [[nodiscard]] double outside_share_24h() const noexcept { return outside_share_.share(); }
-  /// As of this step, for whoever goes on from the state of its lags.
   [[nodiscard]] const DisplacementModel& model() const noexcept { return model_; }
 
-  /// How the terms of another one become those of this one.
+  /// Index of the other prediction's term for each of ours.
   [[nodiscard]] std::vector<int> plan_terms(const Prediction& previous) const {
     return model_.plan_terms(previous.model_);
   }
   [[nodiscard]] bool same_domain(const Prediction& previous) const {
     return domain_ && previous.domain_ && domain_->alike(*previous.domain_);
   }
-  /// After a reload: lags, domain and certainty go on; displacement is asked for anew.
+  /// After a reload: lags, domain and certainty continue; displacement is computed anew.
   void adopt(const Prediction& previous, const std::vector<int>& terms, bool domain) noexcept;
-  /// Lags and domain of one that ran beside. @pre made from the same model
+  /// Lags and domain of a parallel prediction. @pre made from the same model
   void adopt_model(const Prediction& beside) noexcept;
   void visit_lags(StateArchive& archive) { archive(model_); }
   void visit_domain(StateArchive& archive);
@@ -158,11 +157,11 @@ class Prediction {
 
   const OutsidePolicy policy_;
   const std::vector<std::size_t> axis_output_;
-  const std::vector<NodePlace> places_;  ///< one per axis
+  const std::vector<NodePlace> places_;
 
   DisplacementModel model_;
-  DisplacementModel at_reference_;     ///< the same model, only ever asked for the zero
-  std::optional<ModelDomain> domain_;  ///< of a model that says what it was made from
+  DisplacementModel at_reference_;     ///< the same model, evaluated at the reference only
+  std::optional<ModelDomain> domain_;  ///< for a model with [made_from]
   OutsideShare outside_share_;
   Certainty certainty_;
   State state_;

@@ -8,8 +8,7 @@
 namespace thermocomp {
 namespace {
 
-/// No operating signal is larger; a value beyond is a garbled register, and its square would stay
-/// in the lags for ever.
+/// Larger values are garbled registers, whose squares would stay in the lags for ever.
 constexpr double signal_magnitude_max = 1e9;
 
 std::vector<std::size_t> indices_of_model(const EstimatorConfig& config,
@@ -56,12 +55,12 @@ Signals SignalIntake::step(nanoseconds now, const ControllerState& controller) n
   return signals;
 }
 
-/// @return whether all that is needed is known
+/// @return true if all needed signals are known
 bool SignalIntake::take(const ControllerState& controller) noexcept {
   for (std::size_t i = 0; i < names_.size(); ++i)
     state_.last[i] = std::abs(controller.signals[i]) <= signal_magnitude_max ? controller.signals[i]
                                                                              : not_a_number;
-  // A switch whose position is unknown is neither on nor off: hold.
+  // A switch in an unknown position counts as missing: hold.
   bool complete = !disable_ || std::isfinite(last_value(disable_));
   for (std::size_t i = 0; i < model_signals_.size(); ++i) {
     of_model_[i] = state_.last[model_signals_[i]];
@@ -72,7 +71,7 @@ bool SignalIntake::take(const ControllerState& controller) noexcept {
 
 void SignalIntake::adopt(const SignalIntake& previous, const std::vector<int>& plan) noexcept {
   take_by_plan(plan, previous.of_model_, of_model_);
-  // Not whether the controller is there: the next step says that.
+  // `online` is set by the next step.
   if (names_ == previous.names_) state_.last = previous.state_.last;
 }
 

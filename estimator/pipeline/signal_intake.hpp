@@ -1,4 +1,4 @@
-/// From the controller's state to the signals that a step goes by.
+/// Signals of a step, from the controller's state.
 #pragma once
 
 #include <array>
@@ -15,9 +15,8 @@
 
 namespace thermocomp {
 
-/// A controller that is silent, or whose values are older than controller_stale_after_s, tells
-/// nothing: its positions and switches are not acted on, and the offset holds where they are
-/// needed.
+/// A controller that is offline, or whose values are older than controller_stale_after_s, gives no
+/// signals: its positions and switches have no effect, and the offset holds where they are needed.
 class SignalIntake {
  public:
   struct State {
@@ -29,7 +28,7 @@ class SignalIntake {
   SignalIntake(const EstimatorConfig& config, const ThermalModel& model);
 
   [[nodiscard]] Signals step(nanoseconds now, const ControllerState& controller) noexcept;
-  /// Of the model's signals, as last reported.
+  /// The model's signals, as last reported.
   [[nodiscard]] std::span<const double> of_model() const noexcept { return of_model_; }
 
   /// @param plan  from plan_names() for the model's signals

@@ -11,7 +11,7 @@ namespace {
 const EstimatorConfig& checked(const EstimatorConfig& config, const ThermalModel& model) {
   config.compensation.validate();
   check_reference(config, model);
-  // One that is broken is refused before a stage reads its rows.
+  // Refuses a broken model before a stage reads its rows.
   [[maybe_unused]] const DisplacementModel whole{model};
   return config;
 }
@@ -35,9 +35,8 @@ class ReasonSet {
   std::uint32_t bits_{0};
 };
 
-/// Why a step did not simply compensate, from all that the stages handed on.
-/// @param written  by the controller's link, see ControllerState
-/// @return a set of Reason
+/// Reasons of a step, a set of Reason, from the results of the stages.
+/// @param written  see ControllerState
 std::uint32_t reasons_of(const Signals& signals, bool written, const Temperatures& temps,
                          const ReferenceState& reference, const Displacement& displacement,
                          const ModeDecision::State& mode, const Targets& targets,
@@ -56,7 +55,7 @@ std::uint32_t reasons_of(const Signals& signals, bool written, const Temperature
   reasons.add(signals.disable >= 0.5, Reason::controller_disabled);
   reasons.add(!targets.may_change || targets.waits_for_cut, Reason::cutting);
   for (const AxisChannel& axis : axes.all()) {
-    // Of an axis that is not driven nothing is sent.
+    // Nothing is sent for an axis that is not driven.
     reasons.add(signals.online && axis.driven() && !written, Reason::not_written);
     reasons.add(!axis.synced(), Reason::not_synced);
     reasons.add(axis.start_unknown(), Reason::start_unknown);
@@ -137,7 +136,7 @@ void Stages::adopt(const Stages& previous) noexcept {
   cycle_update.adopt(previous.cycle_update, plan.columns, plan.signals, plan.axes, plan.terms);
   axes.adopt(previous.axes, plan.axes);
   record = previous.record;
-  // Nothing of this model has been asked yet.
+  // This model has not been evaluated yet.
   record.displacement_known = false;
   record.reasons = 0;
 }

@@ -1,4 +1,4 @@
-/// The makers of the values of a step, one after the other.
+/// The stages of a step.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@
 
 namespace thermocomp {
 
-/// Time of the steps, and what the last one came to.
+/// Times and results of the last step.
 struct StepRecord {
   std::uint64_t cycle{0};
   bool stepped{false};
@@ -29,7 +29,7 @@ struct StepRecord {
   std::uint32_t reasons{0};
 };
 
-/// How a reload takes over: the previous one's index for each of ours, or -1.
+/// Index of each of our items in the previous one for a reload, or -1.
 struct AdoptionPlan {
   std::vector<int> columns;
   std::vector<int> signals;
@@ -38,7 +38,7 @@ struct AdoptionPlan {
   bool same_domain{false};
 };
 
-/// In the order in which a step goes through them; each knows only what it is handed.
+/// In the order of a step; each stage uses only its arguments.
 struct Stages {
   /// @throws InvalidValue when configuration and model do not fit each other
   Stages(const EstimatorConfig& estimator_config, const ThermalModel& thermal_model);
@@ -51,7 +51,7 @@ struct Stages {
   void visit_state(StateArchive& archive);
 
   const EstimatorConfig config;
-  const ThermalModel model;  ///< of the axes: a diameter is its axis' displacement
+  const ThermalModel model;  ///< in axis units: a diameter is its axis' displacement
   const std::vector<std::size_t> axis_output;  ///< axis -> output of the model
 
   SignalIntake signals;

@@ -12,7 +12,7 @@ namespace {
 
 constexpr nanoseconds never = nanoseconds::min();
 constexpr int no_sensor = -1;
-constexpr int unknown_sensor = -2;  ///< one that the previous bank did not have
+constexpr int unknown_sensor = -2;  ///< not in the previous bank
 
 bool same(const SmoothingConfig& a, const SmoothingConfig& b) {
   return a.form == b.form && a.history == b.history && a.period_s == b.period_s &&
@@ -68,7 +68,7 @@ BlockBank::BlockBank(const EstimatorConfig& config, const std::vector<std::strin
 void BlockBank::read(nanoseconds now, std::span<const Reading> readings) noexcept {
   THERMOCOMP_ENSURE(readings.size() == sensors_.size());
   now_ = now;
-  // All are looked at before any is smoothed: a difference needs its reference of this very cycle.
+  // All are screened before any is smoothed: a difference needs the reference of this cycle.
   waiting_ = jumped_ = 0;
   for (std::size_t i = 0; i < sensors_.size(); ++i) look_at(sensors_[i], now, readings[i]);
   for (std::size_t i = 0; i < sensors_.size(); ++i) values_K_[i] = smooth(sensors_[i], now);
@@ -148,8 +148,8 @@ void BlockBank::surround(std::span<const double> expected_degC,
   }
 }
 
-/// All of its channels show the very same, though what they showed last was not: so does a module
-/// that answers before its first conversions.
+/// All channels show the same value although their last good values differ, as from a module that
+/// answers before its first conversion.
 bool BlockBank::is_not_ready(const std::vector<std::size_t>& module) const noexcept {
   if (module.size() < 2) return false;
   double least_degC = std::numeric_limits<double>::infinity();
@@ -165,7 +165,7 @@ bool BlockBank::is_not_ready(const std::vector<std::size_t>& module) const noexc
   return most_degC - least_degC > sensors_[module.front()].config.screening.rate_allowance_K;
 }
 
-/// Whether a good column hangs on another module.
+/// True if a sensor of another module is in a good column.
 bool BlockBank::has_other_witness(std::size_t module) const noexcept {
   for (std::size_t i = 0; i < witnesses_.size(); ++i)
     if (i != module && witnesses_[i] > 0) return true;
@@ -274,7 +274,7 @@ void BlockBank::plan_adoption(const BlockBank& previous) {
   for (const Block& block : blocks_) {
     const auto found =
         std::find_if(previous.blocks_.begin(), previous.blocks_.end(), [&](const Block& each) {
-          // The same sensors by name: a new file may number them anew.
+          // By name, since a new file may number sensors differently.
           return std::equal(block.sensors.begin(), block.sensors.end(), each.sensors.begin(),
                             each.sensors.end(), [&](std::size_t ours, std::size_t theirs) {
                               return sensor_plan_[ours] == static_cast<int>(theirs);
@@ -304,7 +304,7 @@ void BlockBank::adopt(const BlockBank& previous) noexcept {
     if (!same(sensor.config.smoothing, other.config.smoothing) ||
         previous_reference(sensor) != other.reference)
       continue;
-    sensor.smoother = other.smoother;  // same sizes: copies into what is there
+    sensor.smoother = other.smoother;  // same sizes: no allocation
   }
   for (std::size_t i = 0; i < blocks_.size(); ++i) {
     if (block_plan_[i] < 0) continue;

@@ -1,5 +1,4 @@
-/// From sensors to block temperatures: screening, smoothing, differences, the mean of a block's
-/// sensors.
+/// Block temperatures from sensors: screening, smoothing, differences, mean of a block's sensors.
 #pragma once
 
 #include <span>
@@ -11,40 +10,37 @@
 
 namespace thermocomp {
 
-/// All sensors and the blocks they stand for, in the order of the model's temperature columns.
+/// All sensors and their blocks, in the order of the model's temperature columns.
 class BlockBank {
  public:
   /// @throws InvalidValue when a column has no block or a block no sensor
   BlockBank(const EstimatorConfig& config, const std::vector<std::string>& columns);
 
-  /// Takes in the newest readings.
   void read(nanoseconds now, std::span<const Reading> readings) noexcept;
-  /// How many sensors have a value that does not count yet.
+  /// Number of sensors with an unconfirmed value.
   [[nodiscard]] std::size_t waiting() const noexcept { return waiting_; }
-  /// ... because it jumped.
+  /// ... of these, after a jump.
   [[nodiscard]] std::size_t jumped() const noexcept { return jumped_; }
-  /// Before read(), while values are waiting: what the rest of the machine says of them.
-  /// @param expected_degC, sd_K  of a column; NaN: nothing is expected
+  /// Before read(), while values wait: the expectation from the other blocks.
+  /// @param expected_degC, sd_K  of a column; NaN: no expectation
   void surround(std::span<const double> expected_degC, std::span<const double> sd_K) noexcept;
-  /// Before the first step: the sensor's value contradicted this one when the previous run ended.
+  /// Before the first step: the sensor's value before an unconfirmed jump of the previous run.
   void restore_jump(const std::string& name, double from_degC);
-  /// The sensor's newest value counts. @return whether one was waiting
+  /// Confirms the sensor's newest value. @return true if one was waiting
   bool accept(std::size_t sensor) noexcept;
-  /// Shape (columns): when the last jump of a sensor began that proved true, so that what it showed
-  /// before is refuted; the least time: there was none.
+  /// Shape (columns): start of the last confirmed jump of a sensor, which shows that the values
+  /// before it were wrong; min(): none.
   [[nodiscard]] std::span<const nanoseconds> refuted_at() const noexcept { return refuted_at_; }
-  /// What screening lets through now, before smoothing; one per sensor, NaN: nothing.
+  /// Screened values before smoothing; one per sensor, NaN: none.
   void screened(nanoseconds now, std::span<double> values_K) const noexcept;
-  /// The blocks' temperatures from what was read.
-  /// @param left_out  one per sensor: not to be used; empty: all are
-  /// @return whether every column has a temperature in use
+  /// @param left_out  one per sensor: 1 excludes it; empty: all are used
+  /// @return true if every column has a usable temperature
   bool join(std::span<const std::uint8_t> left_out) noexcept;
-  /// From now on the block's temperature is `temp_degC`, since a sensor of it is left out: the
-  /// deviations of the others count from there.
+  /// A sensor of the block is excluded: the block continues from `temp_degC`, and the deviations of
+  /// its other sensors count from there.
   void continue_from(std::size_t column, double temp_degC) noexcept;
 
-  /// Shape (columns): the blocks' temperatures; the last known one where not good, NaN before the
-  /// first.
+  /// Shape (columns): block temperatures; the last known one where not good, NaN before the first.
   [[nodiscard]] std::span<const double> temps_degC() const noexcept { return temps_degC_; }
   [[nodiscard]] bool good(std::size_t column) const noexcept { return good_[column] != 0; }
   [[nodiscard]] std::span<const std::uint8_t> good() const noexcept { return good_; }
@@ -64,16 +60,16 @@ class BlockBank {
     std::size_t module{0};
     double raw_degC{not_a_number};
     Fault fault{Fault::never_read};
-    bool fresh{false};    ///< the newest reading is a new and good one
-    SensorConfig config;  ///< last: a step does not touch it
+    bool fresh{false};    ///< the newest reading is new and good
+    SensorConfig config;  ///< last: not used in a step
     void visit_state(StateArchive& archive) {
       archive(screening, smoother, raw_degC, fault, fresh);
     }
   };
   struct Block {
     std::vector<std::size_t> sensors;
-    /// By how much each sensor differs from the block's mean, kept from when all were good: a
-    /// sensor that drops out does not shift the mean.
+    /// Deviation of each sensor from the block's mean while all were good, so that the loss of a
+    /// sensor does not shift the mean.
     std::vector<double> deviation_K;
   };
 
@@ -81,24 +77,23 @@ class BlockBank {
   void note_refuted(const Sensor& sensor) noexcept;
   [[nodiscard]] bool is_not_ready(const std::vector<std::size_t>& module) const noexcept;
   [[nodiscard]] bool has_other_witness(std::size_t module) const noexcept;
-  /// @return the sensor's value for its block; NaN where there is none to be used
+  /// @return the sensor's value for its block; NaN: not usable
   [[nodiscard]] double smooth(Sensor& sensor, nanoseconds now) noexcept;
   /// Index of the reference sensor in the previous bank, or no_sensor.
   [[nodiscard]] int previous_reference(const Sensor& sensor) const noexcept;
   [[nodiscard]] bool update(Block& block, double& temp_degC) noexcept;
-  /// From the sensors that are left, less their deviations while all were there. @return whether
-  /// any is left
+  /// Mean of the remaining sensors, less their deviations. @return false if none remains
   [[nodiscard]] bool update_without_the_missing(const Block& block,
                                                 double& temp_degC) const noexcept;
 
   std::vector<Sensor> sensors_;
-  std::vector<std::vector<std::size_t>> modules_;  ///< sensors of each
+  std::vector<std::vector<std::size_t>> modules_;  ///< sensors of each module
   std::size_t waiting_{0};
   std::size_t jumped_{0};
-  std::vector<std::size_t> witnesses_;   ///< scratch, one per module: its sensors of good columns
+  std::vector<std::size_t> witnesses_;   ///< scratch, one per module: its sensors in good columns
   std::vector<nanoseconds> refuted_at_;  ///< one per column
-  std::vector<double> values_K_;         ///< of this step, one per sensor; NaN: not to be used
-  std::vector<double> kept_K_;           ///< scratch: the same, what is left out NaN
+  std::vector<double> values_K_;         ///< of this step, one per sensor; NaN: not usable
+  std::vector<double> kept_K_;           ///< scratch: the same, NaN where excluded
   std::span<const double> in_use_K_;     ///< during join(), one of the two
   std::vector<Block> blocks_;            ///< one per column
   std::vector<double> temps_degC_;

@@ -9,7 +9,7 @@
 namespace thermocomp {
 namespace {
 
-/// A variance below is rounding.
+/// A smaller variance is rounding.
 constexpr double variance_K2_min = 1e-12;
 constexpr double temp_degC_max = 1e4;
 
@@ -55,7 +55,7 @@ void LostBlocks::step(nanoseconds now, std::span<const double> temps_degC,
   for (std::size_t i = 0; i < inputs_; ++i)
     changed = changed || (good[i] == 0) != (state_.lost[i] != 0);
   if (changed) change_pattern(now, temps_degC, good);
-  // Kept longer it would be a state that is not saved: a block may go on by another sensor.
+  // Valid for one step, so not archived: a block may continue with another sensor.
   std::fill(given_K2_.begin(), given_K2_.end(), 0.0);
   for (std::size_t i = 0; i < columns_.size(); ++i)
     if (good[i] != 0 || i >= inputs_) state_.temps_degC[i] = temps_degC[i];
@@ -78,23 +78,23 @@ void LostBlocks::step(nanoseconds now, std::span<const double> temps_degC,
   grow(now);
 }
 
-/// From here on a block without a good sensor is lost, and no longer just not there yet.
+/// From here on a block without a good sensor is lost, not starting up.
 void LostBlocks::begin(std::span<const double> temps_degC,
                        std::span<const std::uint8_t> good) noexcept {
   state_.begun = true;
   for (std::size_t i = 0; i < inputs_; ++i) {
     if (good[i] != 0 || state_.restored[i] == 0) {
       state_.temps_degC[i] = temps_degC[i];
-      // Good once and lost again within the settling time: nobody noted the others then.
+      // Good once and lost again within the settling time: the others were not recorded then.
       state_.known[i] = good[i];
       if (good[i] == 0) state_.lost[i] = 1;
-      // The restored values belong to one moment; they are the anchor together.
+      // Restored values are of one moment; together they are the anchor.
       if (state_.restored[i] == 0) state_.anchor_degC[i] = temps_degC[i];
       continue;
     }
     state_.lost[i] = 1;
     state_.known[i] = 1;
-    // An unknown time ago: its drift is taken for fully grown.
+    // Lost an unknown time ago: its drift counts as fully grown.
     state_.lost_since[i] = nanoseconds::min() / 2;
     state_.temps_degC[i] = state_.anchor_degC[i];
   }
@@ -110,7 +110,7 @@ void LostBlocks::begin(std::span<const double> temps_degC,
   state_.anchored_at = state_.start;
 }
 
-/// The input is measured again: what its estimate was off by tells of the errors of the others.
+/// The input is measured again: the error of its estimate corrects the others.
 void LostBlocks::take_back(std::size_t input, double temp_degC) noexcept {
   const double variance_K2 = state_.error_K2[at(input, input)];
   if (state_.known[input] != 0 && variance_K2 > variance_K2_min) {
@@ -135,7 +135,7 @@ void LostBlocks::take_back(std::size_t input, double temp_degC) noexcept {
 
 void LostBlocks::change_pattern(nanoseconds now, std::span<const double> temps_degC,
                                 std::span<const std::uint8_t> good) noexcept {
-  // What has drifted until now is carried on with.
+  // Carries the drift so far over.
   const double drift = grown(now - state_.anchored_at, growth_.drift_time_s);
   for (std::size_t a = 0; a < state_.lost_count; ++a)
     for (std::size_t b = 0; b < state_.lost_count; ++b) {
@@ -144,7 +144,7 @@ void LostBlocks::change_pattern(nanoseconds now, std::span<const double> temps_d
       state_.drift_K2[at(i, k)] +=
           state_.spread_K2[at(i, k)] * drift_factor(growth_, i) * drift_factor(growth_, k) * drift;
     }
-  // What was estimated a step ago is compared with what is measured now, and goes on from there.
+  // Compares the estimate of the last step with the present value and continues from there.
   for (std::size_t i = 0; i < inputs_; ++i)
     if (good[i] != 0 && state_.lost[i] != 0) take_back(i, temps_degC[i]);
   for (std::size_t i = 0; i < inputs_; ++i) {
@@ -153,10 +153,10 @@ void LostBlocks::change_pattern(nanoseconds now, std::span<const double> temps_d
     state_.lost_since[i] = now;
     for (std::size_t k = 0; k < inputs_; ++k)
       state_.drift_K2[at(i, k)] = state_.drift_K2[at(k, i)] = 0.0;
-    // The value it had last was not exact, and what it would show now would not be either.
+    // Noise of the last value and of the present one.
     state_.drift_K2[at(i, i)] = 2.0 * growth_.noise_K * growth_.noise_K + given_K2_[i];
   }
-  // A lost one: what was last measured, or estimated.
+  // Of a lost input, the last measured or estimated value.
   for (std::size_t i = 0; i < inputs_; ++i)
     state_.anchor_degC[i] = state_.lost[i] != 0 ? state_.temps_degC[i] : temps_degC[i];
   state_.anchored_at = now;
@@ -176,7 +176,7 @@ void LostBlocks::list_lost() noexcept {
     if (state_.lost[i] != 0) state_.lost_at[state_.lost_count++] = i;
 }
 
-/// S = (Q_LL)^-1 by Cholesky, B = -S Q_LO. Loops of our own: a library's may allocate.
+/// S = (Q_LL)^-1 by Cholesky, B = -S Q_LO. Own loops, since a library may allocate.
 void LostBlocks::condition() noexcept {
   const std::size_t n = state_.lost_count;
   const auto place = [this](std::size_t a, std::size_t b) { return at(a, b); };
@@ -184,11 +184,11 @@ void LostBlocks::condition() noexcept {
     for (std::size_t b = 0; b <= a; ++b) {
       double sum = precision_per_K2_[at(state_.lost_at[a], state_.lost_at[b])];
       for (std::size_t c = 0; c < b; ++c) sum -= factor_[place(a, c)] * factor_[place(b, c)];
-      // Q is positive definite by construction, and so is every part of it.
+      // Q and each of its principal submatrices are positive definite.
       factor_[place(a, b)] = a == b ? std::sqrt(sum) : sum / factor_[place(b, b)];
     }
   }
-  // The factor's inverse, in place: then S is the product of its transpose and itself.
+  // Inverts the factor in place; S is the product of its transpose and itself.
   for (std::size_t b = 0; b < n; ++b) {
     factor_[place(b, b)] = 1.0 / factor_[place(b, b)];
     for (std::size_t a = b + 1; a < n; ++a) {
@@ -290,7 +290,7 @@ void LostBlocks::adopt(const LostBlocks& previous) noexcept {
     }
   if (!state_.begun) return;
   for (std::size_t i = 0; i < inputs_; ++i) {
-    // An input that is new has no past: it counts as lost until its first value.
+    // A new input has no past: lost until its first value.
     state_.lost[i] = 1;
     state_.known[i] = 0;
     state_.anchor_degC[i] = state_.temps_degC[i];
@@ -303,7 +303,7 @@ void LostBlocks::adopt(const LostBlocks& previous) noexcept {
       if (input_plan_[k] < 0) continue;
       const auto other = static_cast<std::size_t>(input_plan_[k]);
       if (previous.state_.lost[from] == 0 || previous.state_.lost[other] == 0) continue;
-      // Other factors from now on; the error so far, scatter included, stays what it was.
+      // The factors may have changed; the error so far, scatter included, is kept.
       state_.drift_K2[at(i, k)] = state_.error_K2[at(i, k)] =
           previous.state_.error_K2[previous.at(from, other)];
     }

@@ -12,26 +12,25 @@
 
 namespace thermocomp {
 
-/// Conditional expectation of the lost inputs L given the others O, from the changes since the
-/// inputs were last all known (the anchor a, which is renewed when the set L changes):
+/// Conditional expectation of the lost inputs L given the others O, from the changes since all
+/// inputs were last known (the anchor a, renewed when the set L changes):
 ///
 ///     x_L = a_L + B (x_O - a_O),   B = -S Q_LO,   S = (Q_LL)^-1,   Q = (C + noise^2 I)^-1
 ///
-/// So an estimate begins at the last good value, and needs neither mean nor reference. The
-/// covariance of its error grows from W = 2 noise^2 on the diagonal at the moment of loss. For the
-/// lost inputs i, k:
+/// An estimate starts at the last good value and needs neither mean nor reference. The covariance
+/// of its error grows from W = 2 noise^2 on the diagonal at the loss. For lost inputs i, k:
 ///
 ///     V_ik(h) = W_ik + S_ik (d_i d_k g(h / drift_time) + s_i s_k sqrt(g_i g_k)),  g = 1 - exp(-h)
 ///
-/// d, s: drift_factor and scatter_factor of the model file; W: also the drift so far, carried over
-/// when L changes; g_i: with the time since input i was lost over scatter_time. An input that comes
-/// back tells how wrong its estimate was, and the others still lost are corrected by what that says
-/// of them: x_i += W_ik / V_kk (x_k - estimate of x_k).
+/// d, s: drift_factor and scatter_factor of the model file; W: includes the drift so far when L
+/// changes; g_i: with the time since the loss of input i over scatter_time. When input k returns,
+/// the error of its estimate corrects the inputs still lost: x_i += W_ik / V_kk (x_k - estimate of
+/// x_k).
 /// Source: the conditional distribution of a Gaussian vector by blocks of its precision matrix.
 class LostBlocks {
  public:
-  /// Without a covariance in the model it only passes on what it is given.
-  /// @param settle  so long after the first step nothing is estimated: sensors are still coming up
+  /// Without a covariance in the model it passes its input on.
+  /// @param settle  time after the first step without estimates, while sensors start up
   LostBlocks(const ThermalModel& model, nanoseconds settle);
 
   /// @param temps_degC  shape (columns): the blocks' temperatures, the last known where not good
@@ -43,7 +42,7 @@ class LostBlocks {
 
   /// Shape (columns): measured, or estimated where lost.
   [[nodiscard]] std::span<const double> temps_degC() const noexcept { return state_.temps_degC; }
-  /// Whether every column is measured or estimated.
+  /// True if every column is measured or estimated.
   [[nodiscard]] bool complete() const noexcept { return state_.complete; }
   [[nodiscard]] std::size_t lost_count() const noexcept { return state_.lost_count; }
   [[nodiscard]] bool estimated(std::size_t column) const noexcept;
@@ -52,8 +51,8 @@ class LostBlocks {
   /// Standard deviation of gain . x, with gain of shape (columns). Unit of gain times K.
   [[nodiscard]] double sd_of(std::span<const double> gain_per_K) const noexcept;
 
-  /// Just before the step in which a measured input is given up: the value to take it for, because
-  /// its last measured one is not believed. Does nothing for an input that is lost already.
+  /// Before the step in which a measured input is excluded: the value to continue from instead of
+  /// its last one. Ignored for a lost input.
   void continue_from(std::size_t input, double temp_degC, double sd_K) noexcept;
 
   /// Before the first step: temperature at the end of the previous run, an unknown time ago.
@@ -73,7 +72,7 @@ class LostBlocks {
     std::vector<double> anchor_degC;
     std::vector<double> temps_degC;
     std::vector<std::uint8_t> lost;      ///< one per input
-    std::vector<std::uint8_t> known;     ///< has had a value, or an estimate to go on from
+    std::vector<std::uint8_t> known;     ///< has had a value or an estimate
     std::vector<std::uint8_t> restored;  ///< ... from the previous run only
     std::vector<nanoseconds> lost_since;
     std::vector<std::size_t> lost_at;  ///< the lost inputs, the first lost_count of them
@@ -108,7 +107,7 @@ class LostBlocks {
 
   State state_;
 
-  std::vector<double> given_K2_;  ///< of continue_from(), for the same step
+  std::vector<double> given_K2_;  ///< from continue_from(), for the same step
   std::vector<double> factor_;    ///< scratch: Cholesky factor of Q_LL, then its inverse
   std::vector<int> column_plan_;  ///< index in the previous one, -1: none
   std::vector<int> input_plan_;

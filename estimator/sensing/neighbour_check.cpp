@@ -24,7 +24,7 @@ std::vector<double> precision_per_K2(const ThermalModel& model) {
     for (Eigen::Index j = 0; j < n; ++j)
       covariance_K2(i, j) =
           model.covariance_K2[static_cast<std::size_t>(i)].at(static_cast<std::size_t>(j));
-  // The file's matrix may be negative by what rounding does to large numbers.
+  // Rounding of large numbers may leave the file's matrix slightly negative.
   const double rounding_K2 = 1e-8 * static_cast<double>(n) * covariance_K2.cwiseAbs().maxCoeff();
   covariance_K2.diagonal().array() += std::max(noise_K * noise_K, rounding_K2);
   const Eigen::LLT<Matrix> llt(covariance_K2);
@@ -53,9 +53,9 @@ double scatter_factor(const CovarianceGrowth& growth, std::size_t input) noexcep
 
 namespace {
 
-/// No thermocouple in a machine is better than this over hours, whatever a record's matrix says.
+/// Smallest standard deviation of a thermocouple over hours, whatever the record's matrix gives.
 constexpr double floor_K = 0.1;
-/// Nothing else is left unexplained: below this share of the limit.
+/// A remainder below this share of the limit is explained.
 constexpr double clean_share = 0.75;
 
 }  // namespace
@@ -91,7 +91,7 @@ void NeighbourCheck::prepare(std::span<const double> change_K) noexcept {
   }
 }
 
-/// The precision of the others, when nothing is known of this one.
+/// Precision of the other inputs without this one.
 void NeighbourCheck::leave_out(std::size_t input) noexcept {
   present_[input] = 0;
   --present_count_;
@@ -124,7 +124,7 @@ double NeighbourCheck::variance_K2(std::size_t input, double precision) const no
 }
 
 double NeighbourCheck::score(double y, double precision, std::size_t input) const noexcept {
-  // Rounding may leave nothing of the precision of two inputs that are one.
+  // Rounding may cancel the precision of two identical inputs.
   if (!(precision > 0)) return 0.0;
   return std::abs(y) / precision / std::sqrt(variance_K2(input, precision));
 }
@@ -148,8 +148,8 @@ NeighbourCheck::Choice NeighbourCheck::choose() const noexcept {
   for (std::size_t i = 0; i < inputs_; ++i)
     if (present_[i] != 0) largest = std::max(largest, score(y_[i], left_[at(i, i)], i));
   if (!(largest > asked_.sd_limit)) return choice;
-  // Not only of those that are beyond the limit: one that weighs much in the expectation of another
-  // puts that one further off than itself.
+  // Not only inputs beyond the limit: a wrong one with a large weight in the expectation of another
+  // shifts that one further than itself.
   for (std::size_t i = 0; i < inputs_; ++i) {
     if (present_[i] == 0) continue;
     const double rest = rest_without(i);
@@ -181,7 +181,7 @@ NeighbourCheck::Answer NeighbourCheck::find(std::span<const double> change_K,
     wrong = {i, y_[i] / left_[at(i, i)], std::sqrt(variance_K2(i, left_[at(i, i)]))};
     leave_out(i);
     if (choice.rest > clean) continue;
-    // The first of two was measured with the second among its neighbours.
+    // The first of two was judged with the second among its neighbours.
     if (answer.count > 1) {
       const std::size_t first = answer.wrong[0].input;
       std::copy(change_K.begin(), change_K.end(), motions_.begin());

@@ -1,5 +1,5 @@
-/// Which temperature changed as its neighbours say that it cannot have; and the precision matrix of
-/// the model's inputs, which the expectation of each from the others needs.
+/// Detection of temperatures whose change contradicts their neighbours, and the precision matrix of
+/// the model's inputs.
 #pragma once
 
 #include <array>
@@ -16,47 +16,47 @@ namespace thermocomp {
 /// @throws InvalidValue when the matrix or the growth of its errors does not fit the model
 [[nodiscard]] std::vector<double> precision_per_K2(const ThermalModel& model);
 
-/// 1 - exp(-age / time); 1 where it is grown at once.
+/// 1 - exp(-age / time); for time 0 the step to 1.
 [[nodiscard]] double grown(double age_s, double time_s) noexcept;
 
 [[nodiscard]] double drift_factor(const CovarianceGrowth& growth, std::size_t input) noexcept;
 [[nodiscard]] double scatter_factor(const CovarianceGrowth& growth, std::size_t input) noexcept;
 
-/// A change between two moments, and how sure one must be.
+/// Age of a change and limits of its check.
 struct ChangeAsked {
-  double age_s{0.0};     ///< between the two
-  double share{1.0};     ///< of the variance of a change of that age that the way of asking leaves
-  double sd_limit{1e9};  ///< standard deviations beyond which a remainder is not believed
+  double age_s{0.0};     ///< between its two moments
+  double share{1.0};     ///< variance relative to that of a plain difference of this age
+  double sd_limit{1e9};  ///< remainders beyond this many standard deviations are unexplained
 };
 
-/// Of the changes x of all inputs, and with the precision matrix Q of the model's covariance, what
-/// is left of input i when the others are taken away, and its standard deviation:
+/// Remainder of input i after its expectation from the others, for the changes x of all inputs and
+/// the precision matrix Q of the model's covariance, and its standard deviation:
 ///
 ///     r_i = (Q x)_i / Q_ii,
 ///     sd_i^2 = share a^2 (2 noise^2 + (d_i^2 g(age / drift_time) + s_i^2 g(age / scatter_time)) /
 ///              Q_ii) + floor^2,       g(h) = 1 - exp(-h),
 ///
-/// the growth that the model file states of estimates in hours that it was not made from. A linear
-/// expectation errs in proportion to the motion: a = max(1, median of |x_j| / sqrt(2 C_jj)) tells
-/// how far the change is beyond those of the record.
+/// with the growth that the model file gives for estimates in hours that it was not made from. The
+/// error of a linear expectation is proportional to the motion: the change relative to those of the
+/// record is a = max(1, median of |x_j| / sqrt(2 C_jj)).
 ///
-/// A wrong input moves the expectation of its neighbours too. Named is the one without which
-/// nothing else is left unexplained:
+/// A wrong input also shifts the expectation of its neighbours. The wrong one is the input c
+/// without which no other remainder is left unexplained:
 ///
 ///     y = Q x,   without c:  y_i - Q_ic y_c / Q_cc,   Q_ii - Q_ic^2 / Q_cc;
 ///
-/// two at once where two are needed. None is named where three would be needed, or where another
-/// explains as much: then the machine does what the record never saw, or nothing tells the two
-/// apart.
+/// or two inputs if one is not enough. None is named if three would be needed, or if another input
+/// explains as much: then the machine does what the record never showed, or the two cannot be
+/// distinguished.
 /// Source: conditional distribution of a Gaussian vector by its precision matrix.
 class NeighbourCheck {
  public:
-  static constexpr std::size_t inputs_min = 3;  ///< of two nobody can tell which is wrong
+  static constexpr std::size_t inputs_min = 3;  ///< the wrong one of two inputs cannot be found
   static constexpr std::size_t wrong_max = 2;
 
   struct Wrong {
     std::size_t input{0};
-    double size_K{0.0};  ///< of its change, not explained
+    double size_K{0.0};  ///< unexplained part of its change
     double sd_K{0.0};
   };
   struct Answer {
@@ -70,7 +70,7 @@ class NeighbourCheck {
   /// @param change_K  shape (inputs); NaN: not known
   /// Never throws, never allocates; O(inputs^2 (1 + unknown inputs)).
   [[nodiscard]] Answer find(std::span<const double> change_K, const ChangeAsked& asked) noexcept;
-  /// r of one input. NaN: its change or those of all others are not known.
+  /// r of one input. NaN: its change or those of all others are unknown.
   [[nodiscard]] double remainder_K(std::size_t input, std::span<const double> change_K) noexcept;
 
  private:
@@ -81,13 +81,13 @@ class NeighbourCheck {
   void leave_out(std::size_t input) noexcept;
   [[nodiscard]] double motion() noexcept;
   [[nodiscard]] double variance_K2(std::size_t input, double precision) const noexcept;
-  /// Standardised, of every input that is present; of one that has nothing to say 0.
+  /// Standardised remainder of a present input; 0 without precision.
   [[nodiscard]] double score(double y, double precision, std::size_t input) const noexcept;
   struct Choice {
     bool found{false};
-    bool only{true};  ///< no other explains as much
+    bool only{true};  ///< no other input explains as much
     std::size_t input{0};
-    double rest{0.0};  ///< largest score that is left without it
+    double rest{0.0};  ///< largest score without it
   };
   [[nodiscard]] double rest_without(std::size_t candidate) const noexcept;
   [[nodiscard]] Choice choose() const noexcept;
@@ -97,13 +97,13 @@ class NeighbourCheck {
   const std::vector<double> precision_per_K2_;
   std::vector<double> change_sd_K_;  ///< sqrt(2 C_jj)
 
-  // Scratch of one question.
+  // Scratch of one call.
   ChangeAsked asked_;
   double amplified_{1.0};  ///< a^2
   std::size_t present_count_{0};
   std::vector<std::uint8_t> present_;
   std::vector<double> change_K_;
-  std::vector<double> left_;  ///< precision of what is present, shape (inputs, inputs)
+  std::vector<double> left_;  ///< precision of the present inputs, shape (inputs, inputs)
   std::vector<double> y_;
   std::vector<double> motions_;
 };

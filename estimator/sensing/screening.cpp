@@ -10,22 +10,19 @@
 namespace thermocomp {
 namespace {
 
-/// How fast the structure of a machine changes over hours at most.
+/// Fastest change of a machine's structure over hours.
 constexpr double slow_K_per_ns = 10.0 / 3600.0 * 1e-9;
-/// A return may miss by this share of the jump: a quarter, so that it is nearer to the past than to
-/// the jump by far.
+/// Largest miss of a return, as a share of the jump: much nearer to the past than to the jump.
 constexpr double return_share = 0.25;
-/// An expectation confirms a value only where its standard deviation is below this share of the
-/// allowance.
+/// Largest standard deviation of an expectation that confirms, as a share of the allowance.
 constexpr double expectation_share = 0.5;
-/// ... and contradicts one that is off by more than so many, and by more than the allowance.
+/// Standard deviations beyond which (and beyond the allowance) an expectation contradicts.
 constexpr double unexpected_sd = 2.5;
 
-/// A module shows a change late, and as a step: it renews its values once a second or more slowly,
-/// and filters them.
+/// Modules filter, and renew values once a second or less often: a change shows late, as a step.
 constexpr nanoseconds shown_late_max = std::chrono::seconds{2};
 
-/// Half, so that a difference to it is one.
+/// Half of min(), so that differences do not overflow.
 constexpr nanoseconds long_ago = nanoseconds::min() / 2;
 
 }  // namespace
@@ -64,8 +61,8 @@ bool Screening::take(nanoseconds now, const Reading& reading) noexcept {
   return false;
 }
 
-/// Nearly every reading: beside the one before, which counted. The reading's time may be any: a
-/// difference to it could overflow.
+/// Fast path for most readings: near the one before, which was confirmed. Times are compared
+/// without differences, which could overflow.
 bool Screening::goes_on(nanoseconds now, const Reading& reading) const noexcept {
   return reading.fault == Fault::none && !state_.waiting && state_.good.known &&
          std::abs(reading.temp_degC - state_.good.temp_degC) <= allowance_K_ &&
@@ -80,15 +77,15 @@ Fault Screening::check(nanoseconds now, const Reading& reading) const noexcept {
   // Written so that NaN fails.
   if (!(reading.temp_degC >= min_degC_ && reading.temp_degC <= max_degC_))
     return Fault::out_of_range;
-  // A time far ahead is as useless as an old one: it would make every later reading look old.
+  // A time far ahead would make every later reading look old.
   if (!(reading.taken_at >= now - stale_after_ && reading.taken_at <= now + stale_after_))
     return Fault::stale;
-  // A reading from before the newest one came late or doubled; it says nothing new.
+  // A late or duplicated reading has no new information.
   if (newest().known && reading.taken_at <= newest().at) return Fault::stale;
   return Fault::none;
 }
 
-/// The course of what is read, whether it counts or not.
+/// Records the sequence of values, confirmed or not.
 void Screening::note(const Reading& reading) noexcept {
   const Value before = newest();
   const nanoseconds gap = before.known ? reading.taken_at - before.at : nanoseconds{0};
@@ -106,7 +103,6 @@ void Screening::note(const Reading& reading) noexcept {
   state_.newest = {true, reading.temp_degC, reading.taken_at};
 }
 
-/// Of the newest value.
 Fault Screening::judge() noexcept {
   const nanoseconds at = state_.newest.at;
   if (state_.good.known && !possible()) return jump(state_.good.temp_degC);
@@ -120,7 +116,7 @@ Fault Screening::judge() noexcept {
   return Fault::none;
 }
 
-/// The newest value contradicts what was or what is expected.
+/// The newest value contradicts an earlier or an expected one.
 Fault Screening::jump(double from_degC) noexcept {
   const nanoseconds at = state_.newest.at;
   if (!state_.jumped) {
@@ -142,7 +138,7 @@ void Screening::count(bool refutes) noexcept {
   state_.good = state_.newest;
   state_.waiting = state_.jumped = false;
   state_.refuted = refutes;
-  surroundings_ = {};  // those of the next wait are made anew
+  surroundings_ = {};  // renewed for the next wait
 }
 
 void Screening::restore_jump(double from_degC) noexcept {
@@ -163,7 +159,7 @@ double Screening::change_K(nanoseconds unread) const noexcept {
   return std::min(rate_K_per_ns_ * unread_ns, outage_K_max_ + slow_K_per_ns * unread_ns);
 }
 
-/// Whether the structure can have come from the last value that counted to the newest one.
+/// True if the structure can have changed from the last confirmed value to the newest one.
 bool Screening::possible() const noexcept {
   const double off_K = std::abs(state_.newest.temp_degC - state_.good.temp_degC);
   const nanoseconds since_good = state_.newest.at - state_.good.at;
@@ -190,7 +186,7 @@ bool Screening::expected() const noexcept {
          std::abs(state_.newest.temp_degC - surroundings_.expected_degC) <= allowance_K_;
 }
 
-/// False where nothing is expected.
+/// False without an expectation.
 bool Screening::unexpected() const noexcept {
   return std::abs(state_.newest.temp_degC - surroundings_.expected_degC) >
          std::max(allowance_K_, unexpected_sd * surroundings_.expected_sd_K);
@@ -210,7 +206,7 @@ TemperatureRange::TemperatureRange(const EstimatorConfig& config, const std::str
   for (const BlockConfig& block : config.blocks) {
     if (block.input != column) continue;
     for (const std::size_t index : block.sensors) {
-      // A configuration that is still being checked may name sensors that are none.
+      // A configuration that is still being checked may name missing sensors.
       if (index >= config.sensors.size()) continue;
       const SensorConfig& sensor = config.sensors[index];
       double low = sensor.screening.temp_degC_min;

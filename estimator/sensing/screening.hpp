@@ -1,5 +1,5 @@
-/// Which readings are refused before they can move an axis, and which temperatures a column of the
-/// model can have at all: those that the screening of its sensors lets through.
+/// Screening of readings before they can move an axis, and the temperature range of a model column
+/// that follows from it.
 #pragma once
 
 #include <cstdint>
@@ -14,77 +14,74 @@
 
 namespace thermocomp {
 
-/// One sensor after a step, for people.
+/// One sensor after a step, for reports.
 struct SensorReport {
   double raw_degC{not_a_number};       ///< as the driver gave it
-  double smoothed_degC{not_a_number};  ///< what the block gets; a difference where configured
+  double smoothed_degC{not_a_number};  ///< value for the block; a difference where configured
   nanoseconds taken_at{};
   Fault fault{Fault::never_read};     ///< after screening
-  std::uint32_t clipped_in_a_row{0};  ///< values that smoothing clipped in a row
+  std::uint32_t clipped_in_a_row{0};  ///< consecutive values clipped by smoothing
   std::uint64_t clipped{0};
   std::uint64_t rejected{0};  ///< readings refused by screening since the start
-  bool waiting{false};        ///< a value is there that does not count yet
-  bool jumped{false};         ///< ... because it contradicts what was or what is expected
-  double jump_K{0.0};         ///< ... by so much, now
+  bool waiting{false};        ///< an unconfirmed value is present
+  bool jumped{false};         ///< ... because it contradicts earlier or expected values
+  double jump_K{0.0};         ///< ... by this much now
   double jumped_from_degC{not_a_number};
   nanoseconds jumped_at{};
   bool suspected{false};     ///< good values that the neighbours contradict
-  bool weighed_down{false};  ///< ... and its blocks do without it
+  bool weighed_down{false};  ///< ... and excluded from its blocks
   double suspected_size_K{0.0};
   nanoseconds suspected_since{};
 
-  /// Too new to count, as every sensor at the start: nothing is wrong with it.
+  /// Unconfirmed only because it is new, as every sensor at the start: not a fault.
   [[nodiscard]] bool settles() const noexcept { return fault == Fault::unconfirmed && !jumped; }
 };
 
-/// Judges one sensor's readings, each once, when it is new. A refused reading is as good as none:
-/// the last one that counted serves until it is stale.
+/// Screens one sensor's readings, each once, when it is new. A refused reading counts as missing:
+/// the last confirmed value is used until it is stale.
 ///
-/// A value T follows the last one that counted, T0, when
+/// A value T follows the last confirmed one, T0, when
 ///
 ///     |T - T0| <= rate_allowance_K + max(rate min(t, 2 s), min(rate u, outage_K_max + 10 K/h u)),
 ///
-/// where t is the time since T0 while T0 serves, and u how long *nothing* was read. Modules show a
-/// change late and as a step, hence the 2 s. A value that is there and does not follow (a jump)
-/// adds nothing to u, however long it lasts: it counts when its neighbours expect it, when an
-/// operator accepts it, or when it returns to where T0 allows. After a jump J a return may miss by
-/// 10 K/h since its begin, up to J / 4.
+/// where t is the time since T0 while T0 is in use, and u the time in which *nothing* was read.
+/// Modules show a change late and as a step, hence the 2 s. A value that does not follow (a jump)
+/// adds nothing to u, however long it lasts: it is confirmed by the expectation of its neighbours,
+/// by an operator, or by its return to where T0 allows. After a jump J a return may miss by 10 K/h
+/// since its start, up to J / 4.
 ///
-/// After an outage, and at the start, a value counts once readings have followed each other for
-/// settle_s, at least settle_readings of them. An exact 0 does not settle: devices give it while
-/// they are not ready.
+/// After an outage, and at the start, a value is confirmed by consecutive readings over settle_s,
+/// at least settle_readings of them. An exact 0 does not settle: devices send it while not ready.
 class Screening {
  public:
   static constexpr std::uint32_t settle_readings = 3;
 
   explicit Screening(const ScreeningConfig& config);
 
-  /// Looks at the newest reading.
-  /// @return whether it is a new and good one; then good_degC() and good_at() are its
+  /// @return true for a new good reading, which good_degC() and good_at() then give
   bool look(nanoseconds now, const Reading& reading) noexcept {
     if (reading.taken_at == state_.seen_at && reading.fault == state_.seen_fault) return false;
     return take(now, reading);
   }
 
-  /// What the next looks are to know beside the readings. An expectation is NaN where nothing
-  /// independent of this sensor makes one.
+  /// Context of the next readings. The expectation is NaN if nothing independent of this sensor
+  /// gives one.
   struct Surroundings {
     double expected_degC{not_a_number};
     double expected_sd_K{0.0};
     bool module_not_ready{false};
   };
   void surround(const Surroundings& surroundings) noexcept { surroundings_ = surroundings; }
-  /// Before the first reading: what counted last, a time ago that nobody knows.
+  /// Before the first reading: the last confirmed value, of unknown age.
   void restore_jump(double from_degC) noexcept;
-  /// The newest value counts, whatever speaks against it.
-  /// @return whether one was waiting
+  /// Confirms the newest value in spite of all checks. @return true if one was waiting
   bool accept() noexcept;
 
-  /// Whether the last good reading may still be used at `now`.
+  /// True if the last good reading may still be used at `now`.
   [[nodiscard]] bool usable(nanoseconds now) const noexcept {
     return state_.good.known && now - state_.good.at <= stale_after_;
   }
-  /// Why the newest reading is not good: none while it is good and fresh.
+  /// Fault of the newest reading; none while it is good and fresh.
   [[nodiscard]] Fault fault(nanoseconds now) const noexcept {
     if (state_.verdict != Fault::none) return state_.verdict;
     return now - state_.good.at > stale_after_ ? Fault::stale : Fault::none;
@@ -92,24 +89,23 @@ class Screening {
   [[nodiscard]] double good_degC() const noexcept { return state_.good.temp_degC; }
   [[nodiscard]] nanoseconds good_at() const noexcept { return state_.good.at; }
   [[nodiscard]] std::uint64_t rejected() const noexcept { return state_.rejected; }
-  /// A value is there that does not count yet.
+  /// An unconfirmed value is present.
   [[nodiscard]] bool waiting() const noexcept { return state_.waiting; }
-  /// ... because it jumped.
   [[nodiscard]] bool jumped() const noexcept { return state_.jumped; }
   [[nodiscard]] double jump_K() const noexcept {
     return state_.jumped ? state_.newest.temp_degC - state_.jump_from_degC : 0.0;
   }
-  /// NaN: it did not.
+  /// NaN: no jump.
   [[nodiscard]] double jumped_from_degC() const noexcept {
     return state_.jumped ? state_.jump_from_degC : not_a_number;
   }
   [[nodiscard]] nanoseconds jumped_at() const noexcept { return state_.jumped_at; }
-  /// The last value that counted ended a jump that was no return: what counted before was refuted.
+  /// The last confirmed value ended a jump without return: the values before it were wrong.
   [[nodiscard]] bool refuted() const noexcept { return state_.refuted; }
   [[nodiscard]] double newest_degC() const noexcept { return state_.newest.temp_degC; }
   [[nodiscard]] bool has_good() const noexcept { return state_.good.known; }
 
-  /// After a reload: the past of the other, the rules of this one.
+  /// After a reload: the state of `previous` with our limits.
   void adopt(const Screening& previous) noexcept { state_ = previous.state_; }
 
   void visit_state(StateArchive& archive) { archive(state_); }
@@ -128,15 +124,15 @@ class Screening {
     bool waiting{false};
     bool jumped{false};
     bool refuted{false};
-    Value good;               ///< the last one that counted
-    Value newest;             ///< while waiting: the last one in range and fresh
-    nanoseconds run_since{};  ///< since when such values have followed each other
+    Value good;               ///< last confirmed value
+    Value newest;             ///< while waiting: the last value in range and fresh
+    nanoseconds run_since{};  ///< start of the consecutive values of this kind
     std::uint32_t run_count{0};
-    nanoseconds unread{};  ///< since `good`, without any value
+    nanoseconds unread{};  ///< time since `good` without any value
     nanoseconds jumped_at{};
     double jump_from_degC{0.0};
     double jump_K_max{0.0};
-    nanoseconds same_since{};  ///< since when `newest` has not changed by one bit
+    nanoseconds same_since{};  ///< since when `newest` has been unchanged to the last bit
     std::uint64_t rejected{0};
     void visit_state(StateArchive& archive) {
       auto& [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p] = *this;
@@ -146,7 +142,7 @@ class Screening {
 
   [[nodiscard]] bool take(nanoseconds now, const Reading& reading) noexcept;
   [[nodiscard]] bool goes_on(nanoseconds now, const Reading& reading) const noexcept;
-  /// The last one in range and fresh, counting or not.
+  /// The last value in range and fresh, confirmed or not.
   [[nodiscard]] const Value& newest() const noexcept {
     return state_.waiting ? state_.newest : state_.good;
   }
@@ -171,14 +167,14 @@ class Screening {
   const nanoseconds stuck_after_;  ///< 0: never
 
   State state_;
-  Surroundings surroundings_;  ///< made anew each step while a value is waiting
+  Surroundings surroundings_;  ///< renewed each step while a value waits
 };
 
-/// A reference outside it was never taken at the machine.
+/// Accepted temperatures of a column; a reference outside was never measured.
 class TemperatureRange {
  public:
-  /// Of all sensors of the column's block; of a sensor that shows a difference, the difference of
-  /// two ranges. A column without sensors may have any finite temperature.
+  /// From all sensors of the column's block; for a difference, the difference of two ranges. A
+  /// column without sensors accepts any finite temperature.
   TemperatureRange(const EstimatorConfig& config, const std::string& column);
 
   [[nodiscard]] bool holds(double temp_degC) const noexcept;  ///< false for NaN
@@ -189,13 +185,13 @@ class TemperatureRange {
   double degC_max_{not_a_number};
 };
 
-/// Of kept references, those that no sensor of their column can show, in words:
-/// "reference_degC.t1_degC = 1e+300 must be in ...".
+/// Kept references outside the range of their column, as text: "reference_degC.t1_degC = 1e+300
+/// must be in ...".
 [[nodiscard]] std::vector<std::string> impossible_references(
     const EstimatorConfig& config, const std::vector<std::string>& columns,
     const std::map<std::string, double>& reference_degC);
 
-/// The numbers that the model file gives as reference. @throws InvalidValue with the key
+/// Checks the reference of the model file. @throws InvalidValue with the key
 void check_reference(const EstimatorConfig& config, const ThermalModel& model);
 
 }  // namespace thermocomp

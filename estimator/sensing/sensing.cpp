@@ -40,7 +40,7 @@ ReferenceState Reference::step(nanoseconds now, const Temperatures& temps,
     }
     if (!std::isfinite(temps_degC_[i])) state.known = false;
   }
-  // Of a silent controller only the last signals are known; they are not those of this moment.
+  // Signals of an offline controller are not those of this moment.
   for (std::size_t i = 0; signals.online && i < signals_.size(); ++i)
     if (!std::isfinite(signals_[i])) {
       signals_[i] = signals.of_model[i];
@@ -84,14 +84,14 @@ void Reference::complete(const Reference& same) noexcept {
 
 namespace {
 
-/// The model as LostBlocks is to see it.
+/// The model for LostBlocks: without covariance if blocks are not to be estimated.
 ThermalModel estimating_model(const ThermalModel& model, const EstimatorConfig& config) {
   ThermalModel seen = model;
   if (!config.compensation.estimate_lost_blocks) seen.covariance_K2.clear();
   return seen;
 }
 
-/// The longest that a working sensor may take until its first value counts.
+/// Longest time until the first value of a working sensor is confirmed.
 nanoseconds settling_time(const EstimatorConfig& config) {
   double longest_s = 0.0;
   for (const SensorConfig& sensor : config.sensors)
@@ -119,7 +119,7 @@ Temperatures Sensing::step(nanoseconds now, std::span<const Reading> readings) n
   return join(now, suspect(now));
 }
 
-/// What the model's covariance expects of the lost inputs is what their sensors are to agree with.
+/// A waiting sensor must agree with the estimate of its lost input.
 void Sensing::weigh_waiting() noexcept {
   for (std::size_t i = 0; i < columns_.size(); ++i) {
     expected_degC_[i] = lost_.estimated(i) ? lost_.temps_degC()[i] : not_a_number;
@@ -132,7 +132,7 @@ void Sensing::accept(std::size_t sensor) noexcept {
   if (blocks_.accept(sensor) && suspicion_) suspicion_->begin_anew(sensor);
 }
 
-/// @return the sensors to be left out, one a sensor; empty: none
+/// @return one per sensor: 1 excludes it; empty: none
 std::span<const std::uint8_t> Sensing::suspect(nanoseconds now) noexcept {
   if (!suspicion_) return {};
   if (suspicion_->is_due(now)) {

@@ -1,5 +1,4 @@
-/// From readings to the temperatures of the model's columns, and the reference from which their
-/// rise counts: the way through this folder.
+/// Temperatures of the model's columns from readings, and the reference of their rise.
 #pragma once
 
 #include <map>
@@ -18,37 +17,37 @@
 
 namespace thermocomp {
 
-/// Temperatures: the model file's numbers, else each column's first good value. Signals: zero
-/// beside such numbers, which mean a machine at rest; a sampled reference says that the machine is
-/// straight as it is, whatever it is doing, so the signals of that moment belong to it.
+/// Temperatures: the model file's numbers, else each column's first good value. Signals: zero with
+/// such numbers, which mean a machine at rest; a sampled reference defines zero displacement in the
+/// present state, so its signals are those of that moment.
 ///
-/// A first good value is provisional for `young`: a jump of its sensor that begins in that time and
-/// proves true shows that the value was false; then the column's reference is taken anew. (To wait
-/// until the machine is steady instead would leave one that is started warm without compensation.)
+/// A first good value is provisional for `young`: if a jump of its sensor begins in that time and
+/// is confirmed, the value was wrong and the column's reference is taken anew. (Waiting for a
+/// steady machine instead would leave one that is started warm without compensation.)
 class Reference {
  public:
   static constexpr nanoseconds young = std::chrono::minutes(10);
 
   explicit Reference(const ThermalModel& model);
 
-  /// Takes what is not known yet, where it is measured now.
+  /// Takes references that are missing and measured now.
   [[nodiscard]] ReferenceState step(nanoseconds now, const Temperatures& temps,
                                     const Signals& signals) noexcept;
-  /// The machine is straight now. The signals are taken at the next step.
-  /// @pre all of them are good
+  /// Displacement is zero now. The signals are taken at the next step.
+  /// @pre all temperatures are good
   void take(std::span<const double> temps_degC) noexcept;
 
   [[nodiscard]] std::span<const double> temps_degC() const noexcept { return temps_degC_; }
   [[nodiscard]] std::span<const double> signals() const noexcept { return signals_; }
 
-  /// Before the first step, by name; what is not there or no finite number stays as it is.
+  /// Before the first step, by name; missing or non-finite values change nothing.
   void restore(const std::map<std::string, double>& temps_degC,
                const std::map<std::string, double>& signals);
-  /// After a reload with plans of plan_names(). Numbers newly written into the model file are
-  /// deliberate; otherwise the machine's state stays.
+  /// After a reload, with plans of plan_names(). New numbers in the model file are deliberate and
+  /// replace the reference; otherwise it stays.
   void adopt(const Reference& previous, const std::vector<int>& columns,
              const std::vector<int>& signals) noexcept;
-  /// Takes what is not known yet from that of an estimator with the same model.
+  /// Takes missing references from an estimator with the same model.
   void complete(const Reference& same) noexcept;
   void visit_temperatures(StateArchive& archive) { archive(temps_degC_, sampled_at_); }
   void visit_signals(StateArchive& archive) { archive(signals_); }
@@ -59,11 +58,11 @@ class Reference {
   const std::vector<std::string> signal_names_;
 
   std::vector<double> temps_degC_;
-  std::vector<nanoseconds> sampled_at_;  ///< one per column; the least time: not a first value
+  std::vector<nanoseconds> sampled_at_;  ///< one per column; min(): not a first value
   std::vector<double> signals_;
 };
 
-/// Screening and smoothing per sensor, blocks, and an estimate for blocks that have no good sensor.
+/// Screening and smoothing per sensor, blocks, and estimates of blocks without a good sensor.
 class Sensing {
  public:
   /// @throws InvalidValue when a column has no block or a block no sensor
@@ -72,12 +71,11 @@ class Sensing {
   /// @param readings  one per sensor, order of the configuration (checked)
   [[nodiscard]] Temperatures step(nanoseconds now, std::span<const Reading> readings) noexcept;
 
-  /// The sensors that are weighed down are used all the same: their estimates do not serve.
-  /// @return the temperatures of this step anew
+  /// Uses the excluded sensors after all, since their estimates are too uncertain.
+  /// @return the temperatures of this step, computed again
   [[nodiscard]] Temperatures use_all(nanoseconds now) noexcept;
-  /// The sensor's newest value counts, whatever speaks against it.
   void accept(std::size_t sensor) noexcept;
-  /// The machine is straight now, and its sensors show it.
+  /// A new reference: the present readings are right, and suspicions end.
   void trust_all() noexcept;
 
   void report(std::span<SensorReport> sensors) const noexcept;
@@ -85,8 +83,8 @@ class Sensing {
   [[nodiscard]] const LostBlocks& lost() const noexcept { return lost_; }
   [[nodiscard]] bool all_good() const noexcept;
 
-  /// Before the first step: temperatures at the end of the previous run, by column, and what the
-  /// sensors showed that had jumped.
+  /// Before the first step: temperatures at the end of the previous run, by column, and the values
+  /// of sensors before an unconfirmed jump.
   void restore(const std::map<std::string, double>& temps_degC,
                const std::map<std::string, double>& jumped_from_degC);
   void plan_adoption(const Sensing& previous);

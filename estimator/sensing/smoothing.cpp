@@ -95,7 +95,7 @@ bool Smoother::agree(const std::array<Sample, agreeing_values>& far, double with
   const double step_K = second.value_K - first.value_K;
   if (std::abs(step_K) <= within_K && std::abs(third.value_K - second.value_K) <= within_K)
     return true;
-  // A steep course is on a line though its values are far from each other.
+  // Values on a steep line agree although they are far from each other.
   const auto way = static_cast<double>((third.at - second.at).count());
   const auto first_way = static_cast<double>((second.at - first.at).count());
   return first_way > 0 &&
@@ -114,12 +114,12 @@ void Smoother::keep_screened(Form& form, const Sample& sample, double distance_K
   ++far_count_;
   if (far_count_ < agreeing_values) return;
   if (!agree(far_, far_K())) {
-    // The newest ones may be the beginning of a run that does.
+    // The newest values may begin a run that agrees.
     std::copy(far_.begin() + 1, far_.end(), far_.begin());
     --far_count_;
     return;
   }
-  // They agree: the temperature is there. The history begins anew with them.
+  // They agree: the temperature has changed, and the history restarts with them.
   form.restart();
   for (const Sample& far : far_) form.keep(far);
   far_count_ = 0;

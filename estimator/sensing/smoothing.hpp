@@ -1,5 +1,5 @@
-/// Regression-line expected-band clipper: a value is believed only near where the recent past says
-/// it should be. Source: JPH0736976B2, claims 1 (sliding line) and 2 (line of lines).
+/// Smoothing: values are clipped to a band about a regression line through the recent ones.
+/// Source: JPH0736976B2, claims 1 (sliding line) and 2 (line of lines).
 #pragma once
 
 #include <array>
@@ -25,7 +25,7 @@ struct Sample {
 
 /// value(t) = mean + slope (t - center)
 struct Line {
-  nanoseconds origin{};  ///< times below are seconds since here
+  nanoseconds origin{};  ///< zero of the times in seconds below
   double center_s{0.0};
   double mean_K{0.0};
   double slope_K_per_s{0.0};
@@ -37,11 +37,11 @@ struct Line {
   void visit_state(StateArchive& archive) { archive(origin, center_s, mean_K, slope_K_per_s); }
 };
 
-/// A time [s] and a value [K] that are worked on side by side: half the instructions, same bits.
+/// Time [s] and value [K] in one SIMD register: half the instructions, same bits.
 using TimeAndValue = double __attribute__((vector_size(16)));
 
-/// Ordinary least squares; the slope is 0 where all samples have one time. O(n), two passes so that
-/// long uptimes cost no digits. @pre 1 to smoothing_samples_max samples
+/// Ordinary least squares; the slope is 0 where all samples have one time. O(n), in two passes to
+/// keep precision at long uptimes. @pre 1 to smoothing_samples_max samples
 [[nodiscard]] inline Line fit_line(std::span<const Sample> samples) noexcept {
   const nanoseconds origin = samples.front().at;
   TimeAndValue pairs[smoothing_samples_max];
@@ -53,7 +53,7 @@ using TimeAndValue = double __attribute__((vector_size(16)));
     sum += pair;
   }
   const TimeAndValue center = sum * (1.0 / static_cast<double>(static_cast<int>(count)));
-  TimeAndValue products{0.0, 0.0};  // of the time with time and value: spread and slant
+  TimeAndValue products{0.0, 0.0};  // sums of time squared and of time x value, about the center
   for (std::size_t i = 0; i < count; ++i) {
     const TimeAndValue from_center = pairs[i] - center;
     products += TimeAndValue{from_center[0], from_center[0]} * from_center;
@@ -62,7 +62,7 @@ using TimeAndValue = double __attribute__((vector_size(16)));
 }
 
 /// The last few samples, oldest first. Each is stored twice, n apart in a ring of 2n, so that the
-/// last n always lie in a row and nothing is ever moved.
+/// last n are always contiguous.
 class SampleHistory {
  public:
   explicit SampleHistory(std::size_t capacity) : capacity_(capacity), samples_(2 * capacity) {}
@@ -94,7 +94,7 @@ class SampleHistory {
   std::vector<Sample> samples_;
 };
 
-/// Form A. The line through the last n values, extended to the next one's time.
+/// Form A: the line through the last n values, extrapolated to the next one's time.
 class SlidingLine {
  public:
   explicit SlidingLine(std::size_t samples) : history_(samples) {}
@@ -109,9 +109,9 @@ class SlidingLine {
   SampleHistory history_;
 };
 
-/// Form B. Blocks of n values with slopes A_1 (newest), A_2, ..., A_k: the coming block's line
-/// starts at the newest block's fitted value at its last sample; its slope continues the polynomial
-/// of degree k - 1 through theirs,
+/// Form B: blocks of n values with slopes A_1 (newest), A_2, ..., A_k. The next block's line starts
+/// at the newest block's fitted value at its last sample; its slope extrapolates the polynomial of
+/// degree k - 1 through the slopes,
 ///
 ///     D = sum_i (-1)^(i+1) binomial(k, i) A_i;   k = 3: D = 3A - 3B + C
 class LineOfLines {
@@ -135,13 +135,13 @@ class LineOfLines {
   Line expected_;
 };
 
-/// One sensor's smoothing: picks one value per period, clips it into the expected band, keeps the
+/// Smoothing of one sensor: takes one value per period, clips it to the expected band, keeps the
 /// history as configured, restarts after an outage.
 class Smoother {
  public:
   explicit Smoother(const SmoothingConfig& config);
 
-  /// A new good value. Takes it when its period has come (always with period 0).
+  /// Takes a good value when its period is due (always with period 0).
   void add(const Sample& sample) noexcept {
     if (form_ == SmoothingForm::off) {
       value_K_ = sample.value_K;
@@ -152,7 +152,7 @@ class Smoother {
     if (due(sample.at)) take(sample);
   }
 
-  /// The next value begins a history that owes nothing to the one before.
+  /// The next value begins a new history.
   void restart() noexcept;
   [[nodiscard]] bool has_value() const noexcept { return has_value_; }
   [[nodiscard]] double value_K() const noexcept { return value_K_; }
@@ -160,8 +160,8 @@ class Smoother {
   [[nodiscard]] std::uint32_t clipped_in_a_row() const noexcept { return clipped_in_a_row_; }
   void visit_state(StateArchive& archive);
 
-  /// How many values in a row must be far outside and agree - beside each other, or on one line -
-  /// before they become the new history.
+  /// Number of consecutive values far outside that must agree, with each other or on one line, to
+  /// become the new history.
   static constexpr std::size_t agreeing_values = 3;
   /// Far outside: this many times the half-width or the robust spread, whichever is larger.
   static constexpr double far_factor = 3.0;
@@ -199,7 +199,7 @@ class Smoother {
   nanoseconds due_at_{};
   std::uint64_t clipped_{0};
   std::uint32_t clipped_in_a_row_{0};
-  std::array<Sample, agreeing_values> far_{};  ///< far values waiting to be believed
+  std::array<Sample, agreeing_values> far_{};  ///< far values waiting for confirmation
   std::size_t far_count_{0};
 };
 

@@ -11,33 +11,33 @@ namespace {
 
 constexpr nanoseconds look_period = std::chrono::seconds(12);
 constexpr nanoseconds tick_period = std::chrono::seconds(60);
-/// Nothing is known of what happened in a pause longer than this.
+/// A longer pause clears the history.
 constexpr nanoseconds pause_max = std::chrono::minutes(5);
 
-/// Two lines of five values with white noise of variance v, extended by 2.5 ticks each, differ by
-/// 2 v (1/5 + 2.5^2/10) = 1.65 v; the file's growth tells 2 v of a change between two ticks.
-/// Limit: 2.2 times the largest that untouched hours showed (1.8: hours 0-16 of the spindle with
-/// the covariance of hours 16-32).
+/// Two lines of five values with white noise of variance v, extrapolated by 2.5 ticks each, differ
+/// by 2 v (1/5 + 2.5^2/10) = 1.65 v; the file's growth gives 2 v for a change between two ticks.
+/// Limit: 2.2 times the largest of undisturbed hours (1.8: hours 0-16 of the spindle with the
+/// covariance of hours 16-32).
 constexpr ChangeAsked jump_asked{60.0, 0.825, 4.0};
-/// A step is at the lines' meeting when the ticks scatter about them by less than this share of it:
-/// one that is a tick away scatters by as much as it seems to be.
+/// Largest scatter of the ticks about their lines, as a share of the step: for a step one tick away
+/// the scatter is as large as its apparent size.
 constexpr double misfit_share = 0.25;
-/// ... and it stays when the level has moved by this share of it. (A spike of t16 in hours 16-32
-/// had shown that a rule against spikes was missing; the share is a plain half.)
+/// Share of the step by which the level must have moved, against spikes (such as that of t16 in
+/// hours 16-32); a plain half.
 constexpr double held_share = 0.5;
 /// 1.4 times the largest of the same hours over all ages (4.3).
 constexpr double creep_sd_limit = 6.0;
-/// A door that is opened goes by; half the shortest age of a creep.
+/// Longer than a door stays open; half the shortest age of a creep.
 constexpr std::uint32_t creep_ticks_min = 30;
 constexpr std::array<std::size_t, 3> creep_levels_back{4, 16, 48};  ///< 1, 4 and 12 h
-/// The lie is over when less of it is left than this share of what was found; a third, so that
-/// wander alone neither ends nor begins one.
+/// A suspicion ends when less than this share of its first error is left: a third, so that drift
+/// alone neither ends nor begins one.
 constexpr double over_share = 0.35;
 constexpr std::uint32_t over_ticks = 10;
-/// In a block: the others agree when they are off by less than this share of the one that is named.
+/// In a block, the others agree if off by less than this share of the suspect's error.
 constexpr double others_share = 1.0 / 3.0;
 
-/// Median of those that are numbers; NaN when fewer than `enough` are. Reorders.
+/// Median of the finite values; NaN if fewer than `enough`. Reorders.
 double median_of(std::span<double> values, std::size_t enough) noexcept {
   const auto end =
       std::partition(values.begin(), values.end(), [](double each) { return std::isfinite(each); });
@@ -138,7 +138,7 @@ double Suspicion::level_K(std::size_t sensor, std::size_t back) noexcept {
   return median_of(values, line_ticks - 2);
 }
 
-/// Between the line through the newest ticks and that through those before, where they meet.
+/// Step between the line through the newest ticks and that through those before, where they meet.
 double Suspicion::jump_K(std::size_t sensor) noexcept {
   constexpr nanoseconds meet = tick_period / 2 - static_cast<int>(line_ticks) * tick_period;
   double jump_K = 0.0;
@@ -198,7 +198,7 @@ void Suspicion::look_for_jumps(nanoseconds now) noexcept {
   for (std::size_t i = 0; i < answer.count; ++i) suspects[i] = suspect_of(answer.wrong[i]);
   for (std::size_t i = 0; i < answer.count; ++i) {
     const Suspect& suspect = suspects[i];
-    // A step within one of the lines gives their meeting a size that is none.
+    // A step within one of the lines gives a wrong size.
     if (!suspect.found || !(misfit_K_[suspect.sensor] <= misfit_share * std::abs(suspect.size_K)))
       continue;
     if (held_K(suspect, answer) / suspect.size_K >= held_share)
@@ -206,7 +206,7 @@ void Suspicion::look_for_jumps(nanoseconds now) noexcept {
   }
 }
 
-/// How far the level has moved, less what the others say: next to nothing after a spike.
+/// Change of the level, less that of the neighbours: next to nothing after a spike.
 double Suspicion::held_K(const Suspect& suspect, const NeighbourCheck::Answer& answer) noexcept {
   for (std::size_t i = 0; i < names_.size(); ++i)
     changes_K_[i] = level_K(i, 0) - level_K(i, line_ticks);
@@ -248,7 +248,7 @@ void Suspicion::join_changes() noexcept {
   }
 }
 
-/// The sensor of the input that is wrong, where it is one.
+/// The wrong sensor of the input, if only one is wrong.
 Suspicion::Suspect Suspicion::suspect_of(const NeighbourCheck::Wrong& wrong) const noexcept {
   const double expected_K = input_changes_K_[wrong.input] - wrong.size_K;
   double sum_K = 0.0;
@@ -273,8 +273,8 @@ Suspicion::Suspect Suspicion::suspect_of(const NeighbourCheck::Wrong& wrong) con
 void Suspicion::begin(const Suspect& suspect, nanoseconds since) noexcept {
   const std::size_t sensor = suspect.sensor;
   const std::size_t input = suspect.input;
-  if (state_.suspected[sensor] != 0) return;  // of two inputs
-  // Until now it was among the neighbours that other errors were measured by.
+  if (state_.suspected[sensor] != 0) return;  // already suspected as a sensor of another input
+  // Earlier errors were measured with this sensor as a neighbour: removes its share.
   for (std::size_t other = 0; other < inputs_.size(); ++other) {
     if (other == input) continue;
     for (const std::size_t earlier : inputs_[other]) {
@@ -298,7 +298,6 @@ void Suspicion::begin(const Suspect& suspect, nanoseconds since) noexcept {
   correct(sensor, suspect.sd_K);
 }
 
-/// Sensors of the input that are not suspected.
 std::size_t Suspicion::believed(std::size_t input) const noexcept {
   std::size_t count = 0;
   for (const std::size_t sensor : inputs_[input])
@@ -306,7 +305,7 @@ std::size_t Suspicion::believed(std::size_t input) const noexcept {
   return count;
 }
 
-/// What each input that the sensor is of would be without its lie, by the newest tick.
+/// Each input of the sensor without its error, at the newest tick.
 void Suspicion::correct(std::size_t sensor, double sd_K) noexcept {
   for (std::size_t input = 0; input < inputs_.size(); ++input) {
     const std::vector<std::size_t>& sensors = inputs_[input];
@@ -366,7 +365,6 @@ void Suspicion::end(std::size_t sensor) noexcept {
   forget(sensor);
 }
 
-/// Its past is no measure of what it reads from now on.
 void Suspicion::forget(std::size_t sensor) noexcept {
   for (std::size_t i = 0; i < ticks_kept; ++i)
     state_.ticks_K[sensor * ticks_kept + i] = not_a_number;

@@ -1,4 +1,4 @@
-/// Sensors that lie plausibly: their values are good, but contradict the neighbours'.
+/// Detection of sensors whose values are good but contradict their neighbours.
 #pragma once
 
 #include <array>
@@ -15,55 +15,56 @@
 
 namespace thermocomp {
 
-/// Each minute (a tick, the median of five looks at what screening let through, before smoothing)
-/// four changes of all inputs are put to the NeighbourCheck:
+/// Each minute (a tick, the median of five screened, unsmoothed samples) the NeighbourCheck judges
+/// four changes of all inputs:
 ///
-///     jump   the step between two lines of five ticks each, extended to where they meet
+///     jump   the step between two lines of five ticks each, extrapolated to where they meet
 ///     creep  the level (median of five ticks) less that of 1, 4 and 12 hours ago; for half an hour
 ///
-/// Only changes count: neither the mean of the record nor the reference is needed, and a sensor
-/// that reads half a degree high does no harm. In a block of several sensors, the one is named
-/// without which the block agrees with its neighbours.
+/// Only changes count: neither the mean of the record nor the reference is needed, and a constant
+/// error does no harm. In a block of several sensors, the suspect is the one without which the
+/// block agrees with its neighbours.
 ///
-/// The lie of a suspected sensor is followed on, tick by tick, by what it changes and the others
-/// do not. It is believed again when little of the lie is left for ten ticks; when it is faulted
-/// for ten ticks (somebody is at it); or with a new reference. Then its past counts no more.
+/// The error of a suspected sensor is re-estimated every tick, from the part of its change that the
+/// others do not share. The suspicion ends when little of the error is left for ten ticks, when the
+/// sensor is faulted for ten ticks (being repaired), or with a new reference. Its history is then
+/// cleared.
 class Suspicion {
  public:
   /// @pre inputs of the model with a covariance, NeighbourCheck::inputs_min at least
   /// @throws InvalidValue when covariance and model do not fit each other; allocates
   Suspicion(const EstimatorConfig& config, const ThermalModel& model);
 
-  /// Whether step() wants values at `now`; else it need not be called.
+  /// True if step() needs values at `now`.
   [[nodiscard]] bool is_due(nanoseconds now) const noexcept {
     return !state_.started || now >= state_.next_look;
   }
-  /// @param values_K  one per sensor, screened; NaN: none to be used
+  /// @param values_K  one per sensor, screened; NaN: not usable
   /// Never throws, never allocates. O(inputs^2) once a minute, else O(sensors).
   void step(nanoseconds now, std::span<const double> values_K) noexcept;
 
   [[nodiscard]] std::size_t count() const noexcept { return state_.count; }
-  /// One per sensor: to be left out of its blocks.
+  /// One per sensor: 1 excludes it from its blocks.
   [[nodiscard]] std::span<const std::uint8_t> weighed_down() const noexcept {
     return state_.weighed_down;
   }
-  /// What an input is when the errors of its sensors are taken away.
+  /// An input without the errors of its sensors.
   struct Corrected {
     std::size_t input{0};
     double temp_degC{not_a_number};
     double sd_K{0.0};
   };
-  /// Of the inputs whose sensors the last step began to weigh down.
+  /// Inputs whose sensors the last step began to exclude.
   [[nodiscard]] std::span<const Corrected> newly_weighed_down() const noexcept {
     return {corrected_.data(), corrected_count_};
   }
-  /// Without them the offsets would be too uncertain: suspected, and used all the same.
+  /// Uses suspected sensors, because the offsets would be too uncertain without them.
   void use_all() noexcept;
-  /// What the sensor showed until now is no measure of what it shows from now on.
+  /// Clears the sensor's history, which no longer applies to its readings.
   void begin_anew(std::size_t sensor) noexcept {
     state_.suspected[sensor] != 0 ? end(sensor) : forget(sensor);
   }
-  /// The machine and its sensors are right as they are now.
+  /// A new reference: machine and sensors are right as they are now.
   void restart() noexcept;
 
   void report(std::span<SensorReport> sensors) const noexcept;
@@ -72,10 +73,10 @@ class Suspicion {
   void visit_state(StateArchive& archive) { archive(state_); }
 
  private:
-  static constexpr std::size_t looks = 5;       ///< in a tick
+  static constexpr std::size_t looks = 5;       ///< samples in a tick
   static constexpr std::size_t line_ticks = 5;  ///< in each line, and in a level
   static constexpr std::size_t ticks_kept = 2 * line_ticks;
-  static constexpr std::size_t ticks_a_level = 15;  ///< between two levels that are kept
+  static constexpr std::size_t ticks_a_level = 15;  ///< between two kept levels
   static constexpr std::size_t levels_kept = 49;    ///< 12 h
 
   struct State {
@@ -83,22 +84,22 @@ class Suspicion {
     nanoseconds next_look{};
     nanoseconds last_look{};
     nanoseconds tick_begin{};
-    std::size_t looked{0};  ///< in the tick that is not complete
+    std::size_t looked{0};  ///< samples in the present tick
     std::size_t ticks_since_level{0};
-    std::size_t next_tick{0};                ///< in the ring
-    std::size_t next_level{0};               ///< in the ring
-    std::size_t count{0};                    ///< suspected
+    std::size_t next_tick{0};
+    std::size_t next_level{0};
+    std::size_t count{0};                    ///< suspected sensors
     std::vector<double> looked_K;            ///< shape (sensors, looks)
     std::vector<double> ticks_K;             ///< shape (sensors, ticks_kept), a ring
     std::vector<double> levels_K;            ///< shape (sensors, levels_kept), a ring
     std::vector<std::uint8_t> suspected;     ///< one per sensor, as all below
-    std::vector<std::uint8_t> weighed_down;  ///< ... and not used
-    std::vector<double> size_K;              ///< of the lie, now
-    std::vector<double> found_K;             ///< ... when it was found
+    std::vector<std::uint8_t> weighed_down;  ///< ... and excluded
+    std::vector<double> size_K;              ///< present error
+    std::vector<double> found_K;             ///< error when it was found
     std::vector<nanoseconds> since;
     std::vector<std::uint32_t> agreed_ticks;   ///< in a row
     std::vector<std::uint32_t> missing_ticks;  ///< in a row
-    std::vector<std::uint32_t> creep_ticks;    ///< in a row that it seemed to creep
+    std::vector<std::uint32_t> creep_ticks;    ///< consecutive ticks of apparent creep
     void visit_state(StateArchive& archive) {
       auto& [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r, s, t] = *this;
       archive(a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r, s, t);
@@ -114,8 +115,7 @@ class Suspicion {
   void follow(std::size_t sensor) noexcept;
   void look_for_jumps(nanoseconds now) noexcept;
   void look_for_creep(nanoseconds now, std::size_t levels_back) noexcept;
-  /// Of changes_K_, one per sensor, those of the inputs: the mean over sensors that are not
-  /// suspected.
+  /// Changes of the inputs from changes_K_: mean over the sensors that are not suspected.
   void join_changes() noexcept;
   struct Suspect {
     bool found{false};
@@ -130,13 +130,13 @@ class Suspicion {
   void begin(const Suspect& suspect, nanoseconds since) noexcept;
   void end(std::size_t sensor) noexcept;
   void forget(std::size_t sensor) noexcept;
-  /// The first input that the sensor belongs to; the number of inputs: to none.
+  /// The first input of the sensor; the number of inputs: none.
   [[nodiscard]] std::size_t input_of(std::size_t sensor) const noexcept;
   [[nodiscard]] std::size_t believed(std::size_t input) const noexcept;
   void correct(std::size_t sensor, double sd_K) noexcept;
 
   const std::vector<std::string> names_;       ///< of the sensors
-  const std::vector<std::string> references_;  ///< ... that theirs are differences to, or ""
+  const std::vector<std::string> references_;  ///< ... reference sensors of theirs, or ""
   const bool may_weigh_down_;
   const std::vector<std::vector<std::size_t>> inputs_;  ///< sensors of each
   NeighbourCheck check_;

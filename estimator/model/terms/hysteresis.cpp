@@ -4,8 +4,8 @@
 namespace thermocomp {
 namespace {
 
-/// A joint with play between the model's displacement and the real one: an output follows the sum
-/// of matrix, guideways and terms only after its play is used up.
+/// Play in a joint between the model's displacement and the real one: an output follows the sum of
+/// matrix, guideways and terms only after the play is used up.
 class OutputHysteresis final : public Term {
  public:
   explicit OutputHysteresis(const TermContext& context)
@@ -24,7 +24,7 @@ class OutputHysteresis final : public Term {
   Play joint_;
 };
 
-/// The same for the part of the structure that one temperature moves: T becomes play(T).
+/// The same for the part of the structure moved by one temperature: T becomes play(T).
 class TemperatureHysteresis final : public Term {
  public:
   explicit TemperatureHysteresis(const TermContext& context)

@@ -7,8 +7,8 @@
 namespace thermocomp {
 namespace {
 
-/// d = sum over i, j of g_ij LP_j(u_i^p_i): what several columns do on several time scales at once.
-/// A temperature's u is its rise.
+/// d = sum over i, j of g_ij LP_j(u_i^p_i): effects of several columns on several time scales. For
+/// a temperature, u is its rise.
 class LagBank final : public Term {
  public:
   explicit LagBank(const TermContext& context);
@@ -35,11 +35,11 @@ class LagBank final : public Term {
   std::vector<Column> columns_;
   std::vector<double> taus_s_;
   std::vector<double> gains_;   ///< shape (outputs, time constants, columns)
-  std::vector<double> values_;  ///< one a column, to its power; scratch
+  std::vector<double> values_;  ///< one per column, to its power; scratch
   bool started_{false};
   nanoseconds at_{};
-  nanoseconds step_{};          ///< the step that shares_ were computed for
-  std::vector<double> shares_;  ///< one a time constant
+  nanoseconds step_{};          ///< step length of shares_
+  std::vector<double> shares_;  ///< one per time constant
   std::vector<double> late_;    ///< shape (time constants, columns)
 };
 
@@ -82,7 +82,7 @@ void LagBank::follow(nanoseconds now) noexcept {
       for (std::size_t i = 0; i < count; ++i) late[i] += share * (values_[i] - late[i]);
     }
   }
-  // A held state is asked again at its own moment, with the slides elsewhere.
+  // A held state is evaluated again at its own time, with the slides elsewhere.
   for (std::size_t j = 0; j < taus_s_.size(); ++j)
     if (!(taus_s_[j] > 0)) std::copy(values_.begin(), values_.end(), late_.data() + j * count);
   at_ = now;
@@ -100,7 +100,7 @@ void LagBank::add(const TermInput& input, std::span<double> displacement_um) noe
   }
 }
 
-/// A rise acts through one time constant after the other.
+/// A rise acts through the time constants one after the other.
 void LagBank::add_slope_on_the_way(std::size_t output,
                                    std::span<double> slope_um_per_K) const noexcept {
   const double* gains = gains_.data() + output * late_.size();

@@ -1,5 +1,4 @@
-/// First-order low pass with the exact step response for an input that is constant over the step,
-/// and its inverse.
+/// First-order low pass, exact for an input that is constant over the step, and its inverse.
 #pragma once
 
 #include <chrono>
@@ -40,14 +39,14 @@ class LowPass {
   bool started_{false};
   nanoseconds at_{};
   double value_{0.0};
-  nanoseconds step_{};  ///< the step that share_ was computed for: exp() once, not every cycle
+  nanoseconds step_{};  ///< step length of share_: exp() only when it changes
   double share_{0.0};
 };
 
 /// T = r + tau d/dt LP_f(r), the inverse of a reading r that follows T with the time constant tau.
-/// The derivative is taken of the reading smoothed with tau_f = tau / 4: that multiplies the noise
-/// of single readings by at most 1 + tau / tau_f = 5, and leaves an error of only tau tau_f T''.
-/// The first step passes the reading on. tau = 0 always does.
+/// The derivative is that of the reading smoothed with tau_f = tau / 4, which multiplies the noise
+/// of single readings by at most 1 + tau / tau_f = 5 and leaves an error of tau tau_f T''. The
+/// first step, and tau = 0, pass the reading on.
 class Lead {
  public:
   explicit Lead(double tau_s) : tau_s_(tau_s), smooth_(smoothing_share * tau_s) {}

@@ -4,7 +4,7 @@
 namespace thermocomp {
 namespace {
 
-/// d = K LP(T): a measured place that the matrix ignores, lagged where tau_s > 0.
+/// d = K LP(T): a measured place that is not in the matrix, lagged where tau_s > 0.
 class MissingTemperature final : public Term {
  public:
   explicit MissingTemperature(const TermContext& context)

@@ -3,7 +3,7 @@
 namespace thermocomp {
 namespace {
 
-/// d = c T^2: expansion that is not proportional to the rise, the same while heating and cooling.
+/// d = c T^2: expansion that is not proportional to the rise, equal for heating and cooling.
 class NonlinearExpansion final : public Term {
  public:
   explicit NonlinearExpansion(const TermContext& context)

@@ -1,4 +1,4 @@
-/// Play (backlash) of a joint: a rate-independent loop.
+/// Rate-independent play (backlash) of a joint.
 #pragma once
 
 #include <algorithm>
@@ -7,8 +7,8 @@
 
 namespace thermocomp {
 
-/// y = min(max(y, u - w/2), u + w/2), started at y = u: the joint stands in the middle of its play.
-/// `w` is the full width of the dead band, in the unit of the input.
+/// y = min(max(y, u - w/2), u + w/2), started at y = u in the middle of the play. `w`: full width
+/// of the dead band, in the unit of the input.
 class Play {
  public:
   explicit Play(double width) : half_width_(0.5 * width) {}

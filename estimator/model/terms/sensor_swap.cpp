@@ -5,7 +5,7 @@
 namespace thermocomp {
 namespace {
 
-/// Two channels are exchanged: each place's rise is what the other one's channel shows.
+/// Two exchanged channels: each place gets the rise of the other channel.
 class SensorSwap final : public Term {
  public:
   explicit SensorSwap(const TermContext& context)

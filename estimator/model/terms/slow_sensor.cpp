@@ -4,7 +4,7 @@
 namespace thermocomp {
 namespace {
 
-/// The reading follows the temperature late: the rise is the one that a quick sensor would show.
+/// A slow sensor: its rise is replaced by that of a quick one.
 class SlowSensor final : public Term {
  public:
   explicit SlowSensor(const TermContext& context)

@@ -4,10 +4,9 @@
 namespace thermocomp {
 namespace {
 
-/// d = g (X - X0) LP(u): how much the machine moves with u (a temperature's rise or an operating
-/// signal) depends on a place X: on where it stood when the reference was taken, that is how the
-/// day began, or on where it stands now. The gain's unit is um per unit of u and K of X. With the
-/// matrix or a missing_heat_source of the same u, two of these are the published
+/// d = g (X - X0) LP(u): the effect of u (a temperature's rise or an operating signal) depends on
+/// the temperature X of a place, at the reference or now. Unit of the gain: um per unit of u and K
+/// of X. With the matrix or a missing_heat_source of the same u, two of these are the published
 /// [a1 + a2 T0 + a3 T1] u with T0 at the start and T1 around the machine.
 /// Source: JP7689460B2 eq. (1), (2).
 class StartDependence final : public Term {
@@ -29,7 +28,7 @@ class StartDependence final : public Term {
     for (std::size_t i = 0; i < gain_um_per_unit_K_.size(); ++i)
       displacement_um[i] += gain_um_per_unit_K_[i] * above_K_ * late_value_;
   }
-  /// At the place's temperature and the value of u that the last step had.
+  /// At the place's temperature and the u of the last step.
   void add_slope(const TermInput& /*input*/, std::size_t output,
                  std::span<double> slope_um_per_K) const noexcept override {
     const double gain = gain_um_per_unit_K_[output];

@@ -1,4 +1,4 @@
-/// An extension of the static model by a named cause, evaluated at run time.
+/// Extensions of the static model by named causes, evaluated at run time.
 #pragma once
 
 #include <functional>
@@ -12,60 +12,58 @@
 
 namespace thermocomp {
 
-/// What a term sees of one step.
 struct TermInput {
   nanoseconds now{};
   std::span<const double> rise_K;            ///< temperature_columns(): T - T_ref
   std::span<const double> signals;           ///< signal_columns()
-  std::span<const double> reference_degC{};  ///< T_ref of temperature_columns(); not in a slope
+  std::span<const double> reference_degC{};  ///< T_ref of temperature_columns(); empty for a slope
 };
 
-/// A step runs through three stages, each over all terms in the order of the model file. A term
-/// overrides the one in which it acts. No allocation, no exception.
+/// A step has three stages, each over all terms in the order of the model file. A term overrides
+/// the stage in which it acts. No allocation, no exception.
 class Term {
  public:
   Term() = default;
   Term(const Term&) = delete;
   Term& operator=(const Term&) = delete;
   virtual ~Term() = default;
-  /// What a reading should have been; matrix, guideways and the later stages see the corrected
-  /// rise.
+  /// Corrects readings; matrix, guideways and later stages use the corrected rise.
   virtual void correct_rise(nanoseconds /*now*/, std::span<double> /*rise_K*/) noexcept {}
   /// Adds the term's displacement to that of matrix and guideways.
   virtual void add(const TermInput& /*input*/, std::span<double> /*displacement_um*/) noexcept {}
-  /// What the structure makes of the displacement.
+  /// Changes the displacement as the structure does, e.g. by the play of a joint.
   virtual void correct_displacement(std::span<double> /*displacement_um*/) noexcept {}
 
-  /// Adds how much `output` moves with each temperature by this term in the end
-  /// [um/K], shape (temperature_columns); for the spread of an offset. Every kind must say it, even
-  /// where it is nothing: for an operating signal, or a temperature passed on late.
+  /// Adds the steady-state derivative of `output` with respect to each temperature [um/K], shape
+  /// (temperature_columns), for the standard deviation of an offset. It is 0 for operating signals
+  /// and lagged temperatures; pure virtual, so that each kind states it.
   virtual void add_slope(const TermInput& input, std::size_t output,
                          std::span<double> slope_um_per_K) const noexcept = 0;
-  /// After all add_slope(): the effect on the way, where it is larger than in the end.
+  /// After all add_slope(): the transient effect, where larger than the steady state.
   virtual void add_slope_on_the_way(std::size_t /*output*/,
                                     std::span<double> /*slope_um_per_K*/) const noexcept {}
-  /// After both: from the corrected rise to what was read.
+  /// After both: from the corrected rise to the reading.
   virtual void correct_slope(std::span<double> /*slope_um_per_K*/) const noexcept {}
-  /// Forgets the past: lags start at their input's present value.
+  /// Clears the past: lags start at their input's present value.
   virtual void restart() noexcept = 0;
   virtual void visit_state(StateArchive& archive) = 0;
 };
 
-/// What a term is made from: its specification with names resolved to indices.
+/// Specification of a term, with names resolved to indices.
 struct TermContext {
   const TermSpec& spec;
-  /// Index among temperature_columns(), signal_columns() or outputs; of two columns the first.
+  /// Index among temperature_columns(), signal_columns() or outputs; the first of two columns.
   std::size_t subject;
-  std::size_t second;  ///< of two columns the second; else 0
-  /// Values of a per-output parameter in the order of the model's outputs, 0 where not given.
+  std::size_t second;  ///< the second of two columns; else 0
+  /// Values of a per-output parameter in the order of the model's outputs; 0: not given.
   std::function<std::vector<double>(std::string_view name)> per_output;
   std::function<double(std::string_view name)> shared;
-  /// Of a lag_bank: index of each subject among temperature_columns() or signal_columns().
+  /// lag_bank: index of each subject among temperature_columns() or signal_columns().
   std::vector<std::size_t> bank_columns{};
   std::vector<double> bank_gains{};  ///< shape (outputs, time constants, subjects)
 };
 
-/// A kind of term and how it is made. To add one: a file with its registration, and its lines at
+/// A kind of term and its factory. A new kind needs a file with its registration, and its lines at
 /// the end of this file and in term_registrations().
 struct TermRegistration {
   TermKind kind{};
@@ -74,7 +72,7 @@ struct TermRegistration {
 
 [[nodiscard]] const std::vector<TermRegistration>& term_registrations();
 
-/// The columns of a model. Made once for all of its terms, since each has a share in them.
+/// Columns of a model, determined once for all of its terms.
 struct ModelColumns {
   explicit ModelColumns(const ThermalModel& model)
       : temperatures(model.temperature_columns()), signals(model.signal_columns()) {}
@@ -86,7 +84,7 @@ struct ModelColumns {
 [[nodiscard]] std::unique_ptr<Term> make_term(const TermSpec& spec, const ThermalModel& model,
                                               const ModelColumns& columns);
 
-/// Every kind: each has a file of this folder and an entry of term_registrations().
+/// One per kind of term, each with a file of this folder.
 TermRegistration thermal_lag_registration();
 TermRegistration missing_heat_source_registration();
 TermRegistration missing_temperature_registration();

@@ -64,7 +64,7 @@ std::vector<std::size_t> bank_columns(const LagBankSpec& bank, const ModelColumn
   return columns;
 }
 
-/// Shape (outputs, time constants, subjects), 0 where none are given.
+/// Shape (outputs, time constants, subjects); 0: not given.
 /// @throws InvalidValue when a shape does not fit
 std::vector<double> bank_gains(const LagBankSpec& bank, const ThermalModel& model) {
   const std::size_t subjects = bank.subjects.size();

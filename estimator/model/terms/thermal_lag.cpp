@@ -6,7 +6,7 @@
 namespace thermocomp {
 namespace {
 
-/// d = g (LP(T) - T): a share of the structure follows the sensor's temperature late.
+/// d = g (LP(T) - T): a share of the structure lags behind the sensor's temperature.
 class ThermalLag final : public Term {
  public:
   explicit ThermalLag(const TermContext& context)
