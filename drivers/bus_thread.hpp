@@ -1,4 +1,4 @@
-/// A driver's thread, its clock and its sleep.
+/// Thread, clock and sleep of a driver.
 #pragma once
 
 #include <array>
@@ -18,12 +18,12 @@
 
 namespace thermocomp {
 
-/// The one clock of the drivers: CLOCK_MONOTONIC as nanoseconds, the time of every Reading.
+/// The clock of all drivers, CLOCK_MONOTONIC: the time of every Reading.
 [[nodiscard]] inline std::chrono::nanoseconds monotonic_now() noexcept {
   return std::chrono::steady_clock::now().time_since_epoch();
 }
 
-/// A configured time in seconds as nanoseconds, bounded to a year so that sums never overflow.
+/// Converts a configured time, limited to a year so that sums never overflow.
 [[nodiscard]] inline std::chrono::nanoseconds from_seconds(double time_s) noexcept {
   constexpr double year_s = 365.0 * 86400.0;
   if (!(time_s > 0.0)) return std::chrono::nanoseconds{0};
@@ -31,7 +31,7 @@ namespace thermocomp {
       static_cast<std::chrono::nanoseconds::rep>((time_s < year_s ? time_s : year_s) * 1e9)};
 }
 
-/// Once signalled it stays so: every later sleep ends at once. signal() may come from any thread.
+/// Stays signalled: every later sleep ends at once. signal() may come from any thread.
 class WakeEvent {
  public:
   /// @throws DriverError when the system has no more descriptors
@@ -44,12 +44,12 @@ class WakeEvent {
 
   void signal() noexcept {
     const std::uint64_t one = 1;
-    // It can only fail when the counter is full, and then it is signalled already.
+    // Fails only when the counter is full, and then it is signalled already.
     [[maybe_unused]] const ssize_t written = ::write(descriptor_, &one, sizeof one);
   }
 
-  /// Sleeps until `time` (CLOCK_MONOTONIC), the event, or input (or an error) at `other`
-  /// (negative: none); an interrupted sleep ends early.
+  /// Sleeps until `time` (CLOCK_MONOTONIC), the event, or input or an error at `other` (negative:
+  /// none); an interrupted sleep ends early.
   void wait_until(std::chrono::nanoseconds time, int other = -1) noexcept {
     const std::chrono::nanoseconds left = time - monotonic_now();
     if (left <= std::chrono::nanoseconds{0}) return;
@@ -64,14 +64,14 @@ class WakeEvent {
   int descriptor_;
 };
 
-/// The daemon locks its memory, so every stack is resident in full: 256 KiB instead of glibc's
-/// 8 MiB. The thread takes no signals (they belong to the main thread) and never inherits the
-/// creator's real-time priority.
+/// A thread with a small stack: the daemon locks its memory, so the whole stack is resident (256
+/// KiB instead of glibc's 8 MiB). It blocks all signals, which belong to the main thread, and never
+/// inherits the creator's real-time priority.
 class BusThread {
  public:
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
   static constexpr std::size_t stack_bytes =
-      std::size_t{2048} * 1024;  // the sanitizers' frames are larger
+      std::size_t{2048} * 1024;  // frames are larger under the sanitizers
 #else
   static constexpr std::size_t stack_bytes = std::size_t{256} * 1024;
 #endif
@@ -85,7 +85,7 @@ class BusThread {
 
   /// Runs `body` in a new thread. `name` is cut to the kernel's 15 characters.
   /// @pre not running
-  /// @throws DriverError when the system gives no thread
+  /// @throws DriverError when the system cannot create a thread
   void start(const std::string& name, std::function<void()> body) {
     body_ = std::move(body);
     pthread_attr_t attributes;
@@ -93,7 +93,7 @@ class BusThread {
     pthread_attr_setstacksize(&attributes, stack_bytes);
     pthread_attr_setinheritsched(&attributes, PTHREAD_EXPLICIT_SCHED);
     pthread_attr_setschedpolicy(&attributes, SCHED_OTHER);
-    // Blocked before the thread exists, so that it inherits the mask from its first instruction.
+    // Blocked before the thread exists, so that it inherits the mask.
     sigset_t all;
     sigset_t before;
     sigfillset(&all);
@@ -106,7 +106,7 @@ class BusThread {
     pthread_setname_np(thread_, name.substr(0, 15).c_str());
   }
 
-  /// Waits for the body's end; at once when not running.
+  /// Waits for the end of the body; returns at once when not running.
   void join() noexcept {
     if (!running_) return;
     pthread_join(thread_, nullptr);

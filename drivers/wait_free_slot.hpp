@@ -1,4 +1,4 @@
-/// One writer leaves the newest value, one reader takes it; neither ever waits for the other.
+/// Passes the newest value from one writer to one reader; neither waits for the other.
 #pragma once
 
 #include <array>
@@ -13,10 +13,9 @@ template <class T>
 class WaitFreeSlot {
  public:
   WaitFreeSlot() = default;
-  /// All three buffers start as copies of `initial`.
   explicit WaitFreeSlot(const T& initial) : buffers_{initial, initial, initial} {}
 
-  /// The writer's buffer. Its content is some earlier value: write all of it.
+  /// The writer's buffer; it holds an earlier value, so write all of it.
   [[nodiscard]] T& back() noexcept { return buffers_[back_]; }
   void publish() noexcept {
     back_ =
@@ -24,8 +23,7 @@ class WaitFreeSlot {
         index_mask;
   }
 
-  /// The reader's side: takes the newest published value if there is one.
-  /// @return whether front() changed
+  /// The reader's side: takes the newest published value. @return true if front() changed
   bool fresh() noexcept {
     if ((shared_.load(std::memory_order_relaxed) & fresh_bit) == 0) return false;
     front_ = shared_.exchange(front_, std::memory_order_acq_rel) & index_mask;

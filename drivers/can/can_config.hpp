@@ -1,5 +1,4 @@
-/// CAN buses, and devices with temperatures on them: plain structures, filled by config/ or by a
-/// test.
+/// Configuration of CAN buses and of the devices with temperatures on them.
 #pragma once
 
 #include <array>
@@ -15,9 +14,9 @@ namespace thermocomp {
 
 enum class ByteOrder { little_endian, big_endian };  ///< Intel, Motorola
 
-/// Bits of a CAN frame read as an unsigned number. `start_bit` counts as DBC files do: for
-/// little_endian the least significant bit, for big_endian the most significant bit, bit 0 = lowest
-/// of byte 0.
+/// Bits of a CAN frame, read as an unsigned number. `start_bit` is numbered as in DBC files: the
+/// least significant bit for little_endian, the most significant bit for big_endian; bit 0 is the
+/// lowest of byte 0.
 struct CanField {
   int start_bit{0};
   int length_bits{8};  ///< 1..64
@@ -25,30 +24,29 @@ struct CanField {
   bool operator==(const CanField&) const = default;
 };
 
-/// A multiplexor: a number in the frame that says which of several contents the rest of the frame
-/// has.
+/// A multiplexor: a number in the frame that selects the content of the rest of the frame.
 struct CanSelector {
-  /// Numbers from first to last, both included.
+  /// Numbers from `first` to `last`, both included.
   struct Pages {
     std::uint64_t first{0};
     std::uint64_t last{0};
     bool operator==(const Pages&) const = default;
   };
   CanField field;
-  std::vector<Pages> pages;  ///< the signal is in the frame while the number is in one of them
+  std::vector<Pages> pages;  ///< the frame carries the signal if its number is in one of them
   bool operator==(const CanSelector&) const = default;
 };
 
-/// A number beside a value that says whether the value is good.
+/// A number beside a value that shows whether the value is good.
 struct CanStatus {
   CanField field;
-  std::uint64_t mask{~std::uint64_t{0}};  ///< bits looked at
-  /// masked number -> fault (none: good); a number not listed and not 0 is device_error
+  std::uint64_t mask{~std::uint64_t{0}};  ///< bits used
+  /// masked number -> fault (none: good); a number that is not listed and not 0 is device_error
   std::vector<Sentinel> codes;
   bool operator==(const CanStatus&) const = default;
 };
 
-/// Where a value stands in a CAN frame, with the numbering of CanField.
+/// Place of a value in a CAN frame, numbered as in CanField.
 struct CanSignal {
   std::uint32_t id{0};
   bool extended_id{false};
@@ -61,9 +59,9 @@ struct CanSignal {
   double scale{1.0};  ///< value = raw * scale + offset
   double offset{0.0};
   std::vector<Sentinel> sentinels;
-  std::vector<CanSelector> selectors{};  ///< all must agree; empty: it is in every frame
+  std::vector<CanSelector> selectors{};  ///< all must match; empty: the signal is in every frame
   std::optional<CanStatus> status{};     ///< in the same frame
-  /// Bits of an extended id that count; fewer: a J1939 group, whoever sends it.
+  /// Bits of an extended id that are compared; with fewer, a J1939 group from any sender.
   std::uint32_t id_mask{0x1FFFFFFF};
   bool operator==(const CanSignal&) const = default;
 };
@@ -71,7 +69,7 @@ struct CanSignal {
 struct CanChannel {
   std::size_t sensor{0};  ///< index of the sensor in the configuration
   CanSignal signal;
-  /// A counter or toggle in the same frame; while it stands still, so does the reading's time.
+  /// A counter or toggle in the same frame; without a change the reading's time stays.
   std::optional<CanField> counter{};
   bool operator==(const CanChannel&) const = default;
 };
@@ -85,8 +83,8 @@ struct CanDeviceConfig {
 struct CanBusConfig {
   static constexpr std::array kinds{"can"};
   std::string name;
-  std::string interface;    ///< "can0"
-  double reconnect_s{0.5};  ///< pause before the interface is tried again
+  std::string interface;
+  double reconnect_s{0.5};  ///< pause between attempts to open the interface
   std::vector<CanDeviceConfig> devices;
   [[nodiscard]] BusOutline outline() const {
     return {kinds[0], interface, devices.size(), "device"};

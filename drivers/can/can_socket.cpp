@@ -36,7 +36,7 @@ std::string error_text(int code) {
 
 can_filter masked_filter(const CanFilter& wanted) noexcept {
   can_filter filter{};
-  // With CAN_RTR_FLAG in the mask remote requests, which carry no data, stay out too.
+  // CAN_RTR_FLAG in the mask also excludes remote requests, which carry no data.
   const std::uint32_t bits = wanted.id.extended ? CAN_EFF_MASK : CAN_SFF_MASK;
   filter.can_id = wanted.id.id | (wanted.id.extended ? CAN_EFF_FLAG : 0u);
   filter.can_mask = (wanted.mask & bits) | CAN_EFF_FLAG | CAN_RTR_FLAG;
@@ -47,7 +47,7 @@ can_filter filter_for(const CanId& wanted) noexcept {
   return masked_filter({wanted, CAN_EFF_MASK});
 }
 
-/// @param raw  classic frames have the same layout, but for the room behind byte 8
+/// @param raw  classic frames have the same layout, without the data after byte 8
 void to_frame(const canfd_frame& raw, bool fd, nanoseconds received_at, CanFrame& frame) noexcept {
   frame.id.extended = (raw.can_id & CAN_EFF_FLAG) != 0;
   frame.id.id = raw.can_id & (frame.id.extended ? CAN_EFF_MASK : CAN_SFF_MASK);
@@ -59,7 +59,7 @@ void to_frame(const canfd_frame& raw, bool fd, nanoseconds received_at, CanFrame
 
 }  // namespace
 
-/// Where recvmmsg leaves a batch.
+/// Buffers of one recvmmsg batch.
 struct CanSocket::Buffers {
   static constexpr std::size_t control_bytes =
       CMSG_SPACE(sizeof(timespec)) + CMSG_SPACE(sizeof(std::uint32_t));
@@ -70,7 +70,7 @@ struct CanSocket::Buffers {
   std::array<iovec, batch_max> parts{};
   std::array<Control, batch_max> controls{};
   std::array<mmsghdr, batch_max> messages{};
-  std::size_t used{batch_max};  ///< those that the kernel has written to, or nobody yet
+  std::size_t used{batch_max};  ///< written by the kernel; all before the first batch
 
   void prepare() noexcept {
     for (std::size_t i = 0; i < used; ++i) {
@@ -172,7 +172,7 @@ void CanSocket::enter(CanState state) {
   tell_state();
 }
 
-/// Makes error() say what the bus suffers from.
+/// Sets error() from the state of the bus.
 void CanSocket::tell_state() {
   switch (state_) {
     case CanState::bus_off:
@@ -188,14 +188,14 @@ void CanSocket::tell_state() {
       error_.clear();
       break;
     case CanState::down:
-      break;  // the error says why
+      break;  // error() has the reason
   }
 }
 
 void CanSocket::look_for_carrier() {
   ifreq request{};
   interface_.copy(std::begin(request.ifr_name), IFNAMSIZ - 1);
-  if (::ioctl(socket_, SIOCGIFFLAGS, &request) < 0) return;  // receiving tells what is wrong
+  if (::ioctl(socket_, SIOCGIFFLAGS, &request) < 0) return;  // receiving reports the error
   const bool none = (request.ifr_flags & IFF_RUNNING) == 0;
   if (none == without_carrier_) return;
   without_carrier_ = none;
@@ -222,7 +222,7 @@ bool CanSocket::configure() {
   interface_.copy(std::begin(request.ifr_name), IFNAMSIZ - 1);
   if (::ioctl(socket_, SIOCGIFINDEX, &request) < 0) return fail("no such interface", errno), false;
   const int index = request.ifr_ifindex;
-  // Binding to an interface that is down would succeed and only fail later.
+  // Binding to an interface that is down succeeds and fails only later.
   if (::ioctl(socket_, SIOCGIFFLAGS, &request) < 0) return fail("no such interface", errno), false;
   if ((request.ifr_flags & IFF_UP) == 0) return fail("interface", ENETDOWN), false;
 
@@ -236,8 +236,8 @@ bool CanSocket::configure() {
   const auto set = [this](int level, int option, const void* value, std::size_t size) {
     return ::setsockopt(socket_, level, option, value, static_cast<socklen_t>(size)) == 0;
   };
-  // Filters before the bind: no frame of anybody else gets in between. An empty list is legal
-  // and receives nothing.
+  // Filters are set before the bind, so that no other frame is received in between. An empty list
+  // is valid and receives nothing.
   if (!set(SOL_CAN_RAW, CAN_RAW_FILTER, filters.data(), bytes) ||
       !set(SOL_CAN_RAW, CAN_RAW_FD_FRAMES, &on, sizeof on) ||
       !set(SOL_CAN_RAW, CAN_RAW_ERR_FILTER, &every_error, sizeof every_error) ||
@@ -256,9 +256,8 @@ bool CanSocket::configure() {
   return true;
 }
 
-/// So that a full bus can wait for a busy machine; the default holds some 30 ms of 1 Mbit/s.
-/// Without the privilege the kernel gives what net.core.rmem_max allows, and it is no harm to have
-/// less.
+/// Enlarges the receive queue, since the default holds about 30 ms of 1 Mbit/s. Without the
+/// privilege the kernel gives up to net.core.rmem_max, which also works.
 void CanSocket::ask_for_room() noexcept {
   const int bytes = 2'000'000;
   if (::setsockopt(socket_, SOL_SOCKET, SO_RCVBUFFORCE, &bytes, sizeof bytes) == 0) return;
@@ -295,7 +294,7 @@ std::span<const CanFrame> CanSocket::receive() {
       without_carrier_ = false;
       enter(CanState::active);
     }
-    // The kernel hands a frame of this socket back once the interface has sent it.
+    // The kernel returns a frame of this socket once the interface has sent it.
     if ((buffers_->messages[i].msg_hdr.msg_flags & MSG_CONFIRM) != 0) {
       ++sent_out_;
       received_.pop_back();
@@ -336,7 +335,7 @@ void CanSocket::note_error_frame(std::uint32_t error_class, std::span<const std:
   if ((error_class & CAN_ERR_CRTL) != 0 && data.size() >= 2) note_error_state(data[1]);
 }
 
-/// @param bits  receiving and transmitting have a counter each: the worse of both is the state
+/// @param bits  states of the receive and transmit counters; the worse is used
 void CanSocket::note_error_state(unsigned bits) {
   const bool passive = (bits & (CAN_ERR_CRTL_RX_PASSIVE | CAN_ERR_CRTL_TX_PASSIVE)) != 0;
   const bool warning = (bits & (CAN_ERR_CRTL_RX_WARNING | CAN_ERR_CRTL_TX_WARNING)) != 0;
@@ -368,7 +367,7 @@ bool CanSocket::send(const CanFrame& frame) {
     }
     return true;
   }
-  // A full queue (bus-off, nobody acknowledges) is a failed write, not a lost link.
+  // A full queue (bus-off, no acknowledgement) is a failed write, not a lost link.
   if (errno == EAGAIN || errno == ENOBUFS) {
     send_failed_ = true;
     error_ = interface_ + ": sending: " + error_text(errno);

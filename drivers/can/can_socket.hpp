@@ -1,4 +1,4 @@
-/// A SocketCAN raw socket that filters in the kernel, stamps what it receives and can be reopened.
+/// SocketCAN raw socket with filters in the kernel, receive time stamps and reopening.
 #pragma once
 
 #include <array>
@@ -27,12 +27,12 @@ struct CanId {
   auto operator<=>(const CanId&) const = default;
 };
 
-/// Whether frames with this identifier are those that the signal is in.
+/// True if frames with this identifier carry the signal.
 [[nodiscard]] inline bool matches(const CanId& id, const CanSignal& signal) noexcept {
   return id.extended == signal.extended_id && ((id.id ^ signal.id) & signal.id_mask) == 0;
 }
 
-/// Identifiers of the same length that agree with `id` in the bits of `mask`.
+/// Identifiers of the same length that match `id` in the bits of `mask`.
 struct CanFilter {
   CanId id;
   std::uint32_t mask{0x1FFFFFFF};
@@ -41,7 +41,7 @@ struct CanFilter {
 struct CanFrame {
   CanId id;
   std::size_t size{0};  ///< bytes of data, 0..8 or, in an FD frame, 0..64
-  bool fd{false};       ///< CAN FD
+  bool fd{false};
   std::array<std::uint8_t, can_bytes_max> data{};
   nanoseconds received_at{};  ///< CLOCK_MONOTONIC
   [[nodiscard]] std::span<const std::uint8_t> payload() const noexcept {
@@ -49,85 +49,83 @@ struct CanFrame {
   }
 };
 
-/// What the interface last said of itself; the middle three are the error states of ISO 11898-1.
+/// State of the interface; the middle three are the error states of ISO 11898-1.
 enum class CanState {
-  down,  ///< not open: no such interface, or it is not up
+  down,  ///< not open: the interface is missing or not up
   active,
   warning,
   passive,
-  bus_off  ///< it takes no part in the bus until it is restarted
+  bus_off  ///< the interface takes no part in the bus until it is restarted
 };
 [[nodiscard]] std::string_view to_string(CanState state) noexcept;
 
-/// What error frames and the kernel reported since the object was made.
+/// Counts of error frames and kernel reports since construction.
 struct CanErrors {
   std::uint64_t error_frames{0};
   std::uint64_t bus_off{0};
   std::uint64_t error_passive{0};
   std::uint64_t error_warning{0};
   std::uint64_t restarted{0};
-  std::uint64_t dropped{0};  ///< frames the kernel threw away because the socket's queue was full
+  std::uint64_t dropped{0};  ///< by the kernel, because the socket's queue was full
 };
 
-/// Whether CAN sockets exist on this system at all. Empty: they do; else what the kernel says.
+/// Empty if the system has CAN sockets; else the kernel's error.
 [[nodiscard]] std::string can_unavailable();
 
-/// Monotonic time of an event stamped with the wall clock: now less its age, and never in the
-/// future nor more than 1 s ago, so that a step of the wall clock cannot make a reading fresh
-/// for ever or stale at once.
+/// Monotonic time of an event with a wall-clock stamp: now less its age, limited to [now - 1 s,
+/// now], so that a step of the wall clock cannot make a reading fresh for ever or stale at once.
 [[nodiscard]] nanoseconds monotonic_stamp(nanoseconds realtime_stamp, nanoseconds realtime_now,
                                           nanoseconds monotonic_now) noexcept;
 
-/// The smallest frame size of at least `size` bytes: above 8 only some sizes exist.
+/// Smallest valid frame size of at least `size` bytes: above 8 bytes only some sizes exist.
 /// @pre size <= can_bytes_max
 [[nodiscard]] std::size_t whole_frame_bytes(std::size_t size) noexcept;
 
-/// One bus seen through one socket, classic and FD frames alike; used by one thread. Trouble is
-/// data: no method throws after construction (except for lack of memory); a lost link closes the
-/// socket, and error() says why.
+/// One bus through one socket, classic and FD frames; for one thread. Faults are data: no method
+/// throws after construction (except for lack of memory); a lost link closes the socket, and
+/// error() gives the reason.
 class CanSocket {
  public:
   static constexpr std::size_t filters_max = 512;  ///< the kernel's CAN_RAW_FILTER_MAX
-  static constexpr std::size_t batch_max = 128;    ///< frames of one receive()
+  static constexpr std::size_t batch_max = 128;    ///< frames per receive()
 
-  /// @param wanted  identifiers to receive; the kernel drops all others. Duplicates are joined.
+  /// @param wanted  identifiers to receive, duplicates allowed; the kernel drops all others
   /// @throws InvalidValue for more than filters_max identifiers or an impossible interface name
   CanSocket(std::string interface, std::vector<CanId> wanted);
-  /// Identifiers to receive as well, from the next open() on.
-  /// @throws InvalidValue when there are more than filters_max of both sorts
+  /// Adds identifiers to receive, from the next open() on.
+  /// @throws InvalidValue for more than filters_max filters in all
   void also_want(const CanFilter& filter);
-  /// Frames with these identifiers that are sent count as sent_out() when they have left the
-  /// interface, from the next open() on.
-  /// @throws InvalidValue when there are more than filters_max of all sorts
+  /// Sent frames with these identifiers count as sent_out() once they have left the interface, from
+  /// the next open() on.
+  /// @throws InvalidValue for more than filters_max filters in all
   void watch_own(const std::vector<CanId>& ids);
   CanSocket(const CanSocket&) = delete;
   CanSocket& operator=(const CanSocket&) = delete;
   ~CanSocket();
 
-  /// Opens and binds; an interface that is missing or down is refused. @return success
+  /// Opens and binds; fails for an interface that is missing or down. @return true on success
   bool open();
   void close() noexcept;
   [[nodiscard]] bool is_open() const noexcept { return socket_ >= 0; }
-  /// Readable when receive() has something to say; -1 when closed.
+  /// Readable when receive() has frames; -1 when closed.
   [[nodiscard]] int descriptor() const noexcept { return socket_; }
 
-  /// What has arrived, without waiting, at most batch_max frames; valid until the next call.
-  /// Error frames are counted and not handed out. Closes itself when the link is lost.
+  /// Received frames, without waiting, at most batch_max; valid until the next call. Error frames
+  /// are counted and not returned. Closes the socket when the link is lost.
   [[nodiscard]] std::span<const CanFrame> receive();
-  /// A frame of more than 8 bytes goes out as CAN FD, filled up with zeros to a size that exists.
+  /// A frame of more than 8 bytes is sent as CAN FD, zero-padded to a valid size.
   /// @return false when the kernel did not take the frame; the link may be lost then
   bool send(const CanFrame& frame);
 
-  /// Frames of watch_own() that the interface has sent since the last open(), as far as receive()
-  /// has seen.
+  /// Frames of watch_own() that receive() has seen leave the interface since the last open().
   [[nodiscard]] std::uint64_t sent_out() const noexcept { return sent_out_; }
   [[nodiscard]] const CanErrors& errors() const noexcept { return errors_; }
   [[nodiscard]] CanState state() const noexcept { return state_; }
-  /// CLOCK_MONOTONIC when the present state was entered.
+  /// CLOCK_MONOTONIC of the last change of state().
   [[nodiscard]] nanoseconds state_since() const noexcept { return state_since_; }
-  /// The controller chip has left the bus and not come back: neither frames nor a restart since.
+  /// The CAN controller has left the bus: neither frames nor a restart since.
   [[nodiscard]] bool bus_off() const noexcept { return state_ == CanState::bus_off; }
-  /// Why the last open(), receive() or send() failed, or what the bus suffers from; else empty.
+  /// Reason of the last failed open(), receive() or send(), or the bus' error state; else empty.
   [[nodiscard]] const std::string& error() const noexcept { return error_; }
 
  private:
@@ -139,7 +137,7 @@ class CanSocket {
   void tell_state();
   void look_for_carrier();
   void fail(const char* what, int code);
-  /// The kernel's time stamp beside a frame; notes its count of dropped frames too.
+  /// Kernel time stamp of a frame; also records the kernel's count of dropped frames.
   std::optional<nanoseconds> read_control(msghdr& header);
   void note_error_frame(std::uint32_t error_class, std::span<const std::uint8_t> data);
   void note_error_state(unsigned bits);
@@ -152,8 +150,7 @@ class CanSocket {
   int socket_{-1};
   CanState state_{CanState::down};
   nanoseconds state_since_;
-  /// It was opened without a carrier, which is how a bus-off interface shows itself; no error frame
-  /// tells what happened before.
+  /// Opened without a carrier, as a bus-off interface appears; no error frame reports the past.
   bool without_carrier_{false};
   bool send_failed_{false};
   std::string error_;

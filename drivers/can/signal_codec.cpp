@@ -21,14 +21,14 @@ CanField field_of(const CanSignal& signal) noexcept {
   return {signal.start_bit, signal.length_bits, signal.byte_order};
 }
 
-/// Place of the field's first bit counted in the order in which it runs through the bytes: for
-/// big_endian from the highest bit of byte 0 downwards.
+/// Position of the field's first bit in the order of its bits; for big_endian counted from the
+/// highest bit of byte 0.
 int first_bit(const CanField& field) noexcept {
   if (field.byte_order == ByteOrder::little_endian) return field.start_bit;
   return field.start_bit / 8 * 8 + (7 - field.start_bit % 8);
 }
 
-/// Eight bytes of the frame as a number of the given order; those beyond its end are zero.
+/// Eight bytes as a number in the given byte order; bytes beyond the end are zero.
 std::uint64_t load(std::span<const std::uint8_t> bytes, ByteOrder order) noexcept {
   std::uint64_t number = 0;
   std::memcpy(&number, bytes.data(), std::min(bytes.size(), sizeof number));
@@ -46,7 +46,7 @@ double as_float(std::uint64_t raw, int length_bits) noexcept {
   return std::bit_cast<double>(raw);
 }
 
-/// The float nearest to `value`; beyond what it can hold: the largest. Tells whether it fitted.
+/// Nearest float, saturated at the largest; `fitted` is false if it was saturated.
 std::uint64_t float_bits(double value, int length_bits, bool& fitted) noexcept {
   if (length_bits == 64) {
     fitted = std::isfinite(value);
@@ -60,7 +60,7 @@ std::uint64_t float_bits(double value, int length_bits, bool& fitted) noexcept {
 
 std::uint64_t integer_bits(double counts, const CanSignal& signal, bool& fitted) noexcept {
   const int value_bits = signal.is_signed ? signal.length_bits - 1 : signal.length_bits;
-  const double above = std::ldexp(1.0, value_bits);  // the first number too large
+  const double above = std::ldexp(1.0, value_bits);  // the smallest number that is too large
   const double lowest = signal.is_signed ? -above : 0.0;
   const double rounded = std::round(counts);
   fitted = rounded >= lowest && rounded < above;
@@ -135,7 +135,7 @@ std::uint64_t extract_raw(std::span<const std::uint8_t> payload, const CanField&
   const auto byte = static_cast<std::size_t>(first / 8);
   const int skipped = first % 8;
   const std::uint64_t number = load(payload.subspan(byte), field.byte_order);
-  // Up to seven bits may stand in a ninth byte.
+  // Up to seven bits may be in a ninth byte.
   const bool more = skipped + field.length_bits > number_bits;
   const std::uint64_t ninth = more ? payload[byte + 8] : 0;
   if (field.byte_order == ByteOrder::little_endian) {
@@ -157,7 +157,7 @@ void insert_raw(std::span<std::uint8_t> payload, const CanField& field,
   for (int left = field.length_bits; left > 0;) {
     const int place = bit % 8;
     const int count = std::min(8 - place, left);
-    // Those of the byte that come first: at its low end, or (big_endian) at its high end.
+    // Bits of this byte that come first: at its low end, or (big_endian) at its high end.
     const int shift = up ? place : 8 - place - count;
     const std::uint64_t part = up ? raw >> (field.length_bits - left) : raw >> (left - count);
     const std::uint64_t mask = low_bits(count) << shift;

@@ -1,4 +1,4 @@
-/// What the controller drivers are built from: plain structures, filled by config/ or by a test.
+/// Configuration of the controller drivers.
 #pragma once
 
 #include <algorithm>
@@ -15,17 +15,17 @@
 
 namespace thermocomp {
 
-/// What a piezo driver is built from.
+/// Configuration of a piezo drive.
 struct PiezoConfig {
-  /// Displacement over voltage as measured, each voltage coming from 0 V: both strictly increase,
-  /// and 0 V is the first. Beyond the ends there is nothing: they are the limits.
+  /// Measured displacement over voltage, each voltage approached from 0 V: both strictly increase,
+  /// the first voltage is 0 V, and the ends are the limits.
   std::vector<double> curve_V;
   std::vector<double> curve_um;
-  bool return_to_zero{true};  ///< to 0 V before each new voltage, which is then without hysteresis
-  double settle_s{0.2};       ///< at 0 V
-  double steady_s{1.0};       ///< an offset must stand still for so long before it is followed
-  double step_um{0.2};        ///< a smaller change is not followed
-  double tolerance_V{1.0};    ///< read back and written voltage may differ by this much
+  bool return_to_zero{true};     ///< to 0 V before each new voltage, against hysteresis
+  double settle_s{0.2};          ///< at 0 V
+  double steady_s{1.0};          ///< time that an offset must be steady before it is followed
+  double step_um{0.2};           ///< a smaller change is not followed
+  double tolerance_V{1.0};       ///< largest difference between read back and written voltage
   inline void validate() const;  ///< @throws InvalidValue
   bool operator==(const PiezoConfig&) const = default;
 };
@@ -75,42 +75,42 @@ struct ModbusSignal {
   bool operator==(const ModbusSignal&) const = default;
 };
 
-/// A controller that interpolates an axis' offset along its travel by itself. Its offset at each
-/// node is one of the command's, in a row; what they come to is sent as a set of values that is
-/// taken over as a whole or not at all.
+/// An axis whose controller interpolates the offset along its travel. The command has one offset
+/// per node, in consecutive entries; they are sent as a set of values that is taken over completely
+/// or not at all.
 struct TravelShape {
   static constexpr std::size_t nodes_max = 16;
-  std::vector<double> nodes_mm;  ///< increasing; of a line both ends of the travel
-  /// A line: the values are K0, the offset at P0 [um], its slope [um/m] and, where it is written,
-  /// P0 itself [mm]:  offset = K0 + slope (P - P0).  None: the offset at each node [um].
+  std::vector<double> nodes_mm;  ///< increasing; for a line both ends of the travel
+  /// For a line: the values are K0, the offset at P0 [um], its slope [um/m] and, where it is
+  /// written, P0 itself [mm]:  offset = K0 + slope (P - P0).  None: the offset at each node [um].
   std::optional<double> p0_mm;
   bool operator==(const TravelShape&) const = default;
 };
 
-/// In registers a set is one block of
+/// Registers of a set: one block
 ///
 ///     begin | values | end
 ///
-/// begin and end hold the number of the set. The block goes in one request, lowest address first.
-/// A reader that takes `end` first, then the values, then `begin`, and finds both equal, has no
-/// values of two sets, wherever it stopped in between.
+/// where begin and end hold the number of the set, written in one request, lowest address first. A
+/// reader that takes `end`, then the values, then `begin`, and finds both equal, has values of one
+/// set only.
 struct ModbusTravel : TravelShape {
   ModbusValue begin;
   std::vector<ModbusValue> values;
   ModbusValue end;
-  std::vector<ModbusValue> applied;  ///< the same values in effect; empty: not read back
+  std::vector<ModbusValue> applied;  ///< the same values as in effect; empty: not read back
   bool operator==(const ModbusTravel&) const = default;
 };
 
-/// Per axis: where the offset is written and where the controller shows what it applies.
+/// Registers of an axis: written offset and applied offset.
 struct ModbusAxis {
   ModbusValue offset;
-  std::optional<ModbusValue> applied;  ///< none: the controller does not read back
-  /// `offset` takes volts of an amplifier, not um, and `applied` shows volts.
+  std::optional<ModbusValue> applied;  ///< none: no read-back
+  /// `offset` and `applied` are voltages of an amplifier, not um.
   std::optional<PiezoConfig> piezo{};
-  std::optional<ModbusTravel> travel{};  ///< in place of `offset` and `applied`
+  std::optional<ModbusTravel> travel{};  ///< replaces `offset` and `applied`
 
-  /// How many offsets of the command are this axis'.
+  /// Number of offsets of this axis in the command.
   [[nodiscard]] std::size_t offsets() const noexcept {
     return travel ? travel->nodes_mm.size() : 1;
   }
@@ -124,15 +124,15 @@ struct ModbusControllerConfig {
   std::string name;
   ModbusLine line;
   int unit{1};
-  double period_s{0.1};  ///< write and read every so often
+  double period_s{0.1};  ///< of writes and reads
   int registers_per_request_max{125};
   int gap_registers_max{8};  ///< unused registers read along to save a request
   static constexpr int one_register = 6;
-  int write_function{16};        ///< or one_register a request
-  std::vector<ModbusAxis> axes;  ///< order of the configuration's axes, one with all its nodes
+  int write_function{16};        ///< or one_register per request
+  std::vector<ModbusAxis> axes;  ///< in the order of the configuration, one with all its nodes
   std::vector<ModbusSignal> signals;
   std::optional<ModbusValue> valid_bits;  ///< register: bit i = offset of axis i is valid
-  std::optional<ModbusValue> heartbeat;   ///< register: counts up with every write
+  std::optional<ModbusValue> heartbeat;   ///< register: incremented with every write
 
   [[nodiscard]] std::size_t registers_per_write() const noexcept {
     constexpr int limit = 123;  // of the protocol
@@ -148,25 +148,25 @@ struct ModbusControllerConfig {
   bool operator==(const ModbusControllerConfig&) const = default;
 };
 
-/// Values that belong together and stand in one frame or in several. Each of these frames carries
-/// the number of the set: those with the same number are one set, however many were lost between.
+/// Values of one set in one or several frames. Each of these frames carries the number of the set:
+/// frames with the same number are of one set, however many were lost in between.
 struct CanSet {
   static constexpr int number_bits_min = 8;
   static constexpr int number_bits_max = 32;
   std::vector<CanSignal> values;
-  std::vector<CanSignal> numbers;  ///< raw counts of equal length, one in each frame of the values
+  std::vector<CanSignal> numbers;  ///< raw counts of equal length, one in each frame with values
   bool operator==(const CanSet&) const = default;
 };
 
-/// Over CAN a set comes frame by frame, and some do not come: a reader takes it over when the
-/// newest frames of all its identifiers carry the same number. Numbers come round, so a frame older
-/// than forgotten_after_s() is part of no set.
+/// Over CAN a set arrives frame by frame, with losses: a reader takes it over when the newest
+/// frames of all its identifiers carry the same number. Numbers wrap around, so frames older than
+/// forgotten_after_s() are ignored.
 struct CanTravel : TravelShape {
   CanSet sent;
   CanSet applied;  ///< the values in effect, with the number of their set; empty: not read back
   bool operator==(const CanTravel&) const = default;
 
-  /// @param period_s  of the frames that are sent
+  /// @param period_s  of the sent frames
   [[nodiscard]] static double forgotten_after_s(double period_s) noexcept {
     constexpr double least_s = 1.0;
     constexpr double periods = 10.0;
@@ -177,9 +177,9 @@ struct CanTravel : TravelShape {
 struct CanAxis {
   CanSignal offset;                   ///< in a frame we send
   std::optional<CanSignal> applied;   ///< in a frame the controller sends
-  std::optional<CanTravel> travel{};  ///< in place of `offset` and `applied`
+  std::optional<CanTravel> travel{};  ///< replaces `offset` and `applied`
 
-  /// How many offsets of the command are this axis'.
+  /// Number of offsets of this axis in the command.
   [[nodiscard]] std::size_t offsets() const noexcept {
     return travel ? travel->nodes_mm.size() : 1;
   }
@@ -197,9 +197,9 @@ struct CanControllerConfig {
   std::string name;
   std::string interface;
   double period_s{0.1};
-  double silent_after_s{2.0};  ///< any configured frame missing for so long: offline
+  double silent_after_s{2.0};  ///< offline if a configured frame is missing for this long
   double reconnect_s{0.5};
-  std::vector<CanAxis> axes;  ///< order of the configuration's axes, one with all its nodes
+  std::vector<CanAxis> axes;  ///< in the order of the configuration, one with all its nodes
   std::vector<CanControllerSignal> signals;
   std::optional<CanSignal> valid_bits;  ///< bit i = offset of axis i is valid
   std::optional<CanSignal> heartbeat;
@@ -212,19 +212,19 @@ struct CanControllerConfig {
   bool operator==(const CanControllerConfig&) const = default;
 };
 
-/// No controller at all, or one that is only read (make_controller.hpp).
+/// No controller, or one that is only read (make_controller.hpp).
 struct DryRunControllerConfig {
   std::string name;
   std::size_t axes{0};
   bool operator==(const DryRunControllerConfig&) const = default;
 };
 
-/// LinuxCNC: a bridge of its own calls the daemon (docs/linuxcnc.md).
+/// LinuxCNC: its bridge calls the daemon (docs/linuxcnc.md).
 struct BridgeControllerConfig {
   std::string name;
-  double silent_after_s{1.0};        ///< without a report: offline
-  std::vector<std::string> axes;     ///< as the bridge calls them, order of the configuration's
-  std::vector<std::string> signals;  ///< as the bridge calls them, order of the configuration's
+  double silent_after_s{1.0};        ///< offline without a report for this long
+  std::vector<std::string> axes;     ///< names in the bridge, in the order of the configuration
+  std::vector<std::string> signals;  ///< names in the bridge, in the order of the configuration
   bool operator==(const BridgeControllerConfig&) const = default;
 };
 

@@ -1,4 +1,4 @@
-/// A machine controller that takes offsets and tells what it does with them.
+/// Link to a machine controller that takes offsets and reports what it applies.
 #pragma once
 
 #include <array>
@@ -10,14 +10,14 @@
 
 namespace thermocomp {
 
-/// What becomes of the writes to a controller.
+/// Result of the writes to a controller.
 struct WriteHealth {
   std::uint64_t refused{0};     ///< answered with an exception
   std::uint64_t unanswered{0};  ///< not answered, or (CAN) not sent by the interface
-  std::uint64_t late{0};        ///< turns of the link, reads and writes, longer than its period
-  nanoseconds confirmed_at{};   ///< CLOCK_MONOTONIC of the newest that was confirmed; 0: none
-  std::string error;            ///< why the newest failed; empty: it did not
-  // Modbus, of the newest where it failed; 0 else
+  std::uint64_t late{0};        ///< exchanges (reads and writes) longer than the link's period
+  nanoseconds confirmed_at{};   ///< CLOCK_MONOTONIC of the newest confirmed write; 0: none
+  std::string error;            ///< of the newest write; empty: it succeeded
+  // Modbus, of the newest write if it failed; else 0
   int function{0};
   int address{0};
   int exception{0};
@@ -33,18 +33,18 @@ struct ControllerHealth {
   std::uint64_t reads{0};
   std::uint64_t read_errors{0};
   WriteHealth write;
-  std::string last_error;  ///< empty when the last exchange was good, and the last write
+  std::string last_error;  ///< empty if the last exchange and the last write were good
   /// CAN: "down", "active", "warning", "passive" or "bus_off"; else empty
   std::string state;
-  nanoseconds state_since{};  ///< CLOCK_MONOTONIC when it was entered
-  std::uint64_t bus_offs{0};  ///< CAN: times the interface left the bus
-  /// Dry run of a controller that is read: what it really applies [um], NaN: not known.
+  nanoseconds state_since{};  ///< CLOCK_MONOTONIC of the change to `state`
+  std::uint64_t bus_offs{0};  ///< CAN: number of times the interface left the bus
+  /// Dry run of a controller that is read: offsets really applied [um]; NaN: unknown.
   std::optional<std::array<double, axes_max>> shown_um{};
 };
 
-/// Rule of the link: after every (re)connection and after every write that failed the link takes a
-/// new epoch, reads back what the controller applies, publishes both together, and sends no offset
-/// that is not marked with that epoch. So the first offset sent starts from what is applied.
+/// Rule of the link: after every (re)connection and every failed write it takes a new epoch, reads
+/// back the applied offsets, publishes both together, and sends only offsets marked with that
+/// epoch. So the first offset sent starts from the applied one.
 class ControllerLink {
  public:
   ControllerLink() = default;

@@ -8,7 +8,7 @@ namespace thermocomp {
 namespace {
 
 constexpr double mm_per_m = 1000.0;
-constexpr std::size_t line_values_max = 3;  // K0, slope and perhaps P0
+constexpr std::size_t line_values_max = 3;  // K0, slope and optionally P0
 
 }  // namespace
 

@@ -1,5 +1,4 @@
-/// The offsets at the nodes of a travel and the values that a controller interpolates by: pure, and
-/// the same on every bus.
+/// Offsets at the nodes of a travel <-> values that a controller interpolates by. Pure.
 #pragma once
 
 #include <cstddef>
@@ -10,24 +9,24 @@
 
 namespace thermocomp {
 
-/// @throws InvalidValue for nodes that cannot be
+/// @throws InvalidValue for impossible nodes
 void check_shape(const TravelShape& shape);
 
-/// @throws InvalidValue when a set of the travel cannot have so many values
+/// @throws InvalidValue for a number of values that the set of the travel cannot have
 void check_count(const TravelShape& shape, std::size_t values, const char* key);
 
-/// The values of the set, in their units: K0, slope and P0, or the offsets themselves.
-/// @param count      how many of them are written: a line's P0 may be left out
+/// Values of the set, in their units: K0, slope and P0, or the offsets themselves.
+/// @param count      number of values written: a line's P0 may be left out
 /// @param offset_um  shape (nodes)
 [[nodiscard]] std::vector<double> travel_values(const TravelShape& shape, std::size_t count,
                                                 std::span<const double> offset_um);
 
 /// @param shown      values of a set
-/// @param offset_um  shape (nodes); overwritten: what is applied there, NaN where it is not known
+/// @param offset_um  shape (nodes); overwritten: applied there, NaN: unknown
 void offsets_shown(const TravelShape& shape, std::span<const double> shown,
                    std::span<double> offset_um) noexcept;
 
-/// How far a node's offset moves with one count of everything that it is shown by [um].
+/// Change of a node's offset with one count of each value that shows it [um].
 /// @param counts  of each value of the set, in its unit; none: 0
 [[nodiscard]] double node_resolution_um(const TravelShape& shape, std::span<const double> counts,
                                         std::size_t node) noexcept;

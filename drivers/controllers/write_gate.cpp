@@ -16,7 +16,7 @@ WriteGate::WriteGate(nanoseconds period, const std::vector<double>& resolution_u
 std::uint32_t WriteGate::synchronised() noexcept {
   if (link_is_new_) {
     const std::uint32_t link = epoch_ % epochs_of_a_link;
-    // 0 says "never connected", and 1 is the first link of all.
+    // 0 means "never connected", and 1 is reserved for the first link.
     epoch_ += link + 1 == epochs_of_a_link ? 2 - link : 1;
   } else {
     epoch_ += epochs_of_a_link;
@@ -42,8 +42,7 @@ void WriteGate::sent(nanoseconds now) noexcept {
   for (std::size_t axis = 0; axis < axes_max; ++axis) {
     SentLately& lately = sent_[axis];
     if (!command_.valid[axis] || !std::isfinite(command_.offset_um[axis])) {
-      // When it is driven again it may start from elsewhere: what was sent before says nothing
-      // then.
+      // Driven again, the axis may start elsewhere: earlier offsets no longer count.
       lately.count = 0;
       continue;
     }
@@ -65,18 +64,18 @@ bool WriteGate::explains(const std::array<double, axes_max>& applied_um) noexcep
     const double before_um = applied_um_[axis];
     const SentLately& lately = sent_[axis];
     const bool to_be_driven = command_.link_epoch == epoch_ && command_.valid[axis];
-    // Until something is sent it is what was read before the command that a command starts from.
+    // Until something is sent, a command starts from the read-back before it.
     if (lately.count != 0 || !to_be_driven || !std::isfinite(before_um))
       applied_um_[axis] = applied_um[axis];
     if (!std::isfinite(applied_um[axis]) || !std::isfinite(before_um)) continue;
     const bool stands = std::abs(applied_um[axis] - before_um) <= slack_um_[axis];
     if (!stands) stands_since_[axis] = look_;
     if (lately.count == 0) {
-      // Not driven: about to be, from where it stood before.
+      // Not driven yet: the first command starts from the read-back before it.
       explained = explained && (!to_be_driven || stands);
       continue;
     }
-    // Anywhere between where it stood and its setpoint.
+    // Between the starting point and the setpoints.
     const auto end = lately.offset_um.begin() +
                      static_cast<std::ptrdiff_t>(std::min(lately.count, SentLately::length));
     const auto [low, high] = std::minmax_element(lately.offset_um.begin(), end);
@@ -86,7 +85,7 @@ bool WriteGate::explains(const std::array<double, axes_max>& applied_um) noexcep
   return explained;
 }
 
-/// The first command of an axis was computed before it was read to stand where it does.
+/// The first command of an axis was computed before the axis was read back where it is.
 bool WriteGate::starts_elsewhere(std::size_t axis) const noexcept {
   return command_.valid[axis] && sent_[axis].count == 0 && command_.look < stands_since_[axis];
 }

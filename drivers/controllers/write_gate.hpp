@@ -1,5 +1,4 @@
-/// When a link may send offsets: the rule of controller_link.hpp as plain logic without I/O or
-/// clock.
+/// Decides when a link may send offsets: the rule of controller_link.hpp without I/O or clock.
 #pragma once
 
 #include <algorithm>
@@ -16,12 +15,11 @@ namespace thermocomp {
 
 enum class SendVerdict {
   send,
-  nothing_to_send,  ///< no command of this epoch, or the cycle stands still: not even a heartbeat
-  resynchronise     ///< too long since the last write, or the command was computed before the axis
-                    ///< went elsewhere: what is applied must be read back first
+  nothing_to_send,  ///< no command of this epoch, or the cycle has stopped: not even a heartbeat
+  resynchronise     ///< write overdue, or axis moved since the command was computed: read back
 };
 
-/// A command and when the cycle computed it, as it is left for a link's thread.
+/// A command for the link's thread, with the time of its computation.
 struct OfferedCommand {
   OffsetCommand command;
   nanoseconds computed_at{};
@@ -29,73 +27,70 @@ struct OfferedCommand {
 
 class WriteGate {
  public:
-  /// A command computed longer ago is a hung cycle's: the controller's watchdog shall see it. The
-  /// slowest cycle computes one a second.
+  /// An older command is that of a hung cycle, and the controller's watchdog must trip. The slowest
+  /// cycle computes one per second.
   static constexpr nanoseconds renewal_max = std::chrono::seconds{2};
 
-  /// How far from all that was sent lately an axis may stand and still be explained, beside two
-  /// steps of its register [um].
+  /// Largest unexplained distance of an axis from all offsets sent lately, in addition to two steps
+  /// of its register [um].
   static constexpr double unexplained_um = 1.0;
 
-  /// Of a period: how soon the first command of an epoch is looked for, and how often.
+  /// Fraction of a period between looks for the first command of an epoch, and their number.
   static constexpr int first_looks = 4;
 
   /// @param period         of the link's writes
-  /// @param resolution_um  an axis' step of the read-back [um]; axes beyond it: 0
+  /// @param resolution_um  one per axis: step of the read-back [um]; missing: 0
   explicit WriteGate(nanoseconds period, const std::vector<double>& resolution_um = {}) noexcept;
 
   /// Everything has been read back: from here on commands of the new epoch may be sent. The epoch
-  /// is of another link where it was lost() since the last one, else a pause of the same.
-  /// @param applied_um  what was read back with it [um]; a controller that has left it before the
-  ///                    first command is written is not explained either
+  /// begins another link if lost() was called since the last one, else it ends a pause.
+  /// @param applied_um  read back [um]; leaving it before the first command is written is
+  ///                    unexplained
   /// @return the new epoch, never 0
   std::uint32_t synchronised(const std::array<double, axes_max>& applied_um) noexcept;
-  std::uint32_t synchronised() noexcept;  ///< nothing was read back
-  /// The link was lost: nothing may be sent until synchronised(), and the controller may have
-  /// restarted meanwhile.
+  std::uint32_t synchronised() noexcept;  ///< without read-back
+  /// The link is lost: nothing is sent until synchronised(), and the controller may have restarted.
   void lost() noexcept {
     in_sync_ = false;
     link_is_new_ = true;
     confirmed_at_.reset();
   }
-  /// The same of a link that is still the same one: what was sent still counts.
+  /// The link pauses: nothing may be sent until synchronised(), but offsets sent still count.
   void paused() noexcept { in_sync_ = false; }
   [[nodiscard]] bool in_sync() const noexcept { return in_sync_; }
-  /// Whether synchronised() will begin another link.
+  /// True if synchronised() will begin another link.
   [[nodiscard]] bool link_is_new() const noexcept { return link_is_new_; }
   /// The newest epoch; 0: never synchronised.
   [[nodiscard]] std::uint32_t epoch() const noexcept { return epoch_; }
-  /// Counts synchronised() and explains(): the number of what was read back last.
+  /// Number of the last read-back: counts synchronised() and explains().
   [[nodiscard]] std::uint64_t look() const noexcept { return look_; }
 
-  /// The cycle has left a command (again), computed at that time.
+  /// The cycle has offered a command, possibly the same again.
   void offered(const OffsetCommand& command, nanoseconds computed_at) noexcept;
   [[nodiscard]] const OffsetCommand& command() const noexcept { return command_; }
 
   [[nodiscard]] SendVerdict verdict(nanoseconds now) const noexcept;
   /// The command was sent in full.
   void sent(nanoseconds now) noexcept;
-  /// What was sent is known to have reached the controller.
+  /// The command has reached the controller.
   void confirmed(nanoseconds now) noexcept { confirmed_at_ = now; }
-  /// Whether something was confirmed lately: on this link, within its patience().
+  /// True if a write was confirmed on this link within patience().
   [[nodiscard]] bool written(nanoseconds now) const noexcept {
     return confirmed_at_ && now - *confirmed_at_ <= patience();
   }
-  /// How long the link's newest turn took, reads and writes: a slow controller is waited for.
+  /// Duration of the link's last exchange, so that a slow controller is waited for.
   void turned(nanoseconds took) noexcept { turn_ = took; }
-  /// So long a link may go without a write: five periods, a second, or two turns of a controller
-  /// that takes longer than that.
+  /// Longest time between two writes: five periods, a second, or twice the last turned().
   [[nodiscard]] nanoseconds patience() const noexcept { return std::max(patience_min_, 2 * turn_); }
 
-  /// How long to wait until the link's next turn; asked once a turn. A period, but a quarter of it
-  /// in the first turns of an epoch in which nothing has been sent: the cycle has been moving away
-  /// from what is applied since it saw the epoch, and the first step shall be a small one.
+  /// Pause before the link's next exchange; called once per exchange. A period, but a quarter of it
+  /// at first while nothing has been sent in the epoch: the cycle has been moving away from the
+  /// applied offset since it saw the epoch, and the first step should be small.
   [[nodiscard]] nanoseconds next_pause() noexcept;
 
-  /// What the controller applies, just read [um], NaN: not known.
-  /// @return false: a driven axis stands where nothing that was sent can have taken it (re-homed,
-  ///         overridden). What is still under way would be a leap from there: synchronised() must
-  ///         come before anything is sent.
+  /// @param applied_um  just read [um]; NaN: unknown
+  /// @return false: no offset sent explains that of a driven axis (re-homed, overridden). An offset
+  ///         under way would be a jump from there: synchronised() must come before the next send.
   [[nodiscard]] bool explains(const std::array<double, axes_max>& applied_um) noexcept;
 
  private:
@@ -114,16 +109,16 @@ class WriteGate {
   std::optional<nanoseconds> confirmed_at_;  ///< on this link
   int looks_{0};                             ///< for the first command of this epoch
 
-  /// Offsets of one axis in this epoch, newest in a ring: a controller with a ramp or a delay of
-  /// its own may be on its way to any of them.
+  /// Latest offsets of one axis in this epoch, a ring: a controller with a ramp or a delay may be
+  /// on its way to any of them.
   struct SentLately {
     static constexpr std::size_t length = 16;
     std::array<double, length> offset_um{};
     std::size_t count{0};
   };
   std::array<SentLately, axes_max> sent_{};
-  std::array<double, axes_max> applied_um_{};  ///< as read last
-  /// The look that showed an axis far from where the one before did.
+  std::array<double, axes_max> applied_um_{};  ///< last read-back
+  /// look() at which the read-back of an axis last jumped.
   std::array<std::uint64_t, axes_max> stands_since_{};
   std::array<double, axes_max> slack_um_{};
 };

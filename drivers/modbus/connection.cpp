@@ -42,7 +42,7 @@ constexpr std::uint8_t read_function(ModbusTable table) noexcept {
   return MODBUS_FC_READ_INPUT_REGISTERS;
 }
 
-/// Function and data of a request or an answer, without what the line puts around it.
+/// Function and data of a request or an answer, without framing.
 struct Pdu {
   std::array<std::uint8_t, MODBUS_MAX_PDU_LENGTH> bytes{};
   std::size_t size{0};
@@ -64,7 +64,7 @@ void unpack_words(std::span<const std::uint8_t> data, std::span<std::uint16_t> w
   for (std::size_t i = 0; i < words.size(); ++i) words[i] = word_at(data, 2 * i);
 }
 
-/// Bytes of the PDU that answers a read.
+/// Size of the PDU that answers a read.
 constexpr std::size_t answer_bytes_of(ModbusTable table, std::size_t words) noexcept {
   return 2 + (is_bit_table(table) ? (words + 7) / 8 : 2 * words);
 }
@@ -140,12 +140,11 @@ class ModbusConnection::Implementation {
   void time_as(const ModbusLine& line) noexcept;
   [[nodiscard]] nanoseconds ready_at(int unit, const ModbusQuestion& question) const noexcept;
 
-  /// One request and its answer, which is left in answer(). `answer_bytes` is the size of the
-  /// expected answer's PDU.
+  /// One request and its answer, available as answer(). `answer_bytes`: size of the expected PDU.
   Exchange exchange(int unit, const Pdu& request, std::size_t answer_bytes);
   [[nodiscard]] std::span<const std::uint8_t> answer() const noexcept { return frames_.answer(); }
   Exchange write(int unit, const Pdu& request, std::size_t word);
-  /// The answer was of the right function but not what was asked for.
+  /// The answer has the right function but not the requested content.
   void reject(int unit, Exchange& exchange, const std::string& detail);
 
  private:
@@ -159,9 +158,9 @@ class ModbusConnection::Implementation {
   void settle(int unit, Exchange& exchange);
 
   ModbusLine line_;
-  bool serial_;    ///< a serial port: nobody at the other end opens or closes it
+  bool serial_;    ///< a serial port: no peer opens or closes it
   bool rtu_;       ///< serial frames
-  bool numbered_;  ///< answers carry the number of their request
+  bool numbered_;  ///< answers carry their request's transaction id
   nanoseconds timeout_{0};
   nanoseconds gap_{0};
   std::unique_ptr<ModbusPort> port_;
@@ -172,15 +171,15 @@ class ModbusConnection::Implementation {
   std::uint64_t closed_unexpectedly_{0};
   std::string last_error_;
   int answers_{0};   ///< on this connection
-  int closings_{0};  ///< in a row, by the peer, after one answer
+  int closings_{0};  ///< consecutive closings by the peer after one answer
   int time_outs_in_a_row_{0};
   nanoseconds line_free_at_{0};
   std::array<LateAnswers, 256> units_;
-  ModbusQuestion question_;  ///< of the exchange under way
-  bool was_sent_{false};     ///< its request
-  bool in_step_{true};       ///< where the next frame begins is known
-  int silent_unit_{-1};      ///< that had no answer last
-  int silent_asked_{0};      ///< requests for which a gateway may still wait
+  ModbusQuestion question_;  ///< of the present exchange
+  bool was_sent_{false};     ///< its request was sent
+  bool in_step_{true};       ///< the start of the next frame is known
+  int silent_unit_{-1};      ///< last unit without answer
+  int silent_asked_{0};      ///< requests that a gateway may still wait for
   nanoseconds silent_since_{0};
   nanoseconds held_{0};
   std::atomic<bool> shared_{false};
@@ -249,8 +248,7 @@ bool ModbusConnection::Implementation::open_anew() {
 
 // ---- one exchange
 
-/// What has come unasked answers nothing. @return false when the line is lost or the peer does not
-/// stop
+/// Discards bytes received before the request. @return false: line lost, or bytes keep coming
 bool ModbusConnection::Implementation::discard() {
   constexpr int pieces_max = 64;
   for (int piece = 0; piece < pieces_max; ++piece) {
@@ -263,16 +261,16 @@ bool ModbusConnection::Implementation::discard() {
   return false;
 }
 
-/// Takes what comes until it is the answer, or too late for one.
+/// Receives until the answer is complete or too late.
 void ModbusConnection::Implementation::await_answer(nanoseconds deadline, Exchange& exchange) {
   constexpr milliseconds rest_max{700};
   constexpr milliseconds block{100};  // serial adapters deliver in blocks
   constexpr milliseconds full{50};
-  // For a frame that has begun.
+  // For the rest of a frame that has begun.
   const nanoseconds rest = rtu_ ? block : std::min<nanoseconds>(timeout_, rest_max);
   const nanoseconds end = deadline + rest;
   nanoseconds until = deadline;
-  bool is_over = false;  // bytes that answer nothing may come without end
+  bool is_over = false;  // unrelated bytes may come without end
   while (true) {
     const ModbusFrames::Found found = frames_.look();
     in_step_ = found != ModbusFrames::Found::no_frame;
@@ -314,8 +312,7 @@ void ModbusConnection::Implementation::judge_silence(Exchange& exchange) const {
   const std::string within =
       " within timeout_ms = " + std::to_string(std::chrono::round<milliseconds>(timeout_).count());
   const std::string came = frames_.came();
-  // What has begun in TCP is followed by its rest, or by nothing that could be distinguished from
-  // it.
+  // In TCP the start of a frame is followed by its rest, or by nothing that could be told from it.
   const bool is_silent = came.empty() || (frames_.came_late() && (rtu_ || !frames_.has_part()));
   exchange.outcome = is_silent ? ExchangeOutcome::timeout : ExchangeOutcome::bad_frame;
   exchange.detail = came.empty()                       ? "no answer" + within
@@ -368,7 +365,7 @@ Exchange ModbusConnection::Implementation::exchange(int unit, const Pdu& request
   if (closings_ < closings_of_a_habit || answers_ == 0 || opened_anew()) {
     const bool has_answered = answers_ > 0;
     exchange = try_once(unit, request, answer_bytes, deadline);
-    // What was written may have been taken: whoever writes looks before he writes again.
+    // A write may have taken effect: the caller reads before it writes again.
     const bool may_repeat = !was_sent_ || question_.function <= MODBUS_FC_READ_INPUT_REGISTERS;
     if (exchange.outcome == ExchangeOutcome::disconnected && has_answered && may_repeat) {
       closings_ = answers_ == 1 ? closings_ + 1 : 0;
@@ -393,7 +390,7 @@ void ModbusConnection::Implementation::take_exception(Exchange& exchange) const 
   if (exchange.detail.empty()) exchange.detail = exception_text(answer()[1]);
 }
 
-/// What an exchange's end means for the ones to come.
+/// Effects of the result on later exchanges.
 void ModbusConnection::Implementation::settle(int unit, Exchange& exchange) {
   LateAnswers& late = units_[static_cast<std::size_t>(unit)];
   const nanoseconds now = port_->now();
@@ -416,15 +413,15 @@ void ModbusConnection::Implementation::settle(int unit, Exchange& exchange) {
       silent_unit_ = unit;
       ++silent_asked_;
       silent_since_ = exchange.sent_at;
-      // A peer that went without a word (power cut) is only found by connecting anew.
+      // A peer that vanished (power cut) is only detected by reconnecting.
       if (!serial_ && ++time_outs_in_a_row_ >= time_outs_of_dead_connection) disconnect();
       return;
     case ExchangeOutcome::bad_frame:
-      // The rest of an answer that broke off may come as late as the answer.
+      // The rest of an incomplete answer may come as late as the answer.
       late.spoiled(question_, frames_.has_part() && !frames_.is_full() ? now : exchange.sent_at,
                    timeout_);
       if (rtu_) {
-        // Until the line is silent; bounded.
+        // Drains the line until it is silent; bounded.
         constexpr milliseconds drain_max{300};
         const nanoseconds silence = std::max<nanoseconds>(gap_, silence_min);
         while (port_->now() < now + drain_max && discard() &&
@@ -432,7 +429,7 @@ void ModbusConnection::Implementation::settle(int unit, Exchange& exchange) {
         }
         line_free_at_ = port_->now();
       } else if (!in_step_ || frames_.has_part()) {
-        disconnect();  // where the next frame of the stream begins is not known any more
+        disconnect();  // the start of the next frame is unknown
       }
       return;
     case ExchangeOutcome::disconnected:
@@ -450,9 +447,9 @@ void ModbusConnection::Implementation::reject(int unit, Exchange& exchange,
   settle(unit, exchange);
 }
 
-// ---- the public face: what is asked, and whether the answer fits
+// ---- public interface: requests, and checks of the answers
 
-/// A write and its answer, which repeats the address and this word.
+/// A write; its answer repeats the address and this word.
 Exchange ModbusConnection::Implementation::write(int unit, const Pdu& request, std::size_t word) {
   constexpr std::size_t answer_bytes = 5;
   Exchange written = exchange(unit, request, answer_bytes);
@@ -538,7 +535,7 @@ Exchange ModbusConnection::read(int unit, ModbusTable table, std::uint16_t addre
   if (!exchange.ok()) return exchange;
   const auto answer = implementation_->answer();
   const std::size_t data_bytes = answer_bytes - 2;
-  // Some gateways fill their frames up.
+  // Some gateways pad their frames.
   if (answer.size() < answer_bytes || answer[1] != data_bytes) {
     const std::size_t declared = answer.size() < 2 ? 0 : answer[1];
     const std::size_t came = declared == data_bytes ? answer.size() - 2 : declared;

@@ -5,7 +5,7 @@
 namespace thermocomp {
 namespace {
 
-constexpr std::size_t head_bytes = 7;  // TCP: number, protocol, length, unit
+constexpr std::size_t head_bytes = 7;  // TCP: transaction id, protocol, length, unit
 constexpr std::size_t checksum_bytes = 2;
 constexpr std::uint8_t exception_bit = 0x80;
 constexpr std::uint8_t write_single_register = 6;
@@ -30,7 +30,7 @@ constexpr std::uint16_t checksum(std::span<const std::uint8_t> bytes) noexcept {
   return static_cast<std::uint16_t>(sum);
 }
 
-/// Length of the answer that begins here; 0: not known.
+/// Length of the answer that begins here; 0: unknown.
 constexpr std::size_t rtu_answer_bytes(std::span<const std::uint8_t> bytes) noexcept {
   if (bytes.size() < 4) return 0;
   const std::uint8_t function = bytes[1];
@@ -40,7 +40,7 @@ constexpr std::size_t rtu_answer_bytes(std::span<const std::uint8_t> bytes) noex
   return confirms ? 8 : 0;
 }
 
-/// The whole answer that begins here, its checksum right; empty: there is none.
+/// The complete answer that begins here, with correct checksum; else empty.
 std::span<const std::uint8_t> rtu_answer(std::span<const std::uint8_t> bytes) noexcept {
   const std::size_t size = rtu_answer_bytes(bytes);
   if (size == 0 || size > bytes.size()) return {};
@@ -100,7 +100,7 @@ std::span<const std::uint8_t> ModbusFrames::request(int unit, std::span<const st
 }
 
 std::span<std::uint8_t> ModbusFrames::room() noexcept {
-  if (received_ == stream_.size()) {  // of so much noise the newest part is enough
+  if (received_ == stream_.size()) {  // keep the newest bytes only
     std::copy(stream_.begin() + frame_bytes_max, stream_.end(), stream_.begin());
     received_ -= frame_bytes_max;
     begin_ -= std::min(begin_, frame_bytes_max);
@@ -120,7 +120,7 @@ bool ModbusFrames::discard() noexcept {
   }
   while (take_tcp()) {
   }
-  // Some gateways fill their frames up with zeros.
+  // Some gateways pad their frames with zeros.
   if (std::all_of(received().begin(), received().end(), [](auto byte) { return byte == 0; }))
     received_ = 0;
   unasked_ = received_;
@@ -142,7 +142,7 @@ ModbusFrames::Found ModbusFrames::look_rtu() {
   const auto asked = std::span(request_).first(request_bytes_);
   for (std::size_t at = begin_; at < received_; ++at) {
     const auto rest = received().subspan(at);
-    // The confirmation of a single register is the same as its request.
+    // The confirmation of a single register equals its request.
     const bool may_be_echo = asked[1] != write_single_register || echoes_;
     if (may_be_echo && !echoed_ && rest.size() >= asked.size() &&
         std::equal(asked.begin(), asked.end(), rest.begin())) {
@@ -166,7 +166,7 @@ ModbusFrames::Found ModbusFrames::look_rtu() {
   return Found::nothing;
 }
 
-/// Takes a whole frame off the front of the stream, into frame_. @return whether there was one
+/// Moves a whole frame from the front of the stream into frame_. @return false if there is none
 bool ModbusFrames::take_tcp() noexcept {
   if (received_ < head_bytes) return false;
   const std::size_t size = word_at(received(), 4) + std::size_t{6};

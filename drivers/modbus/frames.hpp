@@ -1,4 +1,4 @@
-/// Requests and answers of a Modbus line as bytes: made, and found again in what comes. Pure.
+/// Modbus requests and answers as bytes: encoding, and search in the received stream. Pure.
 #pragma once
 
 #include <array>
@@ -9,47 +9,47 @@
 
 namespace thermocomp {
 
-/// Bytes for a person, "0B 04 02 ..."; of many the first.
+/// "0B 04 02 ...", for display; a long text is cut.
 [[nodiscard]] std::string hex_text(std::span<const std::uint8_t> bytes);
 
-/// The frames of one line. RTU: unit, function, data, checksum; an answer is found behind whatever
-/// else comes, as the echo of the request or a byte from the switching of the line. TCP: a head
-/// with a number, the length and the unit.
+/// Frames of one line. RTU: unit, function, data, checksum; an answer is also found after unrelated
+/// bytes, such as the echo of the request or a byte from switching the line. TCP: header with
+/// transaction id, length and unit.
 class ModbusFrames {
  public:
   static constexpr std::size_t frame_bytes_max = 260;
 
-  /// @param rtu  serial frames. @param numbered  an answer carries the number of its request
+  /// @param rtu  serial frames. @param numbered  answers carry their request's transaction id
   ModbusFrames(bool rtu, bool numbered) noexcept : rtu_(rtu), numbered_(numbered) {}
 
-  /// The frame of a request. @param answer_bytes  of the expected answer's function and data
+  /// Frame of a request. @param answer_bytes  of the expected answer's function and data
   std::span<const std::uint8_t> request(int unit, std::span<const std::uint8_t> pdu,
                                         std::size_t answer_bytes) noexcept;
 
-  /// Where bytes that come are put; took() says how many. Never empty.
+  /// Buffer for received bytes; took() gives their number. Never empty.
   [[nodiscard]] std::span<std::uint8_t> room() noexcept;
   void took(std::size_t bytes) noexcept { received_ += bytes; }
-  /// What came before the request is no answer to it. RTU: it goes. TCP: whole frames go, the
-  /// beginning of one is remembered. @return false: the stream makes no sense any more
+  /// Discards bytes received before the request. RTU: all. TCP: whole frames; the start of one is
+  /// kept. @return false: the stream is out of step
   bool discard() noexcept;
   void forget() noexcept;  ///< the line was closed
 
   enum class Found {
-    nothing,  ///< yet
-    answer,   ///< answer() is it: of the unit, to the function
-    other,    ///< came() says what
-    no_frame  ///< the same, and where the next frame begins is not known
+    nothing,  ///< not yet
+    answer,   ///< answer() of the unit, to the function
+    other,    ///< another frame, see came()
+    no_frame  ///< the same, and the start of the next frame is unknown
   };
   [[nodiscard]] Found look();
   [[nodiscard]] std::span<const std::uint8_t> answer() const noexcept { return answer_; }
-  /// Bytes came that are no whole frame yet.
+  /// Bytes of an incomplete frame have come.
   [[nodiscard]] bool has_part() const noexcept { return received_ > begin_; }
-  /// As many bytes came as the answer has, of which none was found: nothing more is to come.
+  /// As many bytes as the answer has came, without an answer among them: nothing more will come.
   [[nodiscard]] bool is_full() const noexcept;
 
-  /// What came in place of the answer; empty: nothing.
+  /// Description of bytes received in place of the answer; empty: none.
   [[nodiscard]] std::string came() const;
-  /// It was an answer to an earlier request, or the request's own echo.
+  /// They were an answer to an earlier request, or the echo of this one.
   [[nodiscard]] bool came_late() const noexcept { return late_ || (echoed_ && other_.empty()); }
 
  private:
@@ -67,15 +67,15 @@ class ModbusFrames {
   std::array<std::uint8_t, frame_bytes_max> request_{};
   std::size_t request_bytes_{0};
   std::size_t answer_bytes_{0};
-  std::array<std::uint8_t, frame_bytes_max> frame_{};  ///< TCP: taken last
+  std::array<std::uint8_t, frame_bytes_max> frame_{};  ///< TCP: last frame
   std::size_t frame_bytes_{0};
   std::array<std::uint8_t, 3 * frame_bytes_max> stream_{};
   std::size_t received_{0};  ///< bytes of stream_
-  std::size_t begin_{0};     ///< RTU: bytes of it that are no answer
-  std::size_t unasked_{0};   ///< TCP: bytes at its front that were there before the request
+  std::size_t begin_{0};     ///< RTU: of these, not part of an answer
+  std::size_t unasked_{0};   ///< TCP: of these, received before the request
   std::span<const std::uint8_t> answer_;
-  bool echoes_{false};  ///< RTU: the line brings its own requests back
-  // Of the exchange under way
+  bool echoes_{false};  ///< RTU: the line echoes our requests
+  // Of the present exchange:
   bool echoed_{false};
   bool late_{false};
   std::string other_;

@@ -1,4 +1,4 @@
-// What can be said of a Modbus line without opening it.
+// Checks and timing of a Modbus line that need no open port.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,7 +10,7 @@
 namespace thermocomp {
 namespace {
 
-// libmodbus takes 9600 without a word for any rate it does not know, so the list is ours to check.
+// libmodbus silently uses 9600 for an unknown rate, so the list is checked here.
 constexpr std::array<int, 20> bauds{110,    300,    600,     1200,    2400,    4800,   9600,
                                     19200,  38400,  57600,   115200,  230400,  460800, 500000,
                                     576000, 921600, 1000000, 1152000, 1500000, 2000000};

@@ -1,5 +1,4 @@
-/// Modbus lines, and devices with temperatures on them: plain structures, filled by config/ or by a
-/// test.
+/// Configuration of Modbus lines and of the devices with temperatures on them.
 #pragma once
 
 #include <array>
@@ -15,12 +14,12 @@
 namespace thermocomp {
 
 enum class Encoding { int16, uint16, int32, uint32, float32, float64 };
-/// Bytes of a value as they come over the wire; the most significant byte is A.
+/// Byte order on the wire; A is the most significant byte.
 enum class WordOrder { abcd, dcba, badc, cdab };
-/// The last is of an S7 CPU: a word of a data block.
+/// data_block: a word of an S7 CPU's data block.
 enum class ModbusTable { coil, discrete_input, holding, input, data_block };
 
-/// Number of registers a value takes: 1, 2 or 4.
+/// Registers per value: 1, 2 or 4.
 [[nodiscard]] constexpr std::size_t registers_of(Encoding encoding) noexcept {
   switch (encoding) {
     case Encoding::int16:
@@ -40,18 +39,18 @@ enum class ModbusTable { coil, discrete_input, holding, input, data_block };
   return table == ModbusTable::coil || table == ModbusTable::discrete_input;
 }
 
-/// Words a value takes in a table; a coil or discrete input is one word, 0 or 1.
+/// Words per value in a table; a coil or discrete input is one word, 0 or 1.
 [[nodiscard]] constexpr std::size_t words_of(ModbusTable table, Encoding encoding) noexcept {
   return is_bit_table(table) ? 1 : registers_of(encoding);
 }
 
-/// One data block of an S7 CPU, over ISO-on-TCP: register n is its bytes 2 n and 2 n + 1.
+/// One data block of an S7 CPU over ISO-on-TCP: register n is bytes 2 n and 2 n + 1.
 struct S7Block {
   static constexpr int port = 102;
   static constexpr int slots = 32;
   static constexpr int byte_max = 65534;
-  static constexpr std::size_t pdu_bytes = 240;     ///< every CPU grants as many
-  static constexpr int registers_per_request{106};  ///< that can be written in one PDU
+  static constexpr std::size_t pdu_bytes = 240;     ///< granted by every CPU
+  static constexpr int registers_per_request{106};  ///< largest write in one PDU
   int db{1};
   int rack{0};
   int slot{1};
@@ -61,41 +60,41 @@ struct S7Block {
 struct ModbusTcp {
   std::string host;
   int port{502};
-  bool rtu_frames{false};  ///< as on a serial line: a serial server that passes bytes on
+  bool rtu_frames{false};  ///< serial frames over TCP: a serial server that passes bytes on
   bool datagrams{false};   ///< UDP
   std::optional<S7Block> s7{};
   bool operator==(const ModbusTcp&) const = default;
 };
 struct ModbusRtu {
-  std::string device;  ///< "/dev/ttyUSB0"
+  std::string device;
   int baud{9600};
   char parity{'N'};  ///< 'N', 'E' or 'O'
   int data_bits{8};
   int stop_bits{1};
-  bool rs485{false};  ///< let the kernel drive the transceiver's direction (TIOCSRS485)
+  bool rs485{false};  ///< the kernel switches the transceiver's direction (TIOCSRS485)
   bool operator==(const ModbusRtu&) const = default;
 };
 
 /// Timing of a Modbus line, shared by sensors and controllers.
 struct ModbusLine {
   std::variant<ModbusTcp, ModbusRtu> link;
-  double timeout_ms{200.0};           ///< for one answer
+  double timeout_ms{200.0};           ///< per answer
   double inter_frame_delay_ms{-1.0};  ///< silence between frames; negative: 3.5 characters, 1.75 ms
                                       ///< above 19200 baud; TCP: 0
-  double reconnect_s{1.0};            ///< pause before a connection is tried again
-  double backoff_s_max{30.0};         ///< longest pause before a dead unit is asked again
-  int retries{1};                     ///< further tries of one request before it has failed
-  /// TCP, UDP: answers carry any transaction number; late ones are recognised as on a serial line.
+  double reconnect_s{1.0};            ///< pause between attempts to connect
+  double backoff_s_max{30.0};         ///< longest pause between requests to a dead unit
+  int retries{1};                     ///< of one request before it counts as failed
+  /// TCP, UDP: any transaction id is accepted; late answers are recognised as on a serial line.
   bool ignore_transaction{false};
   bool operator==(const ModbusLine&) const = default;
 };
 
-/// A register or bit beside the value that says whether the value is good.
+/// A register or bit that shows whether the value is good.
 struct ModbusStatus {
   ModbusTable table{ModbusTable::discrete_input};
   std::uint16_t address{0};    ///< 0-based, as on the wire
-  std::uint16_t mask{0xFFFF};  ///< bits looked at (registers only)
-  /// masked value -> fault; a value not listed and not 0 is device_error
+  std::uint16_t mask{0xFFFF};  ///< bits used (registers only)
+  /// masked value -> fault; a value that is not listed and not 0 is device_error
   std::vector<Sentinel> codes;
   bool operator==(const ModbusStatus&) const = default;
 };
@@ -106,7 +105,7 @@ struct ModbusChannel {
   std::uint16_t address{0};  ///< 0-based, as on the wire
   Encoding encoding{Encoding::int16};
   WordOrder word_order{WordOrder::abcd};
-  std::uint16_t mask{0xFFFF};  ///< of a 16-bit value: the bits that are the number
+  std::uint16_t mask{0xFFFF};  ///< bits of a 16-bit value that are the number
   double scale{1.0};           ///< temp = raw * scale + offset_degC
   double offset_degC{0.0};
   std::vector<Sentinel> sentinels;
@@ -114,8 +113,8 @@ struct ModbusChannel {
   bool operator==(const ModbusChannel&) const = default;
 };
 
-/// A register that the device changes with each conversion; while it stands still, so do the times
-/// of the device's readings.
+/// A register that the device changes with each conversion; while it does not change, neither do
+/// the times of the device's readings.
 struct ModbusRenewal {
   ModbusTable table{ModbusTable::input};
   std::uint16_t address{0};
@@ -127,15 +126,15 @@ struct ModbusDeviceConfig {
   int unit{1};           ///< 0..247 (255 on TCP)
   double period_s{1.0};  ///< how often it is read
   int registers_per_request_max{125};
-  int gap_registers_max{8};  ///< unused registers read along to save a request
+  int gap_registers_max{8};  ///< unused registers that a request may read along
   bool one_register_a_request{false};
-  bool wide_registers{false};  ///< a register has 32 bits: a value one address, its answer 4 bytes
+  bool wide_registers{false};  ///< 32-bit registers: one address per value, answer of 4 bytes
   std::optional<ModbusRenewal> renewal;
   std::vector<ModbusChannel> channels;
   bool operator==(const ModbusDeviceConfig&) const = default;
 };
 
-/// What the key `kind` of a line may say.
+/// Values of the key `kind` of a line.
 inline constexpr std::array modbus_kinds{"modbus_tcp", "modbus_rtu", "modbus_rtu_over_tcp",
                                          "modbus_udp"};
 [[nodiscard]] constexpr const char* kind_of(const ModbusLine& line) noexcept {

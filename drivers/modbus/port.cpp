@@ -32,8 +32,8 @@ struct SocketAddress {
   socklen_t length{0};
 };
 
-/// A numeric address is known at once; a name is looked up by a thread of its own, which may
-/// outlive this object (the name service cannot be interrupted).
+/// Resolves a host name. A numeric address is resolved at once, a name by a thread of its own,
+/// which may outlive this object (the name service cannot be interrupted).
 class NameLookup {
  public:
   NameLookup(const std::string& host, int port);
@@ -41,11 +41,11 @@ class NameLookup {
   NameLookup& operator=(const NameLookup&) = delete;
   ~NameLookup();
 
-  /// Readable once done() can be called.
+  /// Readable when done() is true.
   [[nodiscard]] int done_fd() const noexcept;
   [[nodiscard]] bool done() const noexcept;
   /// @pre done()
-  /// @return the address, or nothing with `error` set
+  /// @return the address, or nullopt with `error` set
   [[nodiscard]] std::optional<SocketAddress> result(std::string& error) const;
 
  private:
@@ -92,7 +92,7 @@ struct NameLookup::State {
   }
 };
 
-/// A thread nobody waits for, deaf to signals, with a stack sized on purpose.
+/// Starts a detached thread with all signals blocked and a small stack.
 bool run_detached(void* (*body)(void*), void* argument) noexcept {
   pthread_attr_t attributes;
   pthread_attr_init(&attributes);
@@ -142,13 +142,13 @@ bool NameLookup::done() const noexcept {
 }
 
 std::optional<SocketAddress> NameLookup::result(std::string& error) const {
-  THERMOCOMP_ENSURE(done());  // also what makes the other thread's result visible here
+  THERMOCOMP_ENSURE(done());  // also makes the other thread's result visible here
   if (state_->error == 0) return state_->address;
   error = state_->host + ": " + ::gai_strerror(state_->error);
   return std::nullopt;
 }
 
-/// Waiting for a descriptor, a time or cancel(), whichever comes first.
+/// Waits for a descriptor, a time or cancel(), whichever is first.
 class InterruptibleWait {
  public:
   /// @throws DriverError when the system has no more descriptors
@@ -157,8 +157,8 @@ class InterruptibleWait {
   InterruptibleWait& operator=(const InterruptibleWait&) = delete;
   ~InterruptibleWait();
 
-  /// Waits for `events` of `fd` (negative: for nothing but the time), cancel() or the deadline.
-  /// Errors of the descriptor count as ready: the following read or write names them.
+  /// Waits for `events` of `fd` (negative: none), cancel() or the deadline. Errors of the
+  /// descriptor count as ready: the following read or write returns them.
   PortWait wait_for(int fd, short events, nanoseconds deadline) noexcept;
   bool pause_until(nanoseconds time) noexcept;  ///< @return false when cancelled
   void cancel() noexcept;
@@ -209,10 +209,10 @@ bool InterruptibleWait::pause_until(nanoseconds time) noexcept {
   return wait_for(-1, 0, time) != PortWait::cancelled;
 }
 
-/// A socket to a host and port, of a stream or of datagrams.
+/// Stream or datagram socket to a host and port.
 class TcpPort final : public ModbusPort {
  public:
-  /// @param connect_max  the longest that connecting may take
+  /// @param connect_max  limit for connecting
   TcpPort(const ModbusTcp& tcp, nanoseconds connect_max) : tcp_(tcp), connect_max_(connect_max) {}
   ~TcpPort() override { close_socket(); }
 
@@ -253,7 +253,7 @@ bool TcpPort::open(std::string& why) {
     }
   }
   const auto address = lookup_->result(why);
-  lookup_.reset();  // names may move: asked anew for every connection
+  lookup_.reset();  // resolved for every connection, since addresses may change
   return address && open_socket(*address, why);
 }
 
@@ -313,7 +313,7 @@ PortBytes TcpPort::receive(std::span<std::uint8_t> into) noexcept {
   }
 }
 
-/// A serial port, opened and set by libmodbus.
+/// Serial port, opened and configured by libmodbus.
 class RtuPort final : public ModbusPort {
  public:
   /// @throws DriverError when libmodbus refuses the line
@@ -374,7 +374,7 @@ bool RtuPort::open(std::string& why) {
 void RtuPort::close_device() noexcept {
   if (!open_) return;
   open_ = false;
-  // Bytes that cannot be sent any more would make close() of a serial port wait for them.
+  // close() of a serial port would wait for bytes that cannot be sent any more.
   modbus_flush(context_.get());
   modbus_close(context_.get());
 }
@@ -392,7 +392,7 @@ PortBytes RtuPort::receive(std::span<std::uint8_t> into) noexcept {
   if (count > 0) return {PortBytes::Kind::bytes, static_cast<std::size_t>(count)};
   if (count < 0 && (errno == EAGAIN || errno == EINTR)) return {PortBytes::Kind::nothing};
   if (count < 0) return {PortBytes::Kind::lost};
-  // 0: nothing is there, or the port is gone.
+  // 0: no data, or the port is gone.
   pollfd port{fd(), POLLIN, 0};
   const timespec at_once{};
   const bool is_gone = ::ppoll(&port, 1, &at_once, nullptr) > 0 && (port.revents & ~POLLIN) != 0;

@@ -1,5 +1,5 @@
-/// What carries the bytes of a Modbus line and knows the time: a TCP socket, a serial port, or a
-/// simulation of either. ModbusConnection decides which bytes are a frame and what it answers.
+/// Transport and clock of a Modbus line: TCP socket, serial port, or a simulation of either.
+/// ModbusConnection does the framing.
 #pragma once
 
 #include <cstddef>
@@ -14,7 +14,7 @@ namespace thermocomp {
 
 enum class PortWait : std::uint8_t { ready, late, cancelled };
 
-/// What a port had to give.
+/// Result of receive().
 struct PortBytes {
   enum class Kind : std::uint8_t {
     bytes,    ///< `size` of them, at least one
@@ -25,7 +25,7 @@ struct PortBytes {
   std::size_t size{0};
 };
 
-/// One thread uses a port; only cancel() may come from another. Closed at first.
+/// For one thread; only cancel() may come from another. Closed at first.
 class ModbusPort {
  public:
   ModbusPort() = default;
@@ -36,35 +36,35 @@ class ModbusPort {
   [[nodiscard]] virtual nanoseconds now() const noexcept = 0;  ///< CLOCK_MONOTONIC
 
   /// @pre closed
-  /// @return whether it is open; if not, `why` says what is wrong
+  /// @return true if open; else `why` has the reason
   virtual bool open(std::string& why) = 0;
   virtual void close() noexcept = 0;  ///< also when closed
 
-  /// @param bytes  a whole frame. @return whether all of it was taken
+  /// @param bytes  a whole frame. @return true if all of it was taken
   virtual bool send(std::span<const std::uint8_t> bytes) noexcept = 0;
-  /// Waits until something can be received, or something is wrong with the line.
+  /// Waits for input or an error of the line.
   virtual PortWait wait_for_input(nanoseconds deadline) noexcept = 0;
-  /// What is there, without waiting.
+  /// Received bytes, without waiting.
   virtual PortBytes receive(std::span<std::uint8_t> into) noexcept = 0;
 
-  /// Why the newest request was refused; empty: the code of the exception says all.
+  /// Reason of the refusal of the newest request; empty: see the exception code.
   [[nodiscard]] virtual std::string refusal() const { return {}; }
 
   /// @return false when cancelled
   virtual bool pause_until(nanoseconds time) noexcept = 0;
-  /// For good: every present and future wait ends at once.
+  /// Irreversible: every present and future wait ends at once.
   virtual void cancel() noexcept = 0;
   [[nodiscard]] virtual bool cancelled() const noexcept = 0;
 };
 
-/// The real port of a line, not opened yet.
+/// Port of a line, closed.
 /// @pre check_line() has passed
 /// @throws DriverError when the system has no more descriptors
 [[nodiscard]] std::unique_ptr<ModbusPort> make_modbus_port(const ModbusLine& line);
 
-/// A data block of an S7 CPU behind the face of a Modbus TCP line, so that time-outs, late answers
-/// and lost connections are handled in one place.
-/// @param tcp  carries the bytes. @param timeout  for each answer while it opens
+/// Access to a data block of an S7 CPU through the interface of a Modbus TCP line, so that
+/// time-outs, late answers and lost connections are handled in one place.
+/// @param tcp  transport. @param timeout  for each answer during open()
 [[nodiscard]] std::unique_ptr<ModbusPort> make_s7_port(const S7Block& block,
                                                        std::unique_ptr<ModbusPort> tcp,
                                                        nanoseconds timeout);

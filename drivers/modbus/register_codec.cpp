@@ -21,7 +21,7 @@ constexpr bool is_integer(Encoding encoding) noexcept {
   return encoding != Encoding::float32 && encoding != Encoding::float64;
 }
 
-/// Ends of an integer encoding.
+/// Range of an integer encoding.
 struct Limits {
   std::int64_t lowest;
   std::int64_t highest;
@@ -85,7 +85,7 @@ void place_bits(std::uint64_t bits, const NumberFormat& format, Encoded& encoded
   }
 }
 
-/// Bits of the nearest representable raw value; tells whether an end was taken.
+/// Bits of the nearest representable raw value; `saturated` if it is an end of the range.
 std::uint64_t nearest_bits(double raw, Encoding encoding, bool& saturated) noexcept {
   if (encoding == Encoding::float64) return std::bit_cast<std::uint64_t>(raw);
   if (encoding == Encoding::float32) {
@@ -150,8 +150,8 @@ Fault decode_status(const ModbusStatus& status, std::uint16_t word) noexcept {
 
 namespace {
 
-/// Whether `number`, to which `code` was rounded, is the code itself. The greatest codes are
-/// rounded to 2^63, which is none.
+/// True if `number`, rounded from `code`, equals it; the greatest codes are rounded to 2^63, out of
+/// range.
 bool is_exactly(double number, std::int64_t code) noexcept {
   return number < 0x1p63 && static_cast<std::int64_t>(number) == code;
 }

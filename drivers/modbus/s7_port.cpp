@@ -11,7 +11,7 @@ namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
-// Where things stand in a Modbus TCP frame.
+// Byte positions in a Modbus TCP frame.
 constexpr std::size_t unit_at = 6;
 constexpr std::size_t function_at = 7;
 constexpr std::size_t address_at = 8;
@@ -21,14 +21,14 @@ constexpr std::uint8_t read_registers = 3;
 constexpr std::uint8_t write_registers = 16;
 constexpr std::uint8_t exception_bit = 0x80;
 
-// In an S7 frame: TPKT, COTP, the head of a job or of its answer, parameters, data.
+// Byte positions in an S7 frame: TPKT, COTP, header of a job or its answer, parameters, data.
 constexpr std::size_t tpkt_bytes = 4;
 constexpr std::size_t cotp_kind_at = 5;
 constexpr std::size_t s7_at = 7;
 constexpr std::size_t number_at = s7_at + 4;
 constexpr std::size_t parameter_size_at = s7_at + 6;
 constexpr std::size_t error_class_at = s7_at + 10;
-constexpr std::size_t answer_at = s7_at + 12;  ///< its parameters
+constexpr std::size_t answer_at = s7_at + 12;  ///< parameters of the answer
 constexpr std::uint8_t setup = 0xF0;
 constexpr std::uint8_t read_variable = 4;
 constexpr std::uint8_t write_variable = 5;
@@ -54,7 +54,7 @@ Bytes framed(std::span<const std::uint8_t> cotp) {
   return frame;
 }
 
-/// @param number  its answer carries it
+/// @param number  returned in its answer
 Bytes job(std::size_t number, const Bytes& parameters, const Bytes& data = {}) {
   Bytes bytes{2, 0xF0, 0x80, 0x32, 1, 0, 0};
   push_word(bytes, number);
@@ -66,13 +66,13 @@ Bytes job(std::size_t number, const Bytes& parameters, const Bytes& data = {}) {
 }
 
 Bytes connection_request(const S7Block& block) {
-  constexpr std::uint8_t basic = 3;  // not a programming device's or a panel's connection
+  constexpr std::uint8_t basic = 3;  // basic connection, not of a programming device or a panel
   const auto place = static_cast<std::uint8_t>(block.rack * S7Block::slots + block.slot);
   return framed(
       Bytes{17, 0xE0, 0, 0, 0, 1, 0, 0xC0, 1, 10, 0xC1, 2, basic, 0, 0xC2, 2, basic, place});
 }
 
-/// The read or write of a data block's bytes that a request for its words comes to.
+/// S7 job that reads or writes the bytes of a request's words.
 Bytes job_of(std::span<const std::uint8_t> request, const S7Block& block) {
   const bool writes = request[function_at] == write_registers;
   const std::size_t bytes = 2 * word_at(request, count_at);
@@ -80,11 +80,11 @@ Bytes job_of(std::span<const std::uint8_t> request, const S7Block& block) {
   Bytes item{writes ? write_variable : read_variable, 1, 0x12, 10, 0x10, 2};  // counted in bytes
   push_word(item, bytes);
   push_word(item, static_cast<std::size_t>(block.db));
-  item.push_back(0x84);  // a data block's
+  item.push_back(0x84);  // area: data block
   item.push_back(static_cast<std::uint8_t>(first_bit >> 16));
   push_word(item, first_bit);
   if (!writes) return job(word_at(request, 0), item);
-  Bytes data{0, 4};  // its length in bits
+  Bytes data{0, 4};  // length in bits
   push_word(data, 8 * bytes);
   append(data, request.subspan(written_at, bytes));
   return job(word_at(request, 0), item, data);
@@ -95,7 +95,7 @@ bool is_answer(std::span<const std::uint8_t> frame) noexcept {
          (frame[s7_at + 1] == 2 || frame[s7_at + 1] == 3);
 }
 
-/// @return empty: the connection is confirmed
+/// @return empty if the connection is confirmed
 std::string connection_problem(std::span<const std::uint8_t> frame) {
   constexpr std::uint8_t confirm = 0xD0;
   constexpr std::uint8_t disconnect = 0x80;
@@ -107,7 +107,7 @@ std::string connection_problem(std::span<const std::uint8_t> frame) {
          (frame.size() > reason_at ? ", reason " + std::to_string(frame[reason_at]) : "");
 }
 
-/// @return empty: PDUs are long enough for every job
+/// @return empty if PDUs are long enough for every job
 std::string setup_problem(std::span<const std::uint8_t> frame) {
   constexpr std::size_t pdu_bytes_at = answer_at + 6;
   if (!is_answer(frame) || frame.size() < pdu_bytes_at + 2 || frame[error_class_at] != 0 ||
@@ -128,7 +128,7 @@ std::string hex_code(int code) {
 constexpr const char* permit =
     "permit PUT/GET access by remote partners and full access in the CPU's protection settings";
 
-/// @param code  of the item
+/// @param code  return code of the item
 std::string refusal_of(int code, const std::string& block) {
   const std::string optimised = "clear \"Optimized block access\" of it and load it again";
   std::string text = "return code " + hex_code(code);
@@ -145,8 +145,8 @@ std::string refusal_of(int code, const std::string& block) {
   }
 }
 
-/// Takes Modbus TCP requests, and gives the answers as Modbus TCP frames. A job that is refused is
-/// exception 0x80 | error class or return code.
+/// Modbus TCP requests and answers on an S7 link. A refused job is exception 0x80 | error class or
+/// return code.
 class S7Port final : public ModbusPort {
  public:
   S7Port(const S7Block& block, std::unique_ptr<ModbusPort> tcp, nanoseconds timeout)
@@ -173,7 +173,7 @@ class S7Port final : public ModbusPort {
   std::unique_ptr<ModbusPort> tcp_;
   nanoseconds timeout_;
   Bytes stream_;
-  Bytes frame_;  ///< taken off it last
+  Bytes frame_;  ///< last frame of stream_
   std::array<std::uint8_t, ModbusFrames::frame_bytes_max> request_{};
   std::string refusal_;
 };
@@ -201,7 +201,7 @@ void S7Port::close() noexcept {
   stream_.clear();
 }
 
-/// @return whether frame_ is an answer; if not, why
+/// @return true if frame_ is an answer; else `why` has the reason
 bool S7Port::ask(const Bytes& request, std::string& why) {
   const nanoseconds deadline = now() + timeout_;
   why = "the request could not be sent";
@@ -218,7 +218,7 @@ bool S7Port::ask(const Bytes& request, std::string& why) {
   return false;
 }
 
-/// Size of the frame at the front of the stream; 0: not all of it is here; SIZE_MAX: it is none
+/// Size of the frame at the front of the stream; 0: incomplete; SIZE_MAX: not a frame.
 std::size_t S7Port::next_frame() const noexcept {
   constexpr std::size_t frame_bytes_max = 2048;
   if (!stream_.empty() && stream_[0] != 3) return SIZE_MAX;
@@ -228,7 +228,7 @@ std::size_t S7Port::next_frame() const noexcept {
   return size <= stream_.size() ? size : 0;
 }
 
-/// @return bytes: frame_ is a whole one; lost: of the line, or of where the next one begins
+/// @return bytes: frame_ is complete; lost: the line, or the start of the next frame
 PortBytes::Kind S7Port::pull() noexcept {
   if (next_frame() == 0) {
     std::array<std::uint8_t, ModbusFrames::frame_bytes_max> part{};
@@ -270,7 +270,7 @@ PortBytes S7Port::receive(std::span<std::uint8_t> into) noexcept {
   return {PortBytes::Kind::bytes, answer.size()};
 }
 
-/// Of frame_, in terms of Modbus; empty: it answers no job.
+/// PDU of frame_ in terms of Modbus; empty: not the answer to a job.
 Bytes S7Port::pdu_of_answer() {
   constexpr std::size_t item_head_bytes = 4;
   if (!is_answer(frame_)) return {};
@@ -291,7 +291,7 @@ Bytes S7Port::pdu_of_answer() {
     return {function, request_[address_at], request_[address_at + 1], request_[count_at],
             request_[count_at + 1]};
   if (item + item_head_bytes > frame_.size()) return {};
-  // Data of another length are given on as they are: the connection says what it expected.
+  // Data of another length are passed on: the connection reports the expected length.
   constexpr int last_type_in_bits = 5;
   const std::size_t length = word_at(frame_, item + 2);
   const auto data = std::span<const std::uint8_t>(frame_).subspan(item + item_head_bytes);

@@ -1,6 +1,5 @@
-/// A Modbus line with its thread and all who ask on it: sensors and a controller behind one address
-/// share the connection, because many gateways serve one client at a time and a serial line has one
-/// master.
+/// A Modbus line with its thread and its users: sensors and a controller at one address share the
+/// connection, because many gateways serve one client at a time and a serial line has one master.
 #pragma once
 
 #include <condition_variable>
@@ -14,7 +13,7 @@
 
 namespace thermocomp {
 
-/// Who asks on a line, each in its turn.
+/// A user of a line; users take turns.
 class LineUser {
  public:
   LineUser() = default;
@@ -23,24 +22,24 @@ class LineUser {
   virtual ~LineUser() = default;
 
   [[nodiscard]] virtual const ModbusLine& line() const noexcept = 0;  ///< with its own timing
-  /// When act() is to be called next (CLOCK_MONOTONIC).
+  /// Time of the next act() (CLOCK_MONOTONIC).
   [[nodiscard]] virtual nanoseconds next_action_at() const noexcept = 0;
   virtual void act() = 0;
-  virtual void end() {}  ///< the last thing that is asked of it
+  virtual void end() {}  ///< last call
 };
 
 class SharedLine {
  public:
-  /// The line of this address, which exists as long as somebody has it.
+  /// The line of this address; it exists as long as it has an owner.
   /// @throws DriverError as check_line()
   [[nodiscard]] static std::shared_ptr<SharedLine> of(const ModbusLine& line);
   explicit SharedLine(const ModbusLine& line) : connection_(line) {}
 
   [[nodiscard]] ModbusConnection& connection() noexcept { return connection_; }
-  /// @param name  of the thread, if it is the first
-  /// @throws DriverError when the system gives no thread
+  /// @param name  of the thread, for the first user
+  /// @throws DriverError when the system cannot create a thread
   void join(LineUser& user, const std::string& name);
-  /// Lets the user end, for as long as `patience`; afterwards it is not called any more.
+  /// Lets the user end within `patience`; afterwards it is not called any more.
   void leave(LineUser& user, nanoseconds patience) noexcept;
 
  private:

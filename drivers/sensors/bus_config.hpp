@@ -1,4 +1,4 @@
-/// A bus of any kind that brings readings.
+/// Configuration of a bus of any kind.
 #pragma once
 
 #include <string>
@@ -12,14 +12,14 @@
 
 namespace thermocomp {
 
-/// Every kind. A configuration has
-///   kinds       what the key `kind` of a [[bus]] may say
+/// Every kind of bus. A configuration has
+///   kinds       values of the key `kind` of a [[bus]]
 ///   name        of the bus
-///   outline()   its description for people
-/// and compares equal. Besides it a kind has, each in a file of its own:
+///   outline()   description
+/// and compares equal. In addition, a kind has in files of its own:
 ///   open_PROTOCOL()                  reads the sections    config/buses/PROTOCOL_bus.cpp
-///   make_bus_source(configuration)   brings the readings   drivers/sensors/PROTOCOL_source.cpp
-///   scan_bus(configuration, ...)     looks at it live      cli/scan/scan_PROTOCOL.cpp
+///   make_bus_source(configuration)   makes the source      drivers/sensors/PROTOCOL_source.cpp
+///   scan_bus(configuration, ...)     scans it live         cli/scan/scan_PROTOCOL.cpp
 using BusConfig = std::variant<ModbusBusConfig, CanBusConfig, CanopenBusConfig, J1939BusConfig>;
 
 [[nodiscard]] inline const std::string& name_of(const BusConfig& bus) {

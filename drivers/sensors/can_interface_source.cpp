@@ -101,7 +101,7 @@ void CanInterfaceSource::publish() {
 
 namespace {
 
-/// How late a protocol may notice that something is due: time-outs, SYNC, heartbeats.
+/// Longest delay of a protocol's time-outs, SYNC and heartbeats.
 constexpr nanoseconds tick = std::chrono::milliseconds{10};
 
 }  // namespace
@@ -138,15 +138,14 @@ void CanProtocolSource::work() {
   send();
 }
 
-/// A frame that the kernel does not take is lost, as it may be on any bus: who needs its answer
-/// asks again.
+/// A frame that the kernel does not take is lost: the protocol repeats unanswered requests.
 void CanProtocolSource::send() {
   while (const auto frame = protocol_->next_frame()) socket().send(*frame);
 }
 
 void CanProtocolSource::write_readings(std::vector<Reading>& readings) {
   const auto newest = protocol_->readings();
-  readings.assign(newest.begin(), newest.end());  // same size: never allocates
+  readings.assign(newest.begin(), newest.end());  // same size: no allocation
 }
 
 std::vector<UnitHealth> CanProtocolSource::units(nanoseconds now) {

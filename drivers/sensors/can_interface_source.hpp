@@ -1,5 +1,4 @@
-/// Sources of readings on a CAN interface: socket, thread, hand-over, health; a protocol above
-/// frames.
+/// Sources of readings on a CAN interface (socket, thread, health), with or without a protocol.
 #pragma once
 
 #include <atomic>
@@ -18,11 +17,11 @@
 
 namespace thermocomp {
 
-/// An interface that is missing, down or bus-off is tried again for ever. The derived class knows
-/// what frames mean; its hooks run on the thread only, and its destructor must call stop().
+/// An interface that is missing, down or bus-off is retried for ever. The derived class decodes
+/// frames; its hooks run on the thread only, and its destructor must call stop().
 class CanInterfaceSource : public SensorSource {
  public:
-  /// @throws DriverError when the system has no CAN sockets at all
+  /// @throws DriverError when the system has no CAN sockets
   void start() final;
   void stop() noexcept final;
   void newest(std::span<Reading> all) noexcept final;
@@ -31,24 +30,24 @@ class CanInterfaceSource : public SensorSource {
  protected:
   struct Setting {
     std::string name;
-    std::string kind;  ///< as BusHealth tells it
+    std::string kind;  ///< as in BusHealth
     std::string interface;
     double reconnect_s{0.5};
     nanoseconds patience;  ///< work() is called at least this often while the interface is open
     nanoseconds gather{};  ///< pause after work(), so that frames come in batches
   };
   /// @param wanted   identifiers to receive; more by socket().also_want()
-  /// @param sensors  of each reading the index in the whole configuration
-  /// @param units    as they are before the start
+  /// @param sensors  index in the whole configuration of each reading
+  /// @param units    before the start
   /// @throws InvalidValue for an impossible interface or number of identifiers
   CanInterfaceSource(Setting setting, std::vector<CanId> wanted, std::vector<std::size_t> sensors,
                      std::vector<UnitHealth> units);
 
-  /// The bus can be used from now on ...
+  /// The bus is usable from now on ...
   virtual void bus_opened(nanoseconds now) = 0;
   /// ... no longer, or not yet: every reading becomes no_answer.
   virtual void bus_closed(nanoseconds now) = 0;
-  /// Receives what has come and does what is due.
+  /// Receives frames and does what is due.
   virtual void work() = 0;
   /// @param readings  shape (sensors of this bus); overwritten
   virtual void write_readings(std::vector<Reading>& readings) = 0;
@@ -57,7 +56,7 @@ class CanInterfaceSource : public SensorSource {
   [[nodiscard]] CanSocket& socket() noexcept { return socket_; }
   /// The bus is open and not bus-off, as last reported to the hooks.
   [[nodiscard]] bool usable() const noexcept { return usable_.value_or(false); }
-  /// Calls bus_opened() or bus_closed() where the link has changed.
+  /// Calls bus_opened() or bus_closed() when the state of the link has changed.
   void follow_link();
 
  private:
@@ -70,18 +69,18 @@ class CanInterfaceSource : public SensorSource {
   CanSocket socket_;
   WakeEvent wake_;
   std::atomic<bool> stopping_{false};
-  std::optional<bool> usable_;  ///< none: nothing was reported to the hooks yet
+  std::optional<bool> usable_;  ///< none: not reported to the hooks yet
   WaitFreeSlot<std::vector<Reading>> slot_;
   mutable std::mutex health_mutex_;
   BusHealth health_;
   BusThread thread_;
 };
 
-/// Gives a protocol its socket, its clock and its thread. While the interface is missing, down or
-/// bus-off the protocol is closed, which makes its readings no_answer; it is opened again for ever.
+/// Runs a protocol with a socket, a clock and a thread. While the interface is missing, down or
+/// bus-off the protocol is closed, which makes its readings no_answer; opening is retried for ever.
 class CanProtocolSource final : public CanInterfaceSource {
  public:
-  /// @param kind  as BusHealth tells it
+  /// @param kind  as in BusHealth
   /// @throws InvalidValue for an impossible interface or number of identifiers
   CanProtocolSource(std::string name, std::string kind, std::string interface, double reconnect_s,
                     std::unique_ptr<CanProtocol> protocol);

@@ -12,12 +12,11 @@
 namespace thermocomp {
 namespace {
 
-/// A device that sends nothing for so long is shown as not answering (its readings have their own
-/// limit, in the screening).
+/// A device silent for longer is shown as not answering; screening limits its readings.
 constexpr nanoseconds silent_after = std::chrono::seconds{5};
-/// The health is brought up to date at least this often, frames or not.
+/// Longest interval between updates of the health.
 constexpr nanoseconds look_every = std::chrono::seconds{1};
-/// At 1 Mbit/s some 80 frames arrive meanwhile: one call to the kernel instead of as many.
+/// At 1 Mbit/s about 80 frames arrive in this time: one system call instead of as many.
 constexpr nanoseconds gather = std::chrono::milliseconds{10};
 
 CanId id_of(const CanSignal& signal) {
@@ -101,7 +100,7 @@ void CanSource::bus_opened(nanoseconds now) {
   opened_at_ = now;
 }
 
-/// Marks every reading that is not marked yet; the time is that of the loss.
+/// Marks every reading; readings marked before keep the time of their loss.
 void CanSource::bus_closed(nanoseconds now) {
   for (Reading& reading : readings_) {
     if (reading.fault != Fault::no_answer) reading = {not_a_number, now, Fault::no_answer};
@@ -110,7 +109,7 @@ void CanSource::bus_closed(nanoseconds now) {
 }
 
 void CanSource::work() {
-  constexpr int batches_max = 16;  // so that readings are handed over in a flood too
+  constexpr int batches_max = 16;  // so that readings are published in a flood too
   for (int batch = 0; batch < batches_max; ++batch) {
     const auto frames = socket().receive();
     for (const CanFrame& frame : frames) take(frame);
@@ -119,7 +118,7 @@ void CanSource::work() {
 }
 
 void CanSource::write_readings(std::vector<Reading>& readings) {
-  readings = readings_;  // same size: copies, never allocates
+  readings = readings_;  // same size: no allocation
 }
 
 std::vector<UnitHealth> CanSource::units(nanoseconds now) {
@@ -136,7 +135,7 @@ std::vector<UnitHealth> CanSource::units(nanoseconds now) {
   return units_;
 }
 
-/// Keeps the counter of a channel of this frame's identifier.
+/// Compares and stores the counter of a channel with this frame's identifier.
 CanSource::Arrival CanSource::arrival_of(const CanFrame& frame, Channel& channel) noexcept {
   const bool on_page = carries(frame.payload(), channel.signal);
   if (!channel.counter) return on_page ? Arrival::renewed : Arrival::other_page;
@@ -163,8 +162,8 @@ void CanSource::note_arrival(Arrival arrival, UnitHealth& unit) {
   }
 }
 
-/// Two senders of one group within a short time: whose value a frame holds cannot be known.
-/// @return what is wrong; empty: there is one sender
+/// Detects two senders of one group within a short time: their values cannot be attributed.
+/// @return the problem; empty: there is one sender
 std::string CanSource::contest(const CanFrame& frame, Channel& channel) {
   const nanoseconds at = frame.received_at;
   if (channel.sender && *channel.sender != frame.id && at - channel.last_frame < silent_after) {
@@ -184,7 +183,7 @@ void CanSource::take(const CanFrame& frame) {
   const auto [first, last] =
       std::equal_range(channels_.begin(), groups, Channel{frame.id, {}, {}, 0, 0},
                        [](const Channel& a, const Channel& b) { return a.id < b.id; });
-  std::size_t counted = last_good_.size();  // each device once a frame
+  std::size_t counted = last_good_.size();  // each device once per frame
   for (auto channel = first; channel != last; ++channel) take(frame, *channel, counted);
   for (auto channel = groups; channel != channels_.end(); ++channel) {
     if (matches(frame.id, channel->signal)) take(frame, *channel, counted);

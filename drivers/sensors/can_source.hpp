@@ -12,14 +12,14 @@
 
 namespace thermocomp {
 
-/// Listens only. A reading's time is that of its frame's arrival at the interface. A frame whose
-/// counter has not moved does not count: neither value nor time change (the first frame after the
-/// bus was lost has nothing before it). A J1939 group is taken from any sender; while two send it,
-/// its readings are device_error. While the interface is missing, down or bus-off its
-/// readings are no_answer; it is tried again for ever.
+/// Only listens. A reading's time is the arrival of its frame at the interface. A frame with
+/// unchanged counter is ignored: neither value nor time change (except for the first frame after a
+/// loss of the bus). A J1939 group is accepted from any sender; while two send it, its readings are
+/// device_error. While the interface is missing, down or bus-off the readings are no_answer;
+/// opening is retried for ever.
 ///
-/// Frames are fetched in batches, each 10 ms at the earliest after the one before: their times are
-/// the kernel's, and a full bus costs little.
+/// Frames are fetched in batches at intervals of at least 10 ms: their times are the kernel's, and
+/// a busy bus costs little.
 class CanSource final : public CanInterfaceSource {
  public:
   /// @throws InvalidValue for an impossible signal, interface or number of identifiers
@@ -33,15 +33,15 @@ class CanSource final : public CanInterfaceSource {
     std::optional<CanField> counter;
     std::size_t device{0};  ///< index in the bus' configuration
     std::size_t sensor{0};  ///< index in the whole configuration
-    /// What the counter showed in the last frame of the identifier, and in the last of these that
-    /// carried the signal. Devices count frames or rounds of all pages: either is progress.
+    /// Counter in the last frame of the identifier, and in the last one that carried the signal.
+    /// Devices count frames or rounds of all pages: a change of either is progress.
     std::optional<std::uint64_t> count_of_frame{};
     std::optional<std::uint64_t> count_of_page{};
-    // Of a J1939 group:
-    std::optional<CanId> sender{};  ///< of its last frame
-    std::optional<CanId> rival{};   ///< that sent one shortly before another did
+    // Only for a J1939 group:
+    std::optional<CanId> sender{};  ///< of the last frame
+    std::optional<CanId> rival{};   ///< second sender within a short time
     nanoseconds last_frame{};
-    nanoseconds contested_until{};  ///< two senders are taken to be there until then
+    nanoseconds contested_until{};  ///< until then two senders are assumed
   };
   enum class Arrival { other_page, stood_still, renewed, bad_frame };
 
@@ -60,7 +60,7 @@ class CanSource final : public CanInterfaceSource {
   static Arrival arrival_of(const CanFrame& frame, Channel& channel) noexcept;
   static void note_arrival(Arrival arrival, UnitHealth& unit);
 
-  std::vector<Channel> channels_;  ///< in the order of the identifiers, behind them the groups
+  std::vector<Channel> channels_;  ///< in order of identifier, then the groups
   std::size_t groups_begin_{0};
   nanoseconds opened_at_{};
   std::vector<Reading> readings_;  ///< one per channel

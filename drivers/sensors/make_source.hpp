@@ -1,4 +1,4 @@
-/// From a bus' configuration to its source.
+/// Factory of sources from bus configurations.
 #pragma once
 
 #include <memory>
@@ -8,7 +8,7 @@
 
 namespace thermocomp {
 
-/// A source of one kind: its file PROTOCOL_source.cpp.
+/// One overload per kind of bus, in PROTOCOL_source.cpp.
 /// @throws InvalidValue or DriverError for a configuration that cannot work
 [[nodiscard]] std::unique_ptr<SensorSource> make_bus_source(const ModbusBusConfig& bus);
 [[nodiscard]] std::unique_ptr<SensorSource> make_bus_source(const CanBusConfig& bus);

@@ -8,18 +8,18 @@
 namespace thermocomp {
 namespace {
 
-/// Something that must be read, and where to note where it was put.
+/// A value to read, and the destination of its place.
 struct Item {
   ModbusTable table;
   std::size_t address;
   std::size_t count;  ///< registers or bits
   WordPlace* place;
-  bool is_low_word{false};  ///< of its register
+  bool is_low_word{false};  ///< in its register
 
   [[nodiscard]] std::size_t end() const noexcept { return address + count; }
 };
 
-/// A plan whose places are all made, so that items can point at them.
+/// A plan with all its places, so that items can point to them.
 ModbusPlan empty_plan(const ModbusDeviceConfig& device) {
   ModbusPlan plan;
   if (device.wide_registers) plan.words_a_register = 2;
@@ -72,13 +72,13 @@ bool joins(const PlannedRequest& request, const Item& item, const Limits& limits
   if (request.table != item.table) return false;
   const std::size_t end = std::size_t{request.address} + request.count;
   if (item.end() <= end && item.address == request.address && item.count == request.count) {
-    return true;  // the very same words
+    return true;  // same words
   }
   if (one_register_a_request) return false;
   return item.end() - request.address <= limits.length && item.address <= end + limits.gap;
 }
 
-/// Makes the request that holds the renewal counter the first.
+/// Moves the request with the renewal counter to the front.
 void counter_first(ModbusPlan& plan) {
   const std::size_t chosen = plan.renewal->request;
   std::swap(plan.requests[0], plan.requests[chosen]);

@@ -19,7 +19,7 @@ bool is_serial(const ModbusLine& line) {
   return std::holds_alternative<ModbusRtu>(line.link);
 }
 
-/// On a slow serial line a long answer would make stop() and the other units wait.
+/// Limits the answers of a slow serial line, which would delay stop() and the other units.
 int registers_max_of(const ModbusLine& line) {
   if (!is_serial(line)) return registers_per_request_limit;
   constexpr double answer_s_max = 0.5;
@@ -150,7 +150,7 @@ BusHealth ModbusPoller::health() const {
   return health_;
 }
 
-// ---- what is done when
+// ---- schedule
 
 nanoseconds ModbusPoller::next_action_at() const noexcept {
   if (connection_.connected()) return due(devices_[most_due()]);
@@ -164,7 +164,7 @@ void ModbusPoller::act() {
     Device& device = devices_[most_due()];
     if (connection_.pause_until(due(device))) poll(device);
   } else if (lost_ && !loss_reported_ && connection_.now() < next_connect_at_) {
-    set_lost();  // else closed on purpose: the failed exchanges have said what is wrong
+    set_lost();  // else closed on purpose: the failed exchanges were reported
   } else if (connection_.pause_until(next_connect_at_)) {
     connect();
   }
@@ -182,10 +182,10 @@ void ModbusPoller::connect() {
   set_lost();
 }
 
-/// By this poller, within an exchange or by another user of the line.
+/// The line was opened by this poller, within an exchange or by another user.
 void ModbusPoller::note_connected() {
   connects_ = connection_.connects();
-  if (lost_) {  // whoever was dead may have come back with the line
+  if (lost_) {  // dead units may be back with the line
     for (Device& device : devices_) {
       device.backoff.answered();
       device.next_due = std::min(device.next_due, connection_.now());
@@ -199,7 +199,7 @@ void ModbusPoller::note_connected() {
   health_.last_error.clear();
 }
 
-/// No line: no reading of the bus may be believed any longer.
+/// Without a line no reading of the bus is valid.
 void ModbusPoller::set_lost() {
   lost_ = true;
   loss_reported_ = true;
@@ -217,7 +217,7 @@ nanoseconds ModbusPoller::due(const Device& device) const noexcept {
   return std::max({device.next_due, device.backoff.not_before(), ready_at(device, device.cursor)});
 }
 
-/// Before this time an answer to another request may come that would fit this one as well.
+/// Earlier, an answer to another request may come that fits this one too.
 nanoseconds ModbusPoller::ready_at(const Device& device, std::size_t index) const noexcept {
   const PlannedRequest& planned = device.requests[index].planned;
   return connection_.ready_at(device.config.unit, planned.table, planned.address, planned.count);
@@ -229,7 +229,7 @@ std::size_t ModbusPoller::most_due() const noexcept {
                                   devices_.begin());
 }
 
-/// A unit alone on its line takes nothing from others by being asked often.
+/// A unit alone on its line can be asked often without delay for others.
 nanoseconds ModbusPoller::pause_max() const noexcept {
   const bool is_alone = devices_.size() == 1 && !connection_.is_shared();
   const ModbusLine& line = config_.line;
@@ -243,8 +243,8 @@ std::size_t ModbusPoller::dead_units() const noexcept {
                     [](const Device& device) { return device.backoff.dead(); }));
 }
 
-/// One round over the device's requests, beginning at its cursor: what had no answer last time is
-/// asked first, so that a late answer can only be one to the very same question.
+/// One round over the device's requests from its cursor: an unanswered request is repeated first,
+/// so that a late answer can only be one to the same request.
 void ModbusPoller::poll(Device& device) {
   const nanoseconds began_at = connection_.now();
   const nanoseconds period = std::max(from_seconds(device.config.period_s), nanoseconds{1});
@@ -274,7 +274,7 @@ void ModbusPoller::poll(Device& device) {
   publish();
 }
 
-/// Asks for fewer values at once. @return false: that cannot be
+/// Splits the device's requests. @return false if that is not possible
 bool ModbusPoller::split(Device& device, std::size_t index) const {
   const Request& request = device.requests[index];
   const int code = request.newest.exception_code;
@@ -313,17 +313,17 @@ ModbusPoller::Step ModbusPoller::ask(Device& device, std::size_t index) {
   request.settled = true;
   request.fault = exchange.fault();
   if (exchange.ok()) {
-    // What a gateway has kept may have been read at any time since it was asked for.
+    // A gateway may have read a buffered answer at any time after the request.
     const nanoseconds timeout = from_seconds(1e-3 * config_.line.timeout_ms);
     request.arrived_at = std::min(exchange.arrived_at, exchange.sent_at + timeout);
   }
   return Step::next;
 }
 
-/// A request without a usable answer: another try, or the fault.
+/// A request without a usable answer: another attempt, or the fault.
 ModbusPoller::Step ModbusPoller::give_up(Device& device, std::size_t index,
                                          const Exchange& exchange) {
-  // A gateway that answers in a unit's place has asked it already.
+  // A gateway that answers for a unit has asked it already.
   const bool gateway = exchange.outcome == ExchangeOutcome::exception;
   if (!gateway && !device.backoff.dead() && device.tries < config_.line.retries) {
     ++device.tries;
@@ -334,7 +334,7 @@ ModbusPoller::Step ModbusPoller::give_up(Device& device, std::size_t index,
   device.cursor = (index + 1) % device.requests.size();
   const bool any_answered = std::any_of(device.requests.begin(), device.requests.end(),
                                         [](const Request& request) { return request.settled; });
-  // A register range that is never answered does not make the whole unit dead.
+  // Registers that are never answered do not make the whole unit dead.
   for (Request& request : device.requests) {
     if (!request.settled && (!any_answered || &request == &device.requests[index])) {
       request.fault = exchange.fault();
@@ -349,7 +349,7 @@ ModbusPoller::Step ModbusPoller::give_up(Device& device, std::size_t index,
   return Step::end_of_round;
 }
 
-// ---- answers to readings
+// ---- readings from answers
 
 bool ModbusPoller::renewed(Device& device, bool whole_from_start) const {
   if (!device.config.renewal) return true;
@@ -379,7 +379,7 @@ Reading ModbusPoller::evaluate(const Device& device, std::size_t channel, const 
   nanoseconds arrived_at = request.arrived_at;
   if (fault == Fault::none && place.status) {
     const Request& status = device.requests[place.status->request];
-    // A value is vouched for only as long as its status is fresh.
+    // A value is valid only while its status is fresh.
     arrived_at = std::min(arrived_at, status.arrived_at);
     fault = status.fault != Fault::none
                 ? status.fault

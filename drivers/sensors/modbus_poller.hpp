@@ -1,4 +1,4 @@
-/// What is asked of the units of one Modbus line, when, and what readings the answers become.
+/// Polling of the units of one Modbus line, and the readings from their answers.
 #pragma once
 
 #include <mutex>
@@ -13,70 +13,69 @@
 
 namespace thermocomp {
 
-/// Each device is read at its period on an absolute schedule. A reading's `taken_at` is when the
-/// last answer that gave it a value arrived (with a renewal counter: the last answer in which the
-/// counter had moved); a reading with a fault keeps it and has no value.
+/// Each device is read at its period on an absolute schedule. `taken_at` of a reading is the
+/// arrival of the last answer with its value (with a renewal counter: the last answer in which the
+/// counter had changed); a reading with a fault keeps it and has no value.
 ///
 /// A request for several values that a device refuses from the first time on (exception 2 or 3) is
-/// split: registers between the values are no longer read, then every value alone.
+/// split: first without the registers between the values, then one request per value.
 ///
-/// A failed request is tried again as the line's `retries` say (for a unit that answered until
-/// then); a unit without answer is asked again with growing pauses (UnitBackoff), alone on its
-/// line at least every `reconnect_s` (serial: every 3 s, for the sake of late answers). A lost line
-/// is opened again every `reconnect_s`.
+/// A failed request is retried as often as the line's `retries` (for a unit that answered until
+/// then); a unit without answer is asked with growing pauses (UnitBackoff), alone on its line at
+/// least every `reconnect_s` (serial: every 3 s, for late answers). A lost line is reopened every
+/// `reconnect_s`.
 class ModbusPoller final : public LineUser {
  public:
   /// @param connection  of the configuration's line; outlives the poller
-  /// @throws DriverError naming the device and what cannot work
+  /// @throws DriverError naming the device and the problem
   ModbusPoller(const ModbusBusConfig& config, ModbusConnection& connection);
 
   [[nodiscard]] const ModbusLine& line() const noexcept override { return config_.line; }
-  /// When act() has something to do next; it then waits until that time by itself.
+  /// Time of the next act(), which waits until then by itself.
   [[nodiscard]] nanoseconds next_action_at() const noexcept override;
-  /// Does one thing: connects, runs one device's round of requests, or tells that the line is lost.
-  /// @pre not called again once the connection is cancelled
+  /// Connects, runs one device's requests, or reports the loss of the line.
+  /// @pre the connection is not cancelled
   void act() override;
 
-  /// From the one reading thread: wait-free.
+  /// For the one reading thread: wait-free.
   void newest(std::span<Reading> all) noexcept;
-  /// From any ordinary thread.
+  /// For any ordinary thread.
   [[nodiscard]] BusHealth health() const;
 
-  /// For who looks on between two calls of act(): what the newest request for a channel's value or
-  /// status brought.
+  /// Result of the newest request for a channel's value or status, for callers between two act().
   struct Answer {
     const Exchange& exchange;
     PlannedRequest planned;
-    std::span<const std::uint16_t> words;  ///< of the value; of the last answer that was good
+    std::span<const std::uint16_t> words;  ///< of the value, from the last good answer
   };
   [[nodiscard]] Answer value_of(std::size_t device, std::size_t channel) const;
   [[nodiscard]] std::optional<Answer> status_of(std::size_t device, std::size_t channel) const;
-  /// Every request of the device was asked, and again where that is tried.
+  /// Every request of the device was made, with its retries.
   [[nodiscard]] bool has_asked(std::size_t device) const noexcept;
-  /// The device refuses requests for several values; it is asked for fewer at once.
+  /// The device refuses requests for several values and gets smaller ones.
   [[nodiscard]] bool is_split(std::size_t device) const noexcept {
     return devices_[device].is_split;
   }
 
  private:
-  /// What the last answers to one request said.
+  /// State of one request.
   struct Request {
     PlannedRequest planned;
     std::vector<std::uint16_t> words;
     Exchange newest{};
     nanoseconds arrived_at{};
     Fault fault{Fault::never_read};
-    bool settled{false};  ///< in the round under way
+    bool settled{false};  ///< answered in this round
   };
   struct Device {
     ModbusDeviceConfig config;
     ModbusPlan plan;
     std::vector<Request> requests;
     UnitBackoff backoff;
-    std::size_t first_reading{0};  ///< of its channels in readings_
-    std::size_t cursor{0};         ///< the request a round begins with
-    int tries{0};                  ///< failed ones of the request at the cursor
-    std::size_t rounds{0};         ///< that came to an end
+    std::size_t first_reading{0};  ///< index of its first channel in readings_
+    std::size_t cursor{0};         ///< first request of the next round
+    int tries{0};                  ///< failed attempts at the cursor
+    std::size_t rounds{0};         ///< completed
     bool is_split{false};
     nanoseconds next_due{};
     std::uint16_t counter{0};
@@ -108,13 +107,13 @@ class ModbusPoller final : public LineUser {
   nanoseconds reconnect_;
   ModbusConnection& connection_;
   std::vector<Device> devices_;
-  std::vector<std::size_t> sensors_;  ///< of each reading: its index in the configuration
-  std::vector<Reading> readings_;     ///< the thread's own
+  std::vector<std::size_t> sensors_;  ///< one per reading: index in the configuration
+  std::vector<Reading> readings_;     ///< of the thread
   WaitFreeSlot<std::vector<Reading>> slot_;
   nanoseconds next_connect_at_{0};
-  bool lost_{true};  ///< no line, or not yet
+  bool lost_{true};  ///< the line is lost, or not open yet
   bool loss_reported_{false};
-  std::uint64_t connects_{0};  ///< of the connection, when it was looked at last
+  std::uint64_t connects_{0};  ///< of the connection at the last check
   mutable std::mutex health_mutex_;
   BusHealth health_;
 };

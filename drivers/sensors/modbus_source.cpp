@@ -5,7 +5,7 @@
 namespace thermocomp {
 namespace {
 
-/// Thermocouples behind one Modbus line (TCP or RTU), polled by the line's thread.
+/// Thermocouples on one Modbus line (TCP or RTU), polled by the line's thread.
 class ModbusSource final : public SensorSource {
  public:
   explicit ModbusSource(const ModbusBusConfig& config)

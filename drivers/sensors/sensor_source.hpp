@@ -1,4 +1,4 @@
-/// A bus that brings readings: opened once, read by the cycle without ever waiting.
+/// A bus with readings: opened once, read by the cycle without waiting.
 #pragma once
 
 #include <cstdint>
@@ -15,16 +15,16 @@ struct BusHealth {
   std::string name;
   std::string kind;  ///< of the configuration: "modbus_tcp", "can", ...
   bool connected{false};
-  std::uint64_t connects{0};  ///< times the bus was opened
+  std::uint64_t connects{0};
   std::string last_error;
   std::vector<UnitHealth> units;
   /// CAN: "down", "active", "warning", "passive" or "bus_off"; else empty
   std::string state;
-  nanoseconds state_since{};      ///< CLOCK_MONOTONIC when it was entered
-  std::uint64_t error_frames{0};  ///< CAN: error frames of every kind
-  std::uint64_t bus_offs{0};      ///< CAN: times the interface left the bus
-  std::uint64_t restarts{0};      ///< CAN: times its driver restarted the interface
-  std::uint64_t dropped{0};       ///< CAN: frames lost because they came faster than they were read
+  nanoseconds state_since{};      ///< CLOCK_MONOTONIC of the change to `state`
+  std::uint64_t error_frames{0};  ///< CAN: of every kind
+  std::uint64_t bus_offs{0};      ///< CAN: number of times the interface left the bus
+  std::uint64_t restarts{0};      ///< CAN: restarts of the interface by its driver
+  std::uint64_t dropped{0};       ///< CAN: frames lost because they were not read fast enough
 };
 
 class SensorSource {
@@ -34,17 +34,15 @@ class SensorSource {
   SensorSource& operator=(const SensorSource&) = delete;
   virtual ~SensorSource() = default;
 
-  /// Starts the bus' thread. A bus that is not there yet is not an error: it is tried again for
-  /// ever.
-  /// @throws DriverError when the configuration cannot work on this system at all
+  /// Starts the bus' thread. A bus that is not there yet is no error: it is retried for ever.
+  /// @throws DriverError when the configuration cannot work on this system
   virtual void start() = 0;
   /// Ends the thread within a second. The readings stay as they were.
   virtual void stop() noexcept = 0;
-  /// Copies this bus' newest readings into `all` (one entry per configured sensor, in the order of
-  /// the configuration; entries of other buses are left alone). Wait-free, no allocation; called
-  /// by one thread only.
+  /// Copies this bus' newest readings into `all` (one entry per configured sensor; entries of other
+  /// buses are unchanged). Wait-free, no allocation; for one thread.
   virtual void newest(std::span<Reading> all) noexcept = 0;
-  /// For the operator; any ordinary thread, may lock.
+  /// For any ordinary thread; may lock.
   [[nodiscard]] virtual BusHealth health() const = 0;
 };
 

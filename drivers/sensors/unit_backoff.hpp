@@ -1,4 +1,4 @@
-/// How often a unit that does not answer is asked again. Pure; the time is passed in.
+/// Pauses between requests to a unit that does not answer. Pure; the time is passed in.
 #pragma once
 
 #include <algorithm>
@@ -8,9 +8,8 @@
 namespace thermocomp {
 
 /// Pauses double from `pause_first` to `pause_max`; an answer ends them at once. From the third
-/// failure on they are also long enough that all dead units of the line together take no more than
-/// `line_share_max` of its time with their time-outs, as far as `stretch_max` times `pause_max`
-/// allows.
+/// failure on they also limit the time-outs of all dead units of the line to `line_share_max` of
+/// its time, as far as `stretch_max` times `pause_max` allows.
 class UnitBackoff {
  public:
   using nanoseconds = std::chrono::nanoseconds;
@@ -25,9 +24,9 @@ class UnitBackoff {
     not_before_ = nanoseconds{0};
   }
 
-  /// The unit failed (all tries) at `now`.
-  /// @param cost        time of the line that the failed request took
-  /// @param dead_units  units of the line that do not answer, this one among them
+  /// All attempts failed at `now`.
+  /// @param cost        line time of the failed request
+  /// @param dead_units  units of the line without answer, with this one
   void failed(nanoseconds now, nanoseconds cost, std::size_t dead_units,
               nanoseconds pause_max) noexcept {
     pause_ = std::min(failures_ == 0 ? pause_first_ : 2 * pause_, pause_max);

@@ -1,4 +1,4 @@
-/// What a CANopen bus is built from: plain structures, filled by config/ or by a test.
+/// Configuration of a CANopen bus.
 #pragma once
 
 #include <array>
@@ -13,16 +13,16 @@
 
 namespace thermocomp {
 
-inline constexpr std::size_t canopen_bytes_max = 8;  ///< of a frame; CANopen FD is another protocol
+inline constexpr std::size_t canopen_bytes_max = 8;  ///< per frame; CANopen FD is another protocol
 
-/// A place in a node's object dictionary.
+/// Address of an entry in a node's object dictionary.
 struct ObjectAddress {
   std::uint16_t index{0};
   std::uint8_t sub{0};
   bool operator==(const ObjectAddress&) const = default;
 };
 
-/// A value written to the node before it is started, and read back.
+/// A value written to the node before it is started, and verified.
 struct CanopenWrite {
   ObjectAddress object;
   std::vector<std::uint8_t> bytes;  ///< 1..4, least significant first
@@ -36,7 +36,7 @@ struct CanopenMapped {
   bool operator==(const CanopenMapped&) const = default;
 };
 
-/// A TPDO whose mapping is known: its objects follow each other from bit 0.
+/// A TPDO with known mapping: its objects are consecutive from bit 0.
 struct CanopenMapping {
   std::uint32_t cob_id{0};
   std::vector<CanopenMapped> objects;
@@ -46,13 +46,13 @@ struct CanopenMapping {
 enum class CanopenWay {
   pdo_bits,    ///< bits of a TPDO, given by cob_id and signal.start_bit
   pdo_object,  ///< an object, found in a mapping
-  sdo          ///< an object, asked for every poll_s
+  sdo          ///< an object, read every poll_s
 };
 
-/// An object beside a polled one that says whether its value is good.
+/// An object that shows whether the value of a polled one is good.
 struct CanopenStatus {
   ObjectAddress object;
-  CanStatus number;  ///< in the object's bytes
+  CanStatus number;  ///< within the object's bytes
   bool operator==(const CanopenStatus&) const = default;
 };
 
@@ -60,13 +60,13 @@ struct CanopenChannel {
   std::size_t sensor{0};  ///< index of the sensor in the configuration
   CanopenWay way{CanopenWay::pdo_bits};
   ObjectAddress object;  ///< not for pdo_bits
-  /// Form and scale; for pdo_bits also `id` and `start_bit`. length_bits is that of the object.
+  /// Format and scale; for pdo_bits also `id` and `start_bit`. length_bits is that of the object.
   CanSignal signal;
   double poll_s{1.0};
-  /// Only for sdo: the value counts between two statuses that call it good.
+  /// Only for sdo: a value is accepted between two good statuses.
   std::optional<CanopenStatus> status{};
-  int emergency_channel{0};  ///< by which emergency messages name it; 0: they do not
-  /// Emergency error codes that make it a device_error until the errors are reset.
+  int emergency_channel{0};  ///< number of the channel in emergency messages; 0: none
+  /// Emergency error codes that set device_error until the errors are reset.
   std::vector<std::uint16_t> emergency_codes;
   bool operator==(const CanopenChannel&) const = default;
 };
@@ -79,16 +79,16 @@ enum class EmergencyForm {
 struct CanopenNodeConfig {
   std::string name;
   int node{1};  ///< 1..127
-  /// Period of the node's heartbeat, written to its object 1017; 0: as the node has it.
+  /// Heartbeat period, written to the node's object 1017; 0: not written.
   double heartbeat_s{0.0};
-  double heartbeat_timeout_s{0.0};  ///< without a heartbeat this long: lost; 0: not watched
-  double pdo_period_s{0.0};         ///< how often the node sends each TPDO; 0: not known
-  /// TPDOs come when a value changes: the last one holds while heartbeats come.
+  double heartbeat_timeout_s{0.0};  ///< lost after this long without one; 0: not watched
+  double pdo_period_s{0.0};         ///< period of each TPDO; 0: unknown
+  /// TPDOs are sent on change: the last one holds while heartbeats come.
   bool pdo_on_change{false};
   EmergencyForm emergency{EmergencyForm::generic};
   std::vector<CanopenWrite> writes;
   std::vector<CanopenMapping> mappings;
-  std::vector<int> mappings_read;  ///< numbers of TPDOs whose COB-ID and mapping the node is asked
+  std::vector<int> mappings_read;  ///< numbers of TPDOs to read COB-ID and mapping from
   std::vector<CanopenChannel> channels;
   bool operator==(const CanopenNodeConfig&) const = default;
 };
@@ -96,10 +96,10 @@ struct CanopenNodeConfig {
 struct CanopenBusConfig {
   static constexpr std::array kinds{"canopen"};
   std::string name;
-  std::string interface;    ///< "can0"
-  double reconnect_s{0.5};  ///< pause before the interface is tried again
+  std::string interface;
+  double reconnect_s{0.5};  ///< pause between attempts to open the interface
   bool start_nodes{true};   ///< NMT start, also after a node's reboot
-  int own_node{0};          ///< of our heartbeat; 0: none is sent
+  int own_node{0};          ///< node number of our heartbeat; 0: none is sent
   double heartbeat_s{1.0};  ///< period of our heartbeat
   double sync_s{0.0};       ///< period of SYNC; 0: none is sent
   double sdo_timeout_s{0.5};

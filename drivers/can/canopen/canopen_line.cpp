@@ -9,7 +9,7 @@
 namespace thermocomp {
 namespace {
 
-// The predefined connection set of CiA 301: a function in bits 7 to 10, the node in the rest.
+// Predefined connection set of CiA 301: function code in bits 7 to 10, node number below.
 constexpr std::uint32_t function_mask = 0x780;
 constexpr std::uint32_t node_mask = 0x07F;
 constexpr std::uint32_t sync_id = 0x080;
@@ -27,7 +27,7 @@ CanFrame plain_frame(std::uint32_t id, std::size_t size) {
   return frame;
 }
 
-/// The next multiple of the period after `due`; a late one is not made up for.
+/// Next due time after `due`; missed periods are skipped.
 nanoseconds following(nanoseconds due, nanoseconds period, nanoseconds now) {
   return now - due < period ? due + period : now + period;
 }
@@ -57,7 +57,7 @@ std::vector<CanFilter> CanopenLine::wanted() const {
   const auto exactly = [](std::uint32_t id) { return CanFilter{{id, false}, standard_id_max}; };
   std::vector<CanFilter> filters;
   for (const CanopenNodeConfig& node : config_.nodes) {
-    // Which identifiers a node gave its TPDOs is known only when it has been asked.
+    // The COB-IDs of TPDOs are unknown until they are read from the node.
     if (!node.mappings_read.empty()) return {CanFilter{{0, false}, 0}};
     const auto number = static_cast<std::uint32_t>(node.node);
     filters.push_back(exactly(emergency_id + number));
@@ -134,7 +134,7 @@ void CanopenLine::send_cyclic(nanoseconds now) {
   }
 }
 
-/// Two nodes that both say that a TPDO is theirs: whose value a frame holds is not known.
+/// Detects two nodes that report the same TPDO as their own: its values cannot be attributed.
 void CanopenLine::look_for_conflicts(nanoseconds now) {
   std::map<std::uint32_t, std::vector<std::size_t>> owners;
   for (std::size_t i = 0; i < nodes_.size(); ++i) {

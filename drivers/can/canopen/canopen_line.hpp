@@ -1,4 +1,4 @@
-/// All that is on one CANopen bus: the nodes, SYNC, our own heartbeat. Pure.
+/// One CANopen bus: its nodes, SYNC, our heartbeat. Pure.
 #pragma once
 
 #include <map>
@@ -11,8 +11,7 @@ namespace thermocomp {
 
 class CanopenLine final : public CanProtocol {
  public:
-  /// @throws InvalidValue for a node number that is impossible or used twice, and for impossible
-  ///                      signals
+  /// @throws InvalidValue for impossible or repeated node numbers, and for impossible signals
   explicit CanopenLine(CanopenBusConfig config);
 
   [[nodiscard]] std::vector<CanFilter> wanted() const override;
@@ -34,7 +33,7 @@ class CanopenLine final : public CanProtocol {
   const CanopenBusConfig config_;
   std::vector<CanopenNode> nodes_;
   std::map<int, std::size_t> node_of_number_;
-  std::vector<Reading> readings_;  ///< the nodes' after each other
+  std::vector<Reading> readings_;  ///< those of the nodes, one after the other
   bool open_{false};
   nanoseconds sync_at_{};
   nanoseconds heartbeat_at_{};

@@ -16,7 +16,7 @@ constexpr std::uint8_t command_start = 0x01;
 constexpr std::uint8_t command_pre_operational = 0x80;
 constexpr std::uint8_t state_boot_up = 0x00;
 constexpr std::uint8_t state_operational = 0x05;
-constexpr std::uint8_t toggle_bit = 0x80;  // of node guarding, which shares the identifier
+constexpr std::uint8_t toggle_bit = 0x80;  // of node guarding, which uses the same identifier
 
 constexpr std::uint16_t error_register_object = 0x1001;
 constexpr std::uint16_t heartbeat_object = 0x1017;
@@ -37,7 +37,7 @@ std::uint16_t pdo_object(std::uint16_t first, std::size_t number) {
   return static_cast<std::uint16_t>(first + number - 1);
 }
 
-/// The whole TPDO; of an object that was found in it the object's bytes.
+/// The whole TPDO; for a mapped object its bytes.
 std::span<const std::uint8_t> bytes_of(std::span<const std::uint8_t> data,
                                        const CanopenChannel& channel) {
   const auto first = static_cast<std::size_t>(channel.signal.start_bit / 8);
@@ -57,7 +57,7 @@ std::vector<std::size_t> place_channels(const CanopenMapping& mapping,
       CanopenChannel& channel = channels[i];
       if (channel.way != CanopenWay::pdo_object || !(channel.object == mapped.object)) continue;
       if (mapped.object.index < filler_indices) continue;
-      // An object of another length than its type has is another object than the user thinks.
+      // A length other than that of the type means another object than the configured one.
       if (mapped.length_bits != channel.signal.length_bits) continue;
       if (bit + mapped.length_bits > static_cast<int>(8 * canopen_bytes_max)) continue;
       channel.signal.id = mapping.cob_id;
@@ -131,10 +131,10 @@ void CanopenNode::begin_setup(nanoseconds now) {
     jobs_.push_back({Work::ask_cob_id, static_cast<std::size_t>(number), 0});
     jobs_.push_back({Work::ask_count, static_cast<std::size_t>(number), 0});
   }
-  // Errors may have been reset while nobody listened.
+  // Errors may have been reset without our notice.
   if (knows_emergencies()) jobs_.push_back({Work::ask_errors, 0, 0});
   phase_ = Phase::setting_up;
-  // Some nodes take no settings while they are operational.
+  // Some nodes refuse settings while operational.
   if (!writes_.empty() && starts_) command(command_pre_operational);
   next_job(now);
 }
@@ -167,7 +167,7 @@ void CanopenNode::take_job(const SdoResult& result, nanoseconds now) {
     return setup_failed(to_string(result), Fault::no_answer, now);
   }
   if (result.outcome == SdoOutcome::aborted && jobs_.front().work == Work::write) {
-    refused_ = to_string(result);  // it may have the value already: it is read back next
+    refused_ = to_string(result);  // the node may have the value already, so it is read back next
     jobs_.pop_front();
     return next_job(now);
   }
@@ -191,7 +191,7 @@ void CanopenNode::take_answer(const Job& job, std::span<const std::uint8_t> byte
   }
   if (job.work != Work::verify) return take_mapping_answer(job, bytes, now);
   const CanopenWrite& write = writes_[job.which];
-  // A node that does not tell how long the value is pads it.
+  // A node that sends no length pads the value.
   const bool same = bytes.size() >= write.bytes.size() &&
                     std::equal(write.bytes.begin(), write.bytes.end(), bytes.begin());
   const std::string what = refused_.empty() ? to_string(write.object) + ":" : refused_ + ", and";
@@ -295,7 +295,7 @@ void CanopenNode::command(std::uint8_t what) {
   frames_.push_back(frame);
 }
 
-// -------------------------------------------------------------------- what the node sends
+// -------------------------------------------------------------------- frames of the node
 
 void CanopenNode::take_heartbeat(std::span<const std::uint8_t> data, nanoseconds at) {
   if (data.size() != 1) {
@@ -307,7 +307,7 @@ void CanopenNode::take_heartbeat(std::span<const std::uint8_t> data, nanoseconds
   good_at_ = at;
   const auto state = static_cast<std::uint8_t>(data[0] & ~toggle_bit);
   if (state == state_boot_up) {
-    // Its errors began anew as well.
+    // A reboot clears the node's errors.
     forget_emergencies();
     retry_pause_ = first_pause;
     begin_setup(at);
@@ -318,7 +318,7 @@ void CanopenNode::take_heartbeat(std::span<const std::uint8_t> data, nanoseconds
     begin_setup(at);
   } else if (phase_ == Phase::running && starts_ && state != state_operational &&
              at >= start_again_at_) {
-    // Somebody stopped it, or the command was lost.
+    // The node was stopped, or the command was lost.
     start_again_at_ = at + start_again_every;
     command(command_start);
   } else if (phase_ == Phase::running && state == state_operational && config_.pdo_on_change) {
@@ -326,7 +326,7 @@ void CanopenNode::take_heartbeat(std::span<const std::uint8_t> data, nanoseconds
   }
 }
 
-/// A node that sends what changes says by its heartbeat that nothing has.
+/// A heartbeat of a node that sends on change confirms its last values.
 void CanopenNode::renew_pdos(nanoseconds at) {
   for (std::size_t i = 0; i < channels_.size(); ++i) {
     if (channels_[i].way == CanopenWay::sdo || readings_[i].fault == Fault::no_answer) continue;
@@ -397,7 +397,7 @@ bool CanopenNode::take_pdo(std::uint32_t cob_id, std::span<const std::uint8_t> d
   return has_channel;
 }
 
-/// A value only where nothing speaks against it.
+/// Publishes a value unless an emergency or a second sender makes it invalid.
 void CanopenNode::show(std::size_t channel, const CanValue& decoded, nanoseconds at) {
   if (emergencies_[channel]) return lose(channel, *emergencies_[channel], at);
   if (is_doubtful(channel)) return lose(channel, Fault::device_error, at);
@@ -420,7 +420,7 @@ void CanopenNode::lose_all(Fault fault, nanoseconds at) {
 
 void CanopenNode::poll(nanoseconds now) {
   if (client_.busy()) return;
-  std::optional<std::size_t> due;  // the one that has waited longest
+  std::optional<std::size_t> due;  // the longest overdue
   for (std::size_t i = 0; i < channels_.size(); ++i) {
     if (channels_[i].way != CanopenWay::sdo || now < poll_at_[i]) continue;
     if (!due || poll_at_[i] < poll_at_[*due]) due = i;
@@ -460,7 +460,7 @@ void CanopenNode::take_poll(const SdoResult& result, nanoseconds now) {
   show(channel, decode(result.bytes, channels_[channel].signal), now);
 }
 
-/// Between two good statuses there is a value; after the first one it is asked for at once.
+/// A value is accepted between two good statuses; after the first one it is read at once.
 void CanopenNode::take_status(const SdoResult& result, nanoseconds now) {
   const std::size_t channel = *polled_;
   const RawReading raw{*polled_value_, result.bytes};
@@ -548,7 +548,7 @@ void CanopenNode::advance(nanoseconds now) {
 }
 
 std::optional<CanFrame> CanopenNode::next_frame() {
-  // Commands first: a node is made pre-operational before it is written to.
+  // Commands first: a node becomes pre-operational before it is written to.
   if (!frames_.empty()) {
     const CanFrame frame = frames_.front();
     frames_.pop_front();
@@ -557,7 +557,7 @@ std::optional<CanFrame> CanopenNode::next_frame() {
   return client_.next_frame();
 }
 
-// -------------------------------------------------------------------- for the operator
+// -------------------------------------------------------------------- health
 
 std::string CanopenNode::trouble(nanoseconds now) const {
   if (!conflict_.empty()) return conflict_;

@@ -1,5 +1,5 @@
-/// One node of a CANopen bus as its master sees it: set up, started, watched, read. Pure: frames
-/// and times in, frames and readings out.
+/// Master's side of one CANopen node: set-up, start, supervision, reading. Pure: no socket, no
+/// clock.
 #pragma once
 
 #include <chrono>
@@ -22,15 +22,15 @@ namespace thermocomp {
 
 using std::chrono::nanoseconds;
 
-/// Counts arrivals in windows of eight periods. Two senders put sixteen into one; more than twelve
-/// are taken for that, until a window has few enough again. A sender that makes up for a pause
-/// stays below.
+/// Detects a second sender: counts arrivals in windows of eight periods. Two senders give sixteen;
+/// more than twelve count as two senders until a window has few enough again. A sender that catches
+/// up after a pause stays below.
 class RateWatch {
  public:
   static constexpr int periods = 8;
   static constexpr int arrivals_max = 12;
 
-  /// @param period  zero: nothing is ever too often
+  /// @param period  0: never too often
   explicit RateWatch(nanoseconds period = nanoseconds{0}) noexcept : window_(periods * period) {}
 
   void arrived(nanoseconds at) noexcept {
@@ -57,15 +57,15 @@ class RateWatch {
   bool too_often_{false};
 };
 
-/// Where each channel of a node stands in its TPDOs: fills signal.id, start_bit and length_bits of
-/// the pdo_object channels that `mapping` holds. @return their positions
+/// Fills signal.id, start_bit and length_bits of the pdo_object channels that `mapping` contains.
+/// @return their indices
 std::vector<std::size_t> place_channels(const CanopenMapping& mapping,
                                         std::vector<CanopenChannel>& channels);
 
-/// The life of a node: pre-operational while it is set up (writes, each read back; COB-IDs and
-/// mappings asked for), then started, then read. A reboot, a lost heartbeat or a lost bus begins it
-/// anew. A channel shows a value only while all of that is well; its readings are no_answer before
-/// and in between, device_error where the set-up was refused or two nodes send the same thing.
+/// States of a node: pre-operational during set-up (writes, each verified; COB-IDs and mappings
+/// read), then started, then read. A reboot, a lost heartbeat or a lost bus restarts the set-up.
+/// Readings are no_answer until it is complete, and device_error if the set-up was refused or two
+/// nodes send the same COB-ID.
 class CanopenNode {
  public:
   CanopenNode(const CanopenNodeConfig& config, const CanopenBusConfig& bus);
@@ -73,29 +73,29 @@ class CanopenNode {
   void opened(nanoseconds now);
   void closed(nanoseconds now);
 
-  // What the node sent; the identifier says which of them a frame is for.
+  // Frames of the node, by function code.
   void take_heartbeat(std::span<const std::uint8_t> data, nanoseconds at);
   void take_emergency(std::span<const std::uint8_t> data, nanoseconds at);
   void take_sdo(std::span<const std::uint8_t> data, nanoseconds at);
-  /// A TPDO of this or another node. @return whether a channel is in it
+  /// A TPDO of this or another node. @return true if it carries a channel
   bool take_pdo(std::uint32_t cob_id, std::span<const std::uint8_t> data, nanoseconds at);
 
   void advance(nanoseconds now);
   [[nodiscard]] std::optional<CanFrame> next_frame();
 
-  /// Order of the node's channels, also that of the next two.
+  /// In the order of the node's channels, as are the next two.
   [[nodiscard]] std::span<const Reading> readings() const noexcept { return readings_; }
   [[nodiscard]] const std::vector<RawReading>& raw() const noexcept { return raw_; }
   [[nodiscard]] const std::vector<CanopenChannel>& channels() const noexcept { return channels_; }
-  /// COB-IDs of the TPDOs that the node has said are its own since it came up.
+  /// COB-IDs of the TPDOs that the node reported as its own since its start.
   [[nodiscard]] std::span<const std::uint32_t> cob_ids_reported() const noexcept {
     return cob_ids_reported_;
   }
-  /// Another node says that this TPDO is its own; empty: none does.
+  /// Another node reports this node's TPDO as its own; empty: none does.
   void claim_conflict(const std::string& reason, nanoseconds now);
 
   [[nodiscard]] bool running() const noexcept { return phase_ == Phase::running && !lost_; }
-  /// Counters and what is wrong, for an operator.
+  /// Counters and present error.
   [[nodiscard]] UnitHealth health(nanoseconds now) const;
 
  private:
@@ -103,13 +103,13 @@ class CanopenNode {
   enum class Work { write, verify, ask_cob_id, ask_count, ask_entry, ask_errors };
   struct Job {
     Work work{Work::write};
-    std::size_t which{0};  ///< of the writes, or number of the TPDO
+    std::size_t which{0};  ///< index of the write, or number of the TPDO
     int entry{0};
   };
   struct Watched {
     std::uint32_t cob_id{0};
     RateWatch rate;
-    nanoseconds due_by{};  ///< a TPDO that is not there then is missed
+    nanoseconds due_by{};  ///< later a missing TPDO is reported
   };
 
   void begin_setup(nanoseconds now);
@@ -139,38 +139,38 @@ class CanopenNode {
   [[nodiscard]] std::string trouble(nanoseconds now) const;
 
   const CanopenNodeConfig config_;
-  const bool starts_;  ///< we send NMT commands
+  const bool starts_;  ///< NMT commands are sent
   std::vector<CanopenWrite> writes_;
   std::vector<CanopenChannel> channels_;
   std::vector<Reading> readings_;
   std::vector<RawReading> raw_;
-  std::vector<std::optional<Fault>> emergencies_;  ///< of the channels
+  std::vector<std::optional<Fault>> emergencies_;  ///< one per channel
   std::vector<nanoseconds> poll_at_;
-  std::vector<char> vouched_for_;  ///< whether the status after the last poll was good
+  std::vector<char> vouched_for_;  ///< the status after the last poll was good
   std::vector<Watched> watched_;   ///< one per TPDO
   SdoClient client_;
 
   Phase phase_{Phase::closed};
   std::deque<Job> jobs_;
-  std::optional<std::size_t> polled_;  ///< channel whose answer is awaited
-  /// Of that channel, until its status has come too.
+  std::optional<std::size_t> polled_;  ///< channel that waits for its answer
+  /// Value of that channel until its status arrives.
   std::optional<std::vector<std::uint8_t>> polled_value_;
-  CanopenMapping mapping_;  ///< being asked for
+  CanopenMapping mapping_;  ///< being read
   int entries_{0};
   std::vector<std::uint32_t> cob_ids_reported_;
   nanoseconds retry_at_{};
   nanoseconds retry_pause_;
-  nanoseconds heard_at_{};  ///< last heartbeat, or when it began to be awaited
+  nanoseconds heard_at_{};  ///< last heartbeat, or start of the wait for it
   nanoseconds start_again_at_{};
   bool lost_{false};
   RateWatch heartbeats_;
   std::uint64_t second_answers_seen_{0};
-  nanoseconds second_answer_until_{};  ///< a second node is taken to be there until then
+  nanoseconds second_answer_until_{};  ///< until then a second node is assumed
   std::string conflict_;
-  std::string refused_;  ///< the setting that the node refused and that is read back now
+  std::string refused_;  ///< setting that the node refused, being read back
   std::string setup_error_;
   std::string poll_error_;
-  std::string emergency_text_;  ///< of the last one, until the errors are reset
+  std::string emergency_text_;  ///< of the last emergency, until the errors are reset
   std::deque<CanFrame> frames_;
   UnitHealth counters_;
   nanoseconds good_at_{};  ///< last good answer or TPDO

@@ -15,7 +15,7 @@ constexpr std::uint8_t jumo_break = 0x01;
 constexpr std::uint8_t jumo_short = 0x02;
 constexpr std::uint8_t jumo_short_as_printed = 0x10;
 
-/// By the code's first byte.
+/// By the high byte of the code.
 std::string_view class_name(std::uint16_t code) noexcept {
   switch (code >> 8) {
     case 0x00:

@@ -174,7 +174,7 @@ void SdoClient::abort(SdoOutcome outcome, std::uint32_t abort_code) {
   end(outcome, abort_code);
 }
 
-/// Bytes without which the answer cannot be read. Old nodes send no more; CiA 301 wants all eight.
+/// Bytes needed to read the answer. Old nodes send no more; CiA 301 requires all eight.
 std::size_t SdoClient::bytes_used(std::span<const std::uint8_t> data) noexcept {
   const std::uint8_t specifier = data[0] & specifier_mask;
   if (specifier == response_segment) return frame_bytes - ((data[0] >> 1) & 7u);
@@ -194,7 +194,7 @@ void SdoClient::take(std::span<const std::uint8_t> data, nanoseconds now) {
     if (answered_ && names_object && ours) ++second_answers_;
     return;
   }
-  // The answer to an earlier request, late: it says nothing about this one.
+  // Late answer to an earlier request: not about this one.
   if (names_object && !ours && data.size() >= header_bytes) return;
   if (specifier == response_abort) {
     end(SdoOutcome::aborted, static_cast<std::uint32_t>(little_endian(data, 4, 4)));
@@ -207,13 +207,13 @@ void SdoClient::take(std::span<const std::uint8_t> data, nanoseconds now) {
   } else if (state_ == State::reading_segments && specifier == response_segment) {
     take_segment(data, now);
   } else if (specifier == response_read || specifier == response_written) {
-    ++second_answers_;  // to what has been answered: somebody else answers too
+    ++second_answers_;  // already answered: a second node answers
   } else {
     abort(SdoOutcome::broken, unknown_specifier);
   }
 }
 
-/// The answer to "initiate upload": the value itself, or how long it is.
+/// Answer to "initiate upload": the value itself, or its length.
 void SdoClient::take_first(std::span<const std::uint8_t> data, nanoseconds now) {
   const bool expedited = (data[0] & expedited_bit) != 0;
   const bool sized = (data[0] & size_bit) != 0;

@@ -1,5 +1,4 @@
-/// The client's side of CANopen's service data objects (CiA 301, 7.2.4): one transfer at a time
-/// with one node. Pure: frames and times in, frames and results out.
+/// Client of CANopen SDOs (CiA 301, 7.2.4): one transfer at a time with one node. Pure.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +14,7 @@
 
 namespace thermocomp {
 
-/// What a node means by an abort code; "unknown abort code" for one that is not in CiA 301.
+/// Name of an abort code; "unknown abort code" if it is not in CiA 301.
 [[nodiscard]] std::string_view sdo_abort_name(std::uint32_t code) noexcept;
 
 /// "1017:00"
@@ -23,24 +22,24 @@ namespace thermocomp {
 
 enum class SdoOutcome {
   done,
-  aborted,  ///< by the node, abort_code says why
+  aborted,  ///< by the node, with abort_code
   timed_out,
-  broken  ///< the node broke the protocol, abort_code is what it was sent
+  broken  ///< protocol violation by the node, answered with abort_code
 };
 
 struct SdoResult {
   ObjectAddress object;
   SdoOutcome outcome{SdoOutcome::done};
   std::uint32_t abort_code{0};
-  std::vector<std::uint8_t> bytes;  ///< what was read; empty after a write
+  std::vector<std::uint8_t> bytes;  ///< value read; empty after a write
   nanoseconds timeout{};
 };
 
 /// "2040:01: aborted by the node: 0x06020000 object does not exist"
 [[nodiscard]] std::string to_string(const SdoResult& result);
 
-/// Reads expedited and segmented (at most bytes_max), writes expedited (1..4 bytes). An answer that
-/// leaves out bytes of no use is taken.
+/// Reads expedited and segmented (at most bytes_max), writes expedited (1..4 bytes). Accepts
+/// answers without the unused bytes.
 class SdoClient {
  public:
   static constexpr std::size_t bytes_max = 1024;
@@ -51,23 +50,22 @@ class SdoClient {
   void read(ObjectAddress object, nanoseconds now);
   /// @pre !busy(), 1..4 bytes
   void write(ObjectAddress object, std::span<const std::uint8_t> bytes, nanoseconds now);
-  /// Forgets the transfer; nothing is sent to the node.
+  /// Drops the transfer; nothing is sent to the node.
   void cancel() noexcept;
 
   [[nodiscard]] bool busy() const noexcept { return state_ != State::idle; }
-  /// When advance() has something to do; only while busy.
+  /// Time of the next advance(); only while busy.
   [[nodiscard]] nanoseconds deadline() const noexcept { return deadline_; }
 
-  /// A frame of the node's answering identifier (0x580 + node).
+  /// A frame with the node's response identifier (0x580 + node).
   void take(std::span<const std::uint8_t> data, nanoseconds now);
   void advance(nanoseconds now);
 
-  /// Frames to send, oldest first; each is given once.
+  /// Frames to send, oldest first; each is returned once.
   [[nodiscard]] std::optional<CanFrame> next_frame();
-  /// The end of a transfer; given once.
+  /// Result of a finished transfer; returned once.
   [[nodiscard]] std::optional<SdoResult> result();
-  /// Number of answers to transfers that had already been answered: another node has the same
-  /// number.
+  /// Number of answers to transfers that were already answered: a second node has the same number.
   [[nodiscard]] std::uint64_t second_answers() const noexcept { return second_answers_; }
 
  private:
@@ -86,7 +84,7 @@ class SdoClient {
   nanoseconds timeout_;
   State state_{State::idle};
   ObjectAddress object_;
-  bool answered_{false};  ///< the last transfer ended with the node's own answer
+  bool answered_{false};  ///< the last transfer ended with an answer of the node
   bool toggle_{false};
   std::size_t announced_{0};  ///< bytes of a segmented transfer; 0: not announced
   std::vector<std::uint8_t> bytes_;

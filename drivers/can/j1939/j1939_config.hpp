@@ -1,4 +1,4 @@
-/// What a J1939 bus is built from: plain structures, filled by config/ or by a test.
+/// Configuration of a J1939 bus.
 #pragma once
 
 #include <array>
@@ -12,7 +12,7 @@
 
 namespace thermocomp {
 
-/// Where a suspect parameter (SPN) stands in a parameter group (PGN). Unsigned, as J1939-71 has it.
+/// Place of a suspect parameter (SPN) in a parameter group (PGN); unsigned, as in J1939-71.
 struct J1939Parameter {
   std::uint32_t pgn{0};  ///< 18 bits
   int start_byte{0};     ///< counted from 0; in documents from 1
@@ -20,9 +20,9 @@ struct J1939Parameter {
   int length_bits{16};   ///< 2..32
   double scale{1.0};     ///< value = raw * scale + offset
   double offset{0.0};
-  std::vector<Sentinel> sentinels;           ///< take precedence over the standard's ranges
-  Fault error{Fault::device_error};          ///< what the standard's "error" means here
-  Fault not_available{Fault::device_error};  ///< ... and "not available"
+  std::vector<Sentinel> sentinels;           ///< take precedence over the ranges of the standard
+  Fault error{Fault::device_error};          ///< fault for the standard's "error"
+  Fault not_available{Fault::device_error};  ///< fault for the standard's "not available"
   bool operator==(const J1939Parameter&) const = default;
 };
 
@@ -34,7 +34,7 @@ struct J1939Channel {
 
 struct J1939NodeConfig {
   std::string name;
-  /// Source address, 0..253; nullopt: only the one that its NAME claims.
+  /// Source address, 0..253; nullopt: only the address that its NAME claims.
   std::optional<int> address;
   std::optional<std::uint64_t> name_claimed;  ///< the device's NAME; nullopt: any
   std::vector<J1939Channel> channels;
@@ -44,10 +44,10 @@ struct J1939NodeConfig {
 struct J1939BusConfig {
   static constexpr std::array kinds{"j1939"};
   std::string name;
-  std::string interface;    ///< "can0"
-  double reconnect_s{0.5};  ///< pause before the interface is tried again
-  /// Claimed for us; needed to take messages that are sent to one node (RTS/CTS). nullopt: we send
-  /// nothing but the request for the others' NAMEs.
+  std::string interface;
+  double reconnect_s{0.5};  ///< pause between attempts to open the interface
+  /// Address to claim; needed for messages sent to one node (RTS/CTS). nullopt: only the request
+  /// for the other nodes' NAMEs is sent.
   std::optional<int> own_address;
   std::uint64_t own_name{0};
   std::vector<J1939NodeConfig> nodes;

@@ -14,7 +14,7 @@ using namespace std::chrono_literals;
 constexpr nanoseconds silent_after = 5s;
 constexpr std::size_t name_bytes = 8;
 constexpr std::size_t request_bytes = 3;
-constexpr std::uint32_t any_specific = 0x03FF0000;  // group alone, of one that is sent to a node
+constexpr std::uint32_t any_specific = 0x03FF0000;  // mask for the group only, of an addressed one
 constexpr std::uint32_t any_source = 0x03FFFF00;
 
 std::vector<std::uint32_t> groups(const J1939BusConfig& config) {
@@ -31,7 +31,7 @@ std::string hexadecimal(std::uint64_t name) {
   return text.data();
 }
 
-/// A group of one frame whole; of a longer one the bytes of the parameter.
+/// All bytes of a single-frame group; of a longer one the bytes of the parameter.
 std::span<const std::uint8_t> bytes_of(std::span<const std::uint8_t> group,
                                        const J1939Parameter& parameter) {
   constexpr std::size_t frame_bytes = 8;
@@ -41,7 +41,7 @@ std::span<const std::uint8_t> bytes_of(std::span<const std::uint8_t> group,
   return group.subspan(first, std::min(group.size() - first, static_cast<std::size_t>(bytes)));
 }
 
-/// The group from anybody.
+/// The group from any sender.
 CanFilter filter_of(std::uint32_t pgn) {
   return {identifier({pgn, 0, 0, 0}), is_addressed(pgn) ? any_specific : any_source};
 }
@@ -146,7 +146,7 @@ void J1939Line::claim(std::uint8_t from) {
   frames_.push_back(frame);
 }
 
-/// Allowed also to a node that has no address.
+/// Also permitted for a node without address.
 void J1939Line::ask_for_names() {
   CanFrame frame;
   frame.id = identifier({pgn_request, own_address_.value_or(address_null), address_global, 6});
@@ -155,7 +155,7 @@ void J1939Line::ask_for_names() {
   frames_.push_back(frame);
 }
 
-/// Somebody claims our address: the smaller NAME has it.
+/// Another node claims our address: the smaller NAME wins.
 void J1939Line::take_claim_of_ours(std::uint64_t name) {
   if (name >= config_.own_name) {
     claim(*own_address_);

@@ -1,4 +1,4 @@
-/// All that is on one J1939 bus: parameter groups, multi-packet messages, address claims. Pure.
+/// One J1939 bus: parameter groups, multi-packet messages, address claims. Pure.
 #pragma once
 
 #include <array>
@@ -11,9 +11,9 @@
 
 namespace thermocomp {
 
-/// A device is known by its source address or, where its NAME is configured, by what address that
-/// NAME claims (J1939-81). When somebody else claims the address of such a device its readings are
-/// no_answer until its NAME is heard again.
+/// A device is identified by its source address or, if its NAME is configured, by the address that
+/// the NAME claims (J1939-81). If another NAME claims that address, the readings are no_answer
+/// until the device's NAME is received again.
 class J1939Line final : public CanProtocol {
  public:
   /// @throws InvalidValue for impossible parameters and addresses
@@ -30,17 +30,17 @@ class J1939Line final : public CanProtocol {
   [[nodiscard]] std::vector<RawReading> raw() const override { return raw_; }
   [[nodiscard]] std::vector<UnitHealth> health(nanoseconds now) const override;
 
-  /// Our address while it is ours.
+  /// Our address; nullopt if another node has claimed it.
   [[nodiscard]] std::optional<std::uint8_t> own_address() const noexcept { return own_address_; }
-  /// The address at which the device is read now.
+  /// Present address of the device.
   [[nodiscard]] std::optional<std::uint8_t> address_of(std::size_t node) const;
 
  private:
   struct Node {
     std::optional<std::uint8_t> address;
-    std::size_t first{0};  ///< of its channels among the readings
+    std::size_t first{0};  ///< index of its first channel in the readings
     UnitHealth counters;
-    std::string note;  ///< about its address
+    std::string note;  ///< problem with its address
     nanoseconds good_at{};
   };
 
@@ -55,7 +55,7 @@ class J1939Line final : public CanProtocol {
 
   const J1939BusConfig config_;
   std::vector<Node> nodes_;
-  std::vector<Reading> readings_;  ///< the nodes' after each other
+  std::vector<Reading> readings_;  ///< those of the nodes, one after the other
   std::vector<RawReading> raw_;
   TransportReceiver transport_;
   std::optional<std::uint8_t> own_address_;

@@ -19,7 +19,7 @@ std::size_t bytes_needed(const J1939Parameter& parameter) noexcept {
   return static_cast<std::size_t>(bytes);
 }
 
-/// Fault::none where the raw value is one.
+/// Fault::none if the raw value is no indicator.
 Fault indicated(std::uint64_t raw, const J1939Parameter& parameter) noexcept {
   const int bits = parameter.length_bits;
   if (bits % 8 == 0) {
@@ -110,7 +110,7 @@ constexpr std::uint8_t reason_bad_size = 9;
 constexpr std::size_t frame_bytes = 8;
 constexpr std::size_t packet_bytes = 7;
 constexpr std::size_t size_min = 9;
-constexpr int granted_max = 16;                   // packets that one CTS asks for
+constexpr int granted_max = 16;                   // packets per CTS
 constexpr nanoseconds packet_gap_max = 750ms;     // T1: between two packets
 constexpr nanoseconds first_packet_max = 1250ms;  // T2: after a CTS
 
@@ -161,7 +161,7 @@ void TransportReceiver::begin(const J1939Id& id, std::span<const std::uint8_t> d
                               nanoseconds at) {
   const bool broadcast = id.destination == address_global;
   const Key key{id.source, broadcast};
-  // A sender that begins anew has given up what it had begun.
+  // A new announcement ends the sender's earlier transfer.
   if (transfers_.erase(key) != 0) ++failed_;
   Transfer transfer;
   transfer.pgn = static_cast<std::uint32_t>(little_endian(data, 5, 3));
@@ -236,7 +236,7 @@ void TransportReceiver::advance(nanoseconds now) {
   }
 }
 
-/// @param middle  bytes 2 to 5, the lowest first
+/// @param middle  bytes 2 to 5 of the message, lowest first
 void TransportReceiver::control(std::uint8_t to, std::uint8_t kind, std::uint64_t middle,
                                 std::uint32_t pgn) {
   if (!address_) return;

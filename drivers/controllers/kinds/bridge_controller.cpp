@@ -8,7 +8,7 @@
 namespace thermocomp {
 namespace {
 
-/// For the gate's patience with a pause between two answers only: the bridge sets the pace.
+/// Only for the gate's patience between two answers; the bridge sets the pace.
 constexpr nanoseconds usual_period = std::chrono::milliseconds(50);
 
 }  // namespace
@@ -63,7 +63,7 @@ std::optional<BridgeAnswer> BridgeController::report(const BridgeReport& report)
   ++health_.reads;
   health_.last_error.clear();
   if (report.session != session_) ++health_.connects;
-  // An axis that nothing is reported of is not known to be in step.
+  // An axis without a reported offset is not synchronised.
   const bool taking =
       report.taking &&
       std::all_of(report.applied_um.begin(),

@@ -1,5 +1,5 @@
-/// A controller behind a bridge: a program beside the controller that calls the daemon, tells what
-/// the controller does, and is answered with the offsets.
+/// Link through a bridge: a program at the controller that calls the daemon, reports the
+/// controller's state, and gets the offsets as the answer.
 #pragma once
 
 #include <array>
@@ -17,9 +17,9 @@
 
 namespace thermocomp {
 
-/// What a bridge tells. NaN where it knows nothing.
+/// Report of a bridge; NaN: unknown.
 struct BridgeReport {
-  std::uint64_t session{0};  ///< of the bridge's choice, another one after each (re)start of it
+  std::uint64_t session{0};  ///< chosen by the bridge, a new one after each of its (re)starts
   bool taking{false};        ///< the controller adds offsets to its positions (on, homed, ...)
   std::array<double, axes_max> applied_um{};
   std::array<double, signals_max> signals{};
@@ -30,30 +30,30 @@ struct BridgeReport {
   }
 };
 
-/// What it is answered.
+/// Answer to a report.
 struct BridgeAnswer {
   std::uint32_t link_epoch{0};
-  bool anew{false};  ///< the link is new with this report: offsets go on from what it says
+  bool anew{false};  ///< the link is new with this report: offsets start from its values
   std::array<double, axes_max> offset_um{};
-  std::array<bool, axes_max> valid{};  ///< false: the bridge leaves this axis' offset as it is
+  std::array<bool, axes_max> valid{};  ///< false: the bridge keeps the offset of this axis
 };
 
-/// Each report is an exchange of the rule in controller_link.hpp: what is applied is read back and
-/// published, and what may be sent is the answer. A new link begins with the first report, with one
-/// of another session, after a silence, and with the first report that takes offsets again; a new
-/// epoch of the same link when an axis stands where nothing that was sent can have taken it.
+/// Each report is an exchange of the rule in controller_link.hpp: the applied offsets are read back
+/// and published, and the answer carries the offsets to send. A new link begins with the first
+/// report, with one of another session, after a silence, and with the first report that takes
+/// offsets again; a new epoch of the same link when no offset sent explains an axis' applied one.
 ///
-/// The offsets of an answer count as written with the next report of the same session.
+/// Offsets of an answer count as written with the next report of the same session.
 ///
-/// While the controller takes no offsets (off, not homed) it is online, its signals count, and
-/// nothing is known to be applied: the axes are not in step, and no offset is answered.
+/// While the controller takes no offsets (off, not homed) it is online and its signals are valid,
+/// but no applied offset is known: the axes are not synchronised, and the answer carries no offset.
 ///
-/// No thread of its own: silence is seen by whoever asks for the newest state.
+/// No thread of its own: newest() and health() detect silence.
 class BridgeController final : public ControllerLink {
  public:
   using Now = nanoseconds (*)() noexcept;
 
-  /// @throws InvalidValue for more axes or signals than there can be, or silent_after_s <= 0
+  /// @throws InvalidValue for too many axes or signals, or silent_after_s <= 0
   explicit BridgeController(const BridgeControllerConfig& config, Now now = monotonic_now);
 
   void start() override { started_.store(true); }
@@ -62,10 +62,10 @@ class BridgeController final : public ControllerLink {
   void offer(const OffsetCommand& command) noexcept override;
   [[nodiscard]] ControllerHealth health() const override;
 
-  /// One ordinary thread, always the same. Not before start().
-  /// @return nothing when another session has reported within silent_after_s: two bridges
+  /// For one ordinary thread, always the same. Not before start().
+  /// @return nullopt when another session has reported within silent_after_s (two bridges)
   [[nodiscard]] std::optional<BridgeAnswer> report(const BridgeReport& report);
-  /// A report that cannot be understood came: counted, and stands in the health.
+  /// Counts an invalid report; the health shows the reason.
   void refuse(const std::string& why);
 
  private:
@@ -79,12 +79,12 @@ class BridgeController final : public ControllerLink {
   const nanoseconds silent_after_;
   const Now now_;
   std::atomic<bool> started_{false};
-  // the reporting thread's
+  // of the reporting thread
   WriteGate gate_;
   ControllerState state_;
   std::uint64_t session_{0};
   bool taking_{false};
-  bool answered_{false};  ///< offsets: the next report tells that they were taken
+  bool answered_{false};  ///< with offsets: the next report confirms them
   mutable std::mutex health_mutex_;
   ControllerHealth health_;
   WaitFreeSlot<ControllerState> states_;

@@ -44,13 +44,13 @@ void DryRunController::stop() noexcept {
 
 void DryRunController::newest(ControllerState& state) noexcept {
   read_state(state);
-  // Between two read-backs a controller shows what it showed.
+  // Between two read-backs a controller shows the same values.
   if (state.online && state.taken_at != read_at_) {
     read_at_ = state.taken_at;
     apply_offered(state.link_epoch);
   }
   state.applied_um = applied_um_;
-  state.written = state.online;  // a dry run shows what compensation would be
+  state.written = state.online;  // a dry run shows the compensation as if written
 }
 
 void DryRunController::read_state(ControllerState& state) noexcept {

@@ -1,4 +1,4 @@
-/// From a controller's configuration to its link, and the link that writes nothing.
+/// Factory of controller links, and the link that writes nothing.
 #pragma once
 
 #include <atomic>
@@ -10,16 +10,16 @@
 
 namespace thermocomp {
 
-/// With a link: all that it reads (online, epoch, times, signals) is passed on, and it is never
-/// offered a command, without which no link writes. The axes are shown as a controller would that
-/// starts at 0 um and applies by its next read-back what it was offered; what the controller really
-/// applies is in the health (`shown_um`).
+/// With a link: its state (online, epoch, times, signals) is passed on, and it is never offered a
+/// command, without which no link writes. The axes are shown like those of a controller that starts
+/// at 0 um and applies an offered offset by its next read-back; the offsets really applied are in
+/// the health (`shown_um`).
 ///
-/// Without one: the same for a controller that is none, online from start() to stop(), always of
-/// epoch 1, without signals. No thread of its own. An axis that is not valid keeps what it had.
+/// Without a link: the same without a controller, online from start() to stop(), always with epoch
+/// 1 and without signals. No thread of its own. An axis that is not valid keeps its offset.
 class DryRunController final : public ControllerLink {
  public:
-  /// @param read  the controller's own link; nullptr: there is no controller
+  /// @param read  link to the controller; nullptr: there is none
   /// @throws InvalidValue for more axes than axes_max
   explicit DryRunController(DryRunControllerConfig config,
                             std::unique_ptr<ControllerLink> read = nullptr);
@@ -30,7 +30,7 @@ class DryRunController final : public ControllerLink {
   void offer(const OffsetCommand& command) noexcept override;
   [[nodiscard]] ControllerHealth health() const override;
 
-  /// nullptr: there is no controller. For what else calls it, such as a bridge; offer it nothing.
+  /// nullptr: no controller. For other callers, such as a bridge; do not offer it commands.
   [[nodiscard]] ControllerLink* read() const noexcept { return read_.get(); }
 
  private:
@@ -40,14 +40,14 @@ class DryRunController final : public ControllerLink {
   const DryRunControllerConfig config_;
   const std::unique_ptr<ControllerLink> read_;
   std::atomic<bool> started_{false};
-  // the reader's
+  // of the reader
   std::array<double, axes_max> applied_um_{};
-  nanoseconds read_at_{};  ///< the newest read-back that was seen
+  nanoseconds read_at_{};  ///< time of the newest read-back
   WaitFreeSlot<OffsetCommand> commands_;
-  mutable WaitFreeSlot<std::array<double, axes_max>> shown_um_;  ///< health() reads it
+  mutable WaitFreeSlot<std::array<double, axes_max>> shown_um_;  ///< read by health()
 };
 
-/// @param dry_run  nothing is to be written: the link is a DryRunController around it
+/// @param dry_run  nothing may be written: the link is wrapped in a DryRunController
 /// @throws InvalidValue or DriverError for a configuration that cannot work
 [[nodiscard]] std::unique_ptr<ControllerLink> make_controller(const ControllerConfig& config,
                                                               bool dry_run = false);

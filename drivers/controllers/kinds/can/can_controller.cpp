@@ -16,7 +16,6 @@ CanId id_of(const CanSignal& signal) {
   return {signal.id, signal.extended_id};
 }
 
-/// Values and numbers.
 std::vector<const CanSignal*> signals_of(const CanSet& set) {
   std::vector<const CanSignal*> signals;
   for (const CanSignal& value : set.values) signals.push_back(&value);
@@ -190,7 +189,7 @@ void CanController::plan_outgoing() {
   }
   if (config_.valid_bits) outgoing(*config_.valid_bits).has_valid_bits = true;
   if (config_.heartbeat) outgoing(*config_.heartbeat).has_heartbeat = true;
-  // The controller shall have all offsets before the frame that says that they are good and fresh.
+  // All offsets come before the frame that declares them valid and fresh.
   std::stable_sort(outgoing_.begin(), outgoing_.end(), [](const Outgoing& a, const Outgoing& b) {
     return std::pair(a.has_heartbeat, a.has_valid_bits) <
            std::pair(b.has_heartbeat, b.has_valid_bits);
@@ -291,10 +290,10 @@ void CanController::receive() {
   if (gate_.explains(state_.applied_um))
     publish(true, monotonic_now());
   else
-    synchronise();  // re-homed or overridden: nothing computed before is sent any more
+    synchronise();  // re-homed or overridden: earlier commands are no longer sent
 }
 
-/// All that was handed over is on the bus.
+/// Confirms the write once all frames handed over are on the bus.
 void CanController::note_written(nanoseconds now) {
   if (handed_ == written_ || socket_.sent_out() < handed_) return;
   written_ = handed_;
@@ -325,7 +324,7 @@ void CanController::take(const CanFrame& frame) {
   ++health_.read_errors;
 }
 
-/// @return false: it is too short for what it should carry
+/// @return false if the frame is too short for the set
 bool CanController::take_sets(const CanFrame& frame) {
   bool whole = true;
   for (ShownSet& shown : shown_sets_) {
@@ -367,8 +366,8 @@ void CanController::await_what_is_older(nanoseconds than) noexcept {
   }
 }
 
-/// In sync or not, from what has arrived and how long ago. A bus-off counts even where it was over
-/// before we looked: what waited to be sent then is lost.
+/// Enters or leaves synchronisation by the age of the received frames. A bus-off counts even if it
+/// is already over: the frames queued at that time are lost.
 void CanController::supervise(nanoseconds now) {
   const bool was_off = socket_.errors().bus_off != bus_offs_;
   bus_offs_ = socket_.errors().bus_off;
@@ -389,7 +388,7 @@ void CanController::supervise(nanoseconds now) {
   }
 }
 
-/// What the interface suffers from says more than that nothing came over it.
+/// The error of the interface takes precedence over missing frames.
 void CanController::tell_error() {
   const std::scoped_lock lock(health_mutex_);
   health_.last_error = socket_.error();
@@ -422,8 +421,8 @@ void CanController::synchronise() {
   health_.connected = true;
 }
 
-/// What a frame carries of an axis that is not driven. A read-back is what was sent last, nothing,
-/// or between; any other is not to be sent back to where it came from, and then neither is known.
+/// Value sent for an axis that is not driven. A plausible read-back is the offset sent last, 0, or
+/// a value between; any other must not be sent back, and then neither is known.
 void CanController::hold_what_is_applied(bool link_is_new) {
   for (std::size_t axis = 0; axis < config_.axes.size(); ++axis) {
     for (std::size_t node = 0; node < config_.axes[axis].offsets(); ++node) {
@@ -440,7 +439,7 @@ void CanController::hold_what_is_applied(bool link_is_new) {
   }
 }
 
-/// What is held may be another content now: it has another number.
+/// The held content may have changed, so it gets another number.
 void CanController::number_sets() {
   if (!numbered_) {
     const auto periods =
@@ -469,7 +468,7 @@ void CanController::send_command(nanoseconds now) {
   if (commands_.fresh()) gate_.offered(commands_.front().command, commands_.front().computed_at);
   const SendVerdict verdict = gate_.verdict(now);
   if (verdict == SendVerdict::resynchronise) return lose(true);
-  // Without frames of the controller nothing else would renew the published time.
+  // Without frames to receive, nothing else renews the published time.
   if (incoming_.empty() && gate_.in_sync()) publish(true, now);
   if (verdict == SendVerdict::nothing_to_send) return;
   for (std::size_t axis = 0; axis < config_.axes.size(); ++axis) {
@@ -480,7 +479,7 @@ void CanController::send_command(nanoseconds now) {
   }
   ++heartbeat_;
   const bool waits = handed_ > socket_.sent_out() && !gate_.written(now);
-  // What will never be sent any more (a queue that was emptied) is not waited for.
+  // Frames of an emptied queue will never be sent; do not wait for them.
   if (waits) handed_ = written_ = socket_.sent_out();
   const bool sent = std::all_of(outgoing_.begin(), outgoing_.end(),
                                 [this](Outgoing& frame) { return compose_and_send(frame); });
@@ -496,8 +495,8 @@ void CanController::send_command(nanoseconds now) {
   health_.last_error = health_.write.error;
 }
 
-/// Only sets are in it, and none of them may be followed: a controller that goes by the valid bits
-/// of the turn before would take over what is held.
+/// True if the frame carries only sets that must not be followed: a controller that uses the valid
+/// bits of the previous period would take over the held values.
 bool CanController::may_be_left_out(const Outgoing& outgoing) const noexcept {
   if (outgoing.has_valid_bits || outgoing.has_heartbeat) return false;
   return std::none_of(outgoing.axes.begin(), outgoing.axes.end(), [this](std::size_t axis) {
@@ -547,7 +546,7 @@ void CanController::publish(bool online, nanoseconds now) {
   states_.publish();
 }
 
-/// Everything has to come anew before the next epoch.
+/// All frames must be received again before the next epoch.
 void CanController::lose(bool same_link, bool online) {
   if (same_link)
     gate_.paused();

@@ -1,4 +1,4 @@
-/// Offsets to a controller in CAN frames, and what it applies and measures from its own frames.
+/// Offsets to a controller in CAN frames; applied offsets and signals from its frames.
 #pragma once
 
 #include <atomic>
@@ -15,33 +15,31 @@
 
 namespace thermocomp {
 
-/// Sends its frames each period while there is a command of this epoch. In sync once every frame it
-/// listens for has come since the link was (re)established; out of sync as soon as one of them has
-/// been missing for silent_after_s, the interface is down or bus-off, or a frame could not be sent.
-/// The published time is that of the oldest of these frames. What is sent counts as written once
-/// the interface has sent it: where nobody acknowledges, it never does.
+/// Sends its frames each period while there is a command of this epoch. Synchronised once every
+/// configured frame has been received since the link was (re)established; not synchronised as soon
+/// as one of them is missing for silent_after_s, the interface is down or bus-off, or a frame could
+/// not be sent. The published time is that of the oldest of these frames. Frames count as written
+/// once the interface has sent them, which never happens without an acknowledgement.
 ///
-/// An axis whose command is not valid keeps the value sent last (at first, and on a new link where
-/// it can have come from that: what the controller applies); its valid bit is 0. A frame with an
-/// axis of which neither is known is not sent, unless the valid bits stand in the same frame. Valid
-/// bits and heartbeat are raw numbers: scale and offset are not used; the heartbeat starts anew
-/// when its bits are full.
+/// An axis whose command is not valid keeps the value sent last (at first, and on a new link if it
+/// can result from that value: the applied offset); its valid bit is 0. A frame with an axis for
+/// which neither is known is not sent, unless the valid bits are in the same frame. Valid bits and
+/// heartbeat are raw numbers without scale and offset; the heartbeat wraps around.
 ///
-/// Of an axis whose controller interpolates along its travel the offsets of all nodes go as one set
-/// with a number of its own (CanTravel), while all of them are valid; else its frames are not sent,
-/// unless something else stands in them. Each number stands for one content. What the controller
-/// shows of it counts when all frames carry the number of one set, and is as old as the oldest of
-/// them. Nothing is sent until the frames of whoever sent before this link was started are
-/// forgotten; the numbers then go on half-way round from the one in effect, or by the clock where
-/// not sent: what is left of a former set in a queue or in a controller that forgets nothing
-/// has another number.
+/// For an axis whose controller interpolates along its travel, the offsets of all nodes are sent as
+/// one numbered set (CanTravel) while all of them are valid; else frames with nothing but such sets
+/// are not sent. Each number stands for one content. A read-back set counts when all its frames
+/// carry the same number, and is as old as the oldest of them. Nothing is sent until frames from
+/// before the start of this link have expired; numbering then continues half-way round from the
+/// number in effect, or from the clock without read-back, so that remains of an earlier set in a
+/// queue or in the controller have another number.
 class CanController final : public ControllerLink {
  public:
-  /// @throws InvalidValue for signals that cannot be or overlap
+  /// @throws InvalidValue for impossible or overlapping signals
   explicit CanController(CanControllerConfig config);
   ~CanController() override;
 
-  /// @throws DriverError when the system has no CAN sockets at all
+  /// @throws DriverError when the system has no CAN sockets
   void start() override;
   void stop() noexcept override;
   void newest(ControllerState& state) noexcept override;
@@ -49,24 +47,23 @@ class CanController final : public ControllerLink {
   [[nodiscard]] ControllerHealth health() const override;
 
  private:
-  /// A frame we send.
   struct Outgoing {
     CanFrame frame;
     std::vector<std::size_t> axes;
     bool has_valid_bits{false};
     bool has_heartbeat{false};
   };
-  /// What has to come anew when the link is (re)established, and then again and again.
+  /// Received data that must be renewed after each (re)start of the link and then regularly.
   struct Awaited {
     nanoseconds received_at{};
     bool seen{false};  ///< since the link was (re)established
   };
-  /// A frame we listen for, with where its values go in state_; those of sets go to shown_sets_.
+  /// A frame to receive, with the places of its values in state_; sets are in shown_sets_.
   struct Incoming : Awaited {
     CanId id;
     std::vector<std::pair<CanSignal, double*>> values{};
   };
-  /// The set of an axis that the controller shows.
+  /// The set that the controller shows for an axis.
   struct ShownSet : Awaited {
     std::size_t axis{0};
     CanSetReader reader;
@@ -101,23 +98,23 @@ class CanController final : public ControllerLink {
   void lose(bool same_link = false, bool online = false);
 
   const CanControllerConfig config_;
-  std::vector<std::size_t> first_;  ///< one an axis: its first offset in command and state
+  std::vector<std::size_t> first_;  ///< one per axis: its first offset in command and state
   std::vector<Outgoing> outgoing_;  ///< offsets first, then valid bits, then heartbeat
-  ControllerState state_;           ///< the thread's own
+  ControllerState state_;           ///< of the thread
   std::vector<Incoming> incoming_;
   std::vector<ShownSet> shown_sets_;
-  std::vector<std::uint64_t> set_numbers_;  ///< one an axis: of the set sent last
-  bool numbered_{false};                    ///< they have begun
-  nanoseconds quiet_until_{};               ///< before, nothing is sent
+  std::vector<std::uint64_t> set_numbers_;  ///< one per axis: of the set sent last
+  bool numbered_{false};                    ///< numbering has begun
+  nanoseconds quiet_until_{};               ///< nothing is sent before
   CanSocket socket_;
   WriteGate gate_;
   std::uint64_t heartbeat_{0};
-  std::uint64_t bus_offs_{0};  ///< as the socket counts, up to the newest look
-  std::uint64_t handed_{0};    ///< frames given to the interface, as the socket counts sent_out()
-  std::uint64_t written_{0};   ///< of them, sent when the newest write was confirmed
-  bool silent_{false};         ///< lost because frames were missing, and not back
+  std::uint64_t bus_offs_{0};  ///< count of the socket at the last check
+  std::uint64_t handed_{0};    ///< frames given to the interface, for comparison with sent_out()
+  std::uint64_t written_{0};   ///< handed_ at the newest confirmed write
+  bool silent_{false};         ///< lost because of missing frames, and not back
   nanoseconds next_send_{};
-  std::array<double, axes_max> held_um_{};  ///< what an axis that is not valid goes on sending
+  std::array<double, axes_max> held_um_{};  ///< sent for an axis that is not valid
   WaitFreeSlot<ControllerState> states_;
   WaitFreeSlot<OfferedCommand> commands_;
   WakeEvent wake_;

@@ -3,7 +3,7 @@
 namespace thermocomp {
 namespace {
 
-/// How long stop() lets an exchange and the last write end by themselves.
+/// Time for the present exchange and the last write in stop().
 constexpr std::chrono::milliseconds stop_patience{600};
 
 }  // namespace

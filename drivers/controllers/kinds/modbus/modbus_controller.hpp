@@ -1,4 +1,4 @@
-/// A controller reached over Modbus, spoken to by the line's thread.
+/// Link to a controller over Modbus, run by the line's thread.
 #pragma once
 
 #include "drivers/bus_thread.hpp"
@@ -10,7 +10,7 @@ namespace thermocomp {
 
 class ModbusController final : public ControllerLink {
  public:
-  /// @throws InvalidValue for values that cannot be, DriverError for a line that cannot be
+  /// @throws InvalidValue for impossible values, DriverError for an impossible line
   explicit ModbusController(const ModbusControllerConfig& config);
   ~ModbusController() override;
 

@@ -12,7 +12,7 @@
 namespace thermocomp {
 namespace {
 
-/// The format of valid bits and heartbeat: plain counts, all bits used.
+/// Format of valid bits and heartbeat: plain counts, all bits used.
 NumberFormat raw_format(const ModbusValue& value) noexcept {
   NumberFormat format{value.encoding, value.word_order, 1.0, 0.0};
   if (format.encoding == Encoding::int16) format.encoding = Encoding::uint16;
@@ -20,7 +20,7 @@ NumberFormat raw_format(const ModbusValue& value) noexcept {
   return format;
 }
 
-/// The first count that the register cannot hold exactly.
+/// The smallest count that the register cannot hold exactly.
 std::uint64_t counts_of(Encoding encoding) noexcept {
   switch (encoding) {
     case Encoding::int16:
@@ -105,7 +105,7 @@ bool drivable(const OffsetCommand& command, std::size_t axis) noexcept {
   return command.valid[axis] && std::isfinite(command.offset_um[axis]);
 }
 
-/// The offset of a piezo whose amplifier was given a voltage; its rest is the offset 0.
+/// Offset of a piezo at an amplifier voltage; 0 at rest.
 double resting_um(const PiezoConfig& config, double volt) {
   return std::abs(volt) <= config.tolerance_V ? 0.0 : displacement_at(config, volt);
 }
@@ -178,7 +178,7 @@ nanoseconds ModbusDialogue::next_action_at() const noexcept {
 void ModbusDialogue::act() {
   const nanoseconds began = connection_.now();
   const nanoseconds period = from_seconds(config_.period_s);
-  if (gate_.in_sync() && link_number() != link_) lose(false);  // another user opened the line anew
+  if (gate_.in_sync() && link_number() != link_) lose(false);  // another user reopened the line
   if (!gate_.in_sync()) {
     if (!synchronise()) {
       retry_at_ = connection_.now() + from_seconds(config_.line.reconnect_s);
@@ -186,7 +186,7 @@ void ModbusDialogue::act() {
     }
     next_exchange_at_ = connection_.now();
   }
-  // The time that a reconnection takes says nothing of the controller's pace.
+  // The time of a reconnection is not part of the controller's response time.
   const nanoseconds exchange_began = connection_.now();
   exchange();
   const nanoseconds now = connection_.now();
@@ -196,7 +196,7 @@ void ModbusDialogue::act() {
     ++health_.write.late;
   }
   retry_at_ = write_failed_ ? std::max(began + period, now) : now;
-  // A slow line sets the pace; nothing is caught up.
+  // A slow line sets the pace; missed periods are skipped.
   next_exchange_at_ = std::max(next_exchange_at_ + gate_.next_pause(), now);
 }
 
@@ -205,15 +205,15 @@ void ModbusDialogue::end() {
   if (gate_.verdict(connection_.now()) == SendVerdict::send) write_command();
 }
 
-/// A peer that closes and is there again within an exchange has not restarted; where nothing is
-/// read back nobody would see it if it had.
+/// Without read-back a restart of the controller would go unnoticed, so a connection that the peer
+/// closes unexpectedly counts as a new link too.
 std::uint64_t ModbusDialogue::link_number() const noexcept {
   const bool reads_back = std::none_of(written_.begin(), written_.end(),
                                        [](const auto& written) { return written.has_value(); });
   return reads_back ? connection_.links() : connection_.breaks();
 }
 
-/// Connects where needed, reads everything, and only then takes the new epoch.
+/// Connects if necessary, reads everything, and only then takes the new epoch.
 bool ModbusDialogue::synchronise() {
   if (!connection_.connected() && !connection_.connect()) {
     const std::scoped_lock lock(health_mutex_);
@@ -267,7 +267,7 @@ bool ModbusDialogue::read_written() {
       words.resize(request.count);
       const Exchange exchange = with_retries(
           [&] { return connection_.read(config_.unit, request.table, request.address, words); });
-      // A device may do without these registers, with an exception or in silence.
+      // A device may lack these registers, with an exception or without an answer.
       const bool goes_without = refused_ && exchange.fault() == Fault::device_error;
       if (!exchange.ok() && !goes_without && ++written_asked_ < asked_max) {
         return note_unread(request, exchange);
@@ -294,16 +294,15 @@ void ModbusDialogue::compare_written() {
     written->compare(words);
     held = held && written->count();
   }
-  // What the registers showed when the link began was nothing that was written.
+  // The registers' content at the start of the link was not a written offset.
   if (!held) lose(false);
 }
 
-/// One period: read, and write only while what was read can be explained by what was written. In
-/// this order nothing computed before a re-homing was seen is written after it was (a command tells
-/// which look it knew of), and a controller that is slowly read gets the newest command all the
-/// same. A write that was not answered is not repeated before another look either: in the time that
-/// an answer is waited for a controller can restart. One that was refused waits for the next
-/// period.
+/// One period: reads, and writes only if the read-back is explained by the offsets written. So no
+/// command computed before a re-homing was seen is written after it (a command carries the look it
+/// was computed from), and a slow controller still gets the newest command. A write without answer
+/// is not repeated before another read either: the controller can restart during the time-out. A
+/// refused write waits for the next period.
 void ModbusDialogue::exchange() {
   write_failed_ = false;
   look_for_command();
@@ -369,7 +368,7 @@ void ModbusDialogue::add_axis(std::size_t axis, const OffsetCommand& command,
     fields.push_back(travel_field(*place.travel, set_numbers_[axis], offset_um));
   } else {
     const double value = written_value(axis, offset_um.front());
-    if (std::isnan(value)) return;  // a piezo that waits for the offset to stand still
+    if (std::isnan(value)) return;  // a piezo that waits for a steady offset
     const ModbusValue& offset = place.offset;
     fields.push_back(field_of(offset, WriteStage::offset, value,
                               {offset.encoding, offset.word_order, offset.scale, 0.0}));
@@ -387,7 +386,7 @@ bool ModbusDialogue::write_command() {
   }
   const nanoseconds now = connection_.now();
   gate_.sent(now);
-  if (requests.empty()) return true;  // no axis is driven, and nothing else tells so
+  if (requests.empty()) return true;  // no axis is driven, and nothing else is to be written
   gate_.confirmed(now);
   note_confirmed(now);
   publish(true);
@@ -412,7 +411,7 @@ bool ModbusDialogue::write(const WriteField& request) {
   ++health_.write_errors;
   WriteHealth& last = health_.write;
   ++(refused_ ? last.refused : last.unanswered);
-  const bool is_s7 = s7_of(config_.line) != nullptr;  // then the text alone has the place
+  const bool is_s7 = s7_of(config_.line) != nullptr;  // then only the text has the place
   last.function = is_s7 ? 0 : config_.write_function;
   last.address = is_s7 ? 0 : request.address;
   last.exception = is_s7 ? exchange.exception_code & 0x7F : exchange.exception_code;
@@ -454,7 +453,7 @@ void ModbusDialogue::note_refusal(const Exchange& exchange) noexcept {
   refused_ = is_refused(exchange);
 }
 
-/// Reads every value into state_; all of them or, by the time of the first request, none.
+/// Reads every value into state_, or none on failure; taken_at is the time of the first request.
 bool ModbusDialogue::read_all() {
   std::vector<std::vector<std::uint16_t>> answers;
   nanoseconds taken_at = connection_.now();
@@ -497,7 +496,7 @@ void ModbusDialogue::show_travels() noexcept {
   }
 }
 
-/// A new epoch begins: what the amplifiers show, where they do, is where their axes stand.
+/// At a new epoch the drives start from the amplifiers' voltages, where these are read.
 void ModbusDialogue::restart_piezos() {
   for (std::size_t axis = 0; axis < piezos_.size(); ++axis) {
     if (!piezos_[axis]) continue;
@@ -538,7 +537,7 @@ void ModbusDialogue::publish(bool online) {
   states_.publish();
 }
 
-/// It has just been read, and may be again: it is there, it only does not take what is written.
+/// The controller answers reads but does not take writes: it stays online.
 void ModbusDialogue::lose_by_write() {
   write_failed_ = true;
   if (!connection_.connected() || ending_.load()) return lose(false);

@@ -1,5 +1,4 @@
-/// What is said to a controller over Modbus and when: offsets into its registers, and what it
-/// applies and measures out of them.
+/// Dialogue with a controller over Modbus: writes offsets, reads applied offsets and signals.
 #pragma once
 
 #include <array>
@@ -20,40 +19,38 @@
 namespace thermocomp {
 
 /// Each period: reads everything back and publishes it, then writes the newest command (offsets,
-/// then valid bits, then heartbeat, neighbours in one request) - unless an axis stands where
-/// nothing sent lately can have taken it: that begins a new epoch and nothing is written
-/// (WriteGate); the link is still the same one. After a time-out or a lost connection it is
-/// another, after an exception or a pause of the cycle it is not. A controller that reads well and
-/// refuses or ignores a write stays online and is asked again a period later: that nothing is
-/// ControllerState::written says whether it is written. A piezo leaps to every new offset
-/// by way of 0 V: whether it stands where it was set is left to its drive and to the estimator's
-/// comparison.
+/// then valid bits, then heartbeat, neighbours in one request). If no offset sent lately explains
+/// the applied offset of an axis, a new epoch of the same link begins and nothing is written
+/// (WriteGate). A time-out or a lost connection begins another link; an exception or a pause of the
+/// cycle does not. A controller that answers reads and refuses or ignores writes stays online and
+/// is retried a period later; ControllerState::written shows it. A piezo jumps to each new offset
+/// by way of 0 V: its drive and the estimator's comparison check its position.
 ///
-/// Of an axis whose controller interpolates along its travel the offsets of all nodes go as one set
-/// with a number of its own (ModbusTravel), while all of them are valid. The numbers go on from the
-/// one that stands in `end` whenever everything is read anew: a set that was broken off, by whoever
-/// wrote before, is never taken for one that is whole.
+/// For an axis whose controller interpolates along its travel, the offsets of all nodes are written
+/// as one numbered set (ModbusTravel) while all of them are valid. Numbering continues from the
+/// number in `end` whenever everything is read anew, so that an incomplete set of an earlier writer
+/// is never taken for a complete one.
 ///
-/// Of an axis that is not read back, a new link reads the registers that are written instead, once
-/// (WrittenOffsets): applied_um is what stood in them then, NaN where that cannot be read.
+/// For an axis without read-back, a new link reads the written registers instead, once
+/// (WrittenOffsets): applied_um is their content then, NaN if they cannot be read.
 ///
-/// An axis whose command is not valid keeps its register as it is; its valid bit is 0. The
-/// heartbeat counts up with every command written and starts anew when its register is full. Valid
-/// bits and heartbeat are raw numbers: their scale is not used.
+/// The register of an axis whose command is not valid is not written; its valid bit is 0. The
+/// heartbeat is incremented with every command written and wraps around. Valid bits and heartbeat
+/// are raw numbers without scale.
 class ModbusDialogue final : public LineUser {
  public:
   /// @param connection  of the configuration's line; outlives the dialogue
-  /// @throws InvalidValue for values that cannot be
+  /// @throws InvalidValue for impossible values
   ModbusDialogue(ModbusControllerConfig config, ModbusConnection& connection);
 
   [[nodiscard]] const ModbusLine& line() const noexcept override { return config_.line; }
   [[nodiscard]] nanoseconds next_action_at() const noexcept override;
-  /// One period's exchange, connecting and reading everything back before it where needed.
+  /// Exchange of one period; first connects and reads everything back if necessary.
   void act() override;
-  /// From any thread: the exchange under way does not try again.
+  /// From any thread: the present exchange is not retried.
   void end_soon() noexcept { ending_.store(true); }
   [[nodiscard]] bool ending() const noexcept { return ending_.load(); }
-  /// Writes the last command, if it may be written.
+  /// Writes the last command if that is permitted.
   void end() override;
 
   void newest(ControllerState& state) noexcept;  ///< wait-free; one reader
@@ -64,15 +61,14 @@ class ModbusDialogue final : public LineUser {
  private:
   [[nodiscard]] std::uint64_t link_number() const noexcept;
   bool synchronise();
-  /// The numbers of the sets that stand in the registers. False: they could not be read.
+  /// Reads the set numbers from the registers. @return false if that failed
   bool read_set_numbers();
-  /// What stands in the registers of axes that are not read back. False: asked in vain, to be tried
-  /// again.
+  /// Reads the written registers of axes without read-back. @return false to try again
   bool read_written();
-  /// Whether registers that are not read back hold what was just written.
+  /// Checks that registers without read-back hold the values just written.
   void compare_written();
   void exchange();
-  /// Reads all and begins a new epoch where that is not explained. False: it could not be read.
+  /// Reads all; begins a new epoch if the read-back is unexplained. @return false if reading failed
   bool look();
   void look_for_command();
   bool write_command();
@@ -92,7 +88,7 @@ class ModbusDialogue final : public LineUser {
   void publish(bool online);
   void lose(bool same_link);
   void lose_by_write();
-  /// Repeats `exchange` as the line's `retries` say. Notes why it failed in the end.
+  /// Retries `exchange` as often as the line's `retries`. Records the reason of a failure.
   template <class Request>
   Exchange with_retries(Request&& request);
   void note_refusal(const Exchange& exchange) noexcept;
@@ -100,26 +96,26 @@ class ModbusDialogue final : public LineUser {
 
   const ModbusControllerConfig config_;
   std::vector<ModbusValue> read_values_;  ///< applied offsets, then signals
-  std::vector<double*> read_targets_;     ///< where each of them goes
-  std::vector<std::size_t> first_;        ///< one an axis: its first offset in command and state
+  std::vector<double*> read_targets_;     ///< their destinations
+  std::vector<std::size_t> first_;        ///< one per axis: its first offset in command and state
   ReadPlan read_plan_;
   ModbusConnection& connection_;
   WriteGate gate_;
-  std::vector<std::optional<PiezoDrive>> piezos_;       ///< one an axis
-  std::vector<std::optional<WrittenOffsets>> written_;  ///< one an axis; none: it is read back
-  int written_asked_{0};                                ///< in vain, one after the other
-  std::array<double, axes_max> shown_V_{};       ///< by the amplifiers of piezos, one an axis
-  std::vector<std::vector<double>> shown_sets_;  ///< one an axis: ModbusTravel::applied
-  std::vector<std::uint64_t> set_numbers_;       ///< one an axis: of the set written last
+  std::vector<std::optional<PiezoDrive>> piezos_;       ///< one per axis
+  std::vector<std::optional<WrittenOffsets>> written_;  ///< one per axis; none: it is read back
+  int written_asked_{0};                                ///< consecutive failed attempts
+  std::array<double, axes_max> shown_V_{};       ///< voltages of the amplifiers, one per axis
+  std::vector<std::vector<double>> shown_sets_;  ///< one per axis: ModbusTravel::applied
+  std::vector<std::uint64_t> set_numbers_;       ///< one per axis: of the set written last
   std::uint64_t heartbeat_{0};
-  ControllerState state_;  ///< the thread's own
+  ControllerState state_;  ///< of the thread
   WaitFreeSlot<ControllerState> states_;
   WaitFreeSlot<OfferedCommand> commands_;
   nanoseconds next_exchange_at_;
-  nanoseconds retry_at_;   ///< while not in sync
-  std::uint64_t link_{0};  ///< link_number() of what is read back
-  bool refused_{false};    ///< the controller itself answered the last exchange, with an exception
-  bool write_failed_{false};  ///< in the newest turn
+  nanoseconds retry_at_;   ///< while not synchronised
+  std::uint64_t link_{0};  ///< link_number() of the last read-back
+  bool refused_{false};    ///< the controller itself answered the last exchange with an exception
+  bool write_failed_{false};  ///< in the newest period
   std::atomic<bool> ending_{false};
   mutable std::mutex health_mutex_;
   ControllerHealth health_;

@@ -100,7 +100,7 @@ void append(WriteField& field, const ModbusValue& place, double value, Encoding 
   field.words.insert(field.words.end(), encoded.words().begin(), encoded.words().end());
 }
 
-/// Of a set's number: all bits are used.
+/// All bits of a set's number are used.
 Encoding count_encoding(const ModbusValue& place) noexcept {
   return place.encoding == Encoding::uint32 ? Encoding::uint32 : Encoding::uint16;
 }
@@ -180,7 +180,7 @@ std::vector<double> WrittenOffsets::decode(std::span<const std::uint16_t> words)
   const auto number = [&](const ModbusValue& place) {
     return bits_of(at(place).first(registers_of(place.encoding)), place.encoding, place.word_order);
   };
-  // A set that was broken off is not in effect.
+  // An incomplete set is not in effect.
   if (number(travel.begin) != number(travel.end)) return offsets;
   std::vector<double> values;
   for (const ModbusValue& value : travel.values) values.push_back(value_of(value, at(value)));
@@ -189,7 +189,7 @@ std::vector<double> WrittenOffsets::decode(std::span<const std::uint16_t> words)
 }
 
 bool WrittenOffsets::is_to_be_compared() const noexcept {
-  // Zeros are what registers show that hold nothing.
+  // Registers that hold nothing also show zeros.
   return held_ == Held::not_known &&
          std::any_of(words_.begin(), words_.end(), [](std::uint16_t word) { return word != 0; });
 }

@@ -8,12 +8,12 @@
 namespace thermocomp {
 namespace {
 
-/// Offsets that differ by less stand still: a register's rounding, not a movement.
+/// Smaller differences are rounding of a register, not movement.
 constexpr double still_um = 0.01;
-/// What an amplifier and its read-back may take, beside the time it is given at 0 V.
+/// Response time of amplifier and read-back, in addition to the time at 0 V.
 constexpr double amplifier_s = 0.5;
 
-/// y over x, straight between points; x strictly increases.
+/// y over x, linear between points, constant beyond; x strictly increases.
 double between(const std::vector<double>& x, const std::vector<double>& y, double at) noexcept {
   if (std::isnan(at)) return at;
   if (at <= x.front()) return y.front();
@@ -40,7 +40,7 @@ double displacement_at(const PiezoConfig& config, double volt) noexcept {
 PiezoDrive::PiezoDrive(const PiezoConfig& config) : config_((config.validate(), config)) {}
 
 void PiezoDrive::restart_at(double read_V) noexcept {
-  // Of a drive in use only what it had reached from 0 V itself, and was not about to leave.
+  // From a drive in use, only a voltage that it has reached from 0 V itself and was not leaving.
   const bool from_zero = !std::isfinite(volt_) || (known_ && obeyed_ && !zeroing_);
   known_ = zeroing_ = false;
   volt_ = asked_um_ = followed_um_ = not_a_number;
@@ -55,11 +55,11 @@ void PiezoDrive::restart_at(double read_V) noexcept {
 void PiezoDrive::show(nanoseconds now, double read_V) noexcept {
   const bool on_its_way =
       written_since_ && seconds(now - *written_since_) < config_.settle_s + amplifier_s;
-  // Before the first voltage it rests until the offset stands still, and is meant to.
+  // Before the first voltage the setpoint is 0 V.
   const double meant_V = std::isfinite(volt_) ? volt_ : 0.0;
   const bool as_meant = std::abs(read_V - meant_V) <= config_.tolerance_V;
-  // One that has not obeyed does so again when it shows its setpoint, not while it may be on
-  // its way; then it has come from anywhere but 0 V, unless that is where it is.
+  // An amplifier that did not obey obeys again when it shows its setpoint; then that was not
+  // reached from 0 V, unless it is 0 V.
   const bool again = as_meant && !obeyed_ && meant_V > config_.tolerance_V;
   if ((!as_meant && !on_its_way) || again) known_ = false;
   obeyed_ = as_meant || (obeyed_ && on_its_way && std::isfinite(read_V));
@@ -84,7 +84,7 @@ double PiezoDrive::next(nanoseconds now, double offset_um) noexcept {
   }
   if (zeroing_) {
     if (seconds(now - zero_since_) < config_.settle_s) return volt_;
-    // Where it is to go by now: what has been asked for since the way down began.
+    // The offset may have changed since the way to 0 V began.
     zeroing_ = false;
     known_ = true;
     followed_um_ = asked_um_;

@@ -1,4 +1,4 @@
-/// The voltage of a stacked piezo that moves a tool post, from the offset that is asked for: pure.
+/// Voltage of a stacked piezo that moves a tool post, from the commanded offset. Pure.
 #pragma once
 
 #include <optional>
@@ -8,34 +8,33 @@
 
 namespace thermocomp {
 
-/// The measured curve inverted, straight between its points; held at the ends.
-/// @return volts; NaN for a displacement that is no number
+/// Inverse of the measured curve, linear between its points, constant beyond the ends.
+/// @return volts; NaN for NaN
 [[nodiscard]] double volt_at(const PiezoConfig& config, double displacement_um) noexcept;
-/// The curve itself. @return um
+/// The measured curve. @return um
 [[nodiscard]] double displacement_at(const PiezoConfig& config, double volt) noexcept;
 
-/// One axis: which voltage to write now. Returning to 0 V takes the tool with it, so offsets should
-/// change between cuts only (update = "each_cycle" or hold_while_cutting).
+/// Drive of one axis. Each return to 0 V moves the tool, so offsets should change between cuts only
+/// (update = "each_cycle" or hold_while_cutting).
 class PiezoDrive {
  public:
   explicit PiezoDrive(const PiezoConfig& config);
 
-  /// After a lost link: the voltage in effect is not known.
+  /// After a lost link: the voltage in effect is unknown.
   void restart() noexcept { known_ = false; }
-  /// The same where it has been read back: what stands there is kept, and need not be reached anew
-  /// unless this drive knows that it was not reached from 0 V.
-  /// 0 V is the rest of an amplifier that has no setpoint yet.
+  /// The same with the voltage read back: it is kept, and approached anew only if this drive knows
+  /// that it was not reached from 0 V. 0 V is the rest of an amplifier without setpoint.
   void restart_at(double read_V) noexcept;
   /// @param now  must not run backwards. @return volts within the curve; NaN: nothing to write yet
   [[nodiscard]] double step(nanoseconds now, double offset_um) noexcept;
 
-  /// What the amplifier shows. When it is neither the voltage written nor on the way to it, the
-  /// offset is driven to anew once it stands still.
+  /// Takes the amplifier's voltage. If it is neither the one written nor on the way to it, the
+  /// offset is approached anew once it is steady.
   void show(nanoseconds now, double read_V) noexcept;
-  /// Whether it showed its setpoint, or went there from where it did.
+  /// True if the voltage was the setpoint, or on its way there since it last was.
   [[nodiscard]] bool obeyed() const noexcept { return obeyed_; }
-  /// Which offset that stands for: while it obeys, the one asked for, even where that is still
-  /// waited for or too near to be followed; else what the curve says, and 0 at rest. NaN: not read.
+  /// Offset of the present voltage: while the amplifier obeys, the commanded one, even if it is not
+  /// followed yet; else that of the curve, and 0 at rest. NaN: not read.
   [[nodiscard]] double applied_um() const noexcept { return applied_um_; }
 
  private:
@@ -49,7 +48,7 @@ class PiezoDrive {
   double asked_um_{not_a_number};
   nanoseconds asked_since_{};
   nanoseconds zero_since_{};
-  std::optional<nanoseconds> written_since_;  ///< another voltage than before
+  std::optional<nanoseconds> written_since_;  ///< time of the last change of voltage
   bool obeyed_{true};
   double applied_um_{not_a_number};
 };
