@@ -1,4 +1,4 @@
-// A controller behind a bridge: what the link makes of its reports, in a time of the test's own.
+// The bridge link and its reports, in virtual time.
 #include "drivers/controllers/kinds/bridge_controller.hpp"
 
 #include <chrono>
@@ -38,7 +38,7 @@ struct Bench {
     link.newest(newest);
     return newest;
   }
-  /// As a cycle does: of the epoch that it has seen.
+  /// As a cycle does, with the newest epoch.
   void want(double x_um, double z_um) {
     OffsetCommand command;
     command.link_epoch = state().link_epoch;
@@ -54,7 +54,7 @@ struct Bench {
 
 }  // namespace
 
-TEST_CASE("a report is published and the answer is the newest command", "[controllers][bridge]") {
+TEST_CASE("the answer to a report is the newest command", "[controllers][bridge]") {
   Bench bench;
   CHECK_FALSE(bench.state().online);
   const BridgeAnswer first = bench.report();
@@ -71,11 +71,11 @@ TEST_CASE("a report is published and the answer is the newest command", "[contro
   CHECK(second.valid[0]);
   CHECK(second.offset_um[0] == 5.5);
   CHECK(second.offset_um[1] == -3.5);
-  CHECK_FALSE(second.valid[2]);  // no axis of this configuration
+  CHECK_FALSE(second.valid[2]);  // no such axis in this configuration
   CHECK(bench.link.health().writes == 1);
 }
 
-TEST_CASE("a bridge that falls silent is offline, and begins a new epoch when it is back",
+TEST_CASE("a silent bridge is offline and begins a new epoch on its return",
           "[controllers][bridge]") {
   Bench bench;
   bench.report();
@@ -86,24 +86,24 @@ TEST_CASE("a bridge that falls silent is offline, and begins a new epoch when it
   CHECK_FALSE(bench.link.health().connected);
   const BridgeAnswer back = bench.report();
   CHECK(back.anew);
-  CHECK_FALSE(back.valid[0]);  // what was wanted before the silence is not sent after it
+  CHECK_FALSE(back.valid[0]);  // offsets from before the silence are not sent
   CHECK(bench.state().link_epoch == 2);
   CHECK(bench.state().online);
 }
 
-TEST_CASE("nothing that was wanted before a re-homing is sent after it", "[controllers][bridge]") {
+TEST_CASE("offsets from before a re-homing are not sent after it", "[controllers][bridge]") {
   Bench bench;
   bench.report();
   bench.want(5.0, -3.0);
   bench.report();
   bench.told.applied_um[0] = 0.0;
   const BridgeAnswer answer = bench.report();
-  CHECK_FALSE(answer.anew);  // the bridge keeps what it asks for: it is the same link
+  CHECK_FALSE(answer.anew);  // the bridge keeps its offset: the same link
   CHECK_FALSE(answer.valid[0]);
   CHECK(bench.state().link_epoch == 1 + epochs_of_a_link);
 }
 
-TEST_CASE("a bridge that reads back twice what it was told never asks for it",
+TEST_CASE("a bridge that reads back twice the offset sent gets no more offsets",
           "[controllers][bridge]") {
   Bench bench;
   bench.report();
@@ -114,7 +114,7 @@ TEST_CASE("a bridge that reads back twice what it was told never asks for it",
   }
 }
 
-TEST_CASE("a controller that takes no offsets is online, and not in step",
+TEST_CASE("a controller that takes no offsets is online and not synchronised",
           "[controllers][bridge]") {
   Bench bench;
   bench.report();
@@ -130,13 +130,13 @@ TEST_CASE("a controller that takes no offsets is online, and not in step",
   CHECK(bench.state().signals[0] == 120.0);
   bench.want(5.0, -3.0);
   CHECK_FALSE(bench.report().valid[0]);
-  CHECK_FALSE(bench.report().anew);  // nothing new about being off
+  CHECK_FALSE(bench.report().anew);  // still off: no new link
   bench.told.taking = true;
   CHECK(bench.report().anew);
   CHECK(bench.state().applied_um[0] == 0.0);
 }
 
-TEST_CASE("an axis of which the bridge knows nothing is not in step", "[controllers][bridge]") {
+TEST_CASE("an axis with unknown applied offset is not synchronised", "[controllers][bridge]") {
   Bench bench;
   bench.told.applied_um[1] = not_a_number;
   bench.report();
@@ -145,8 +145,7 @@ TEST_CASE("an axis of which the bridge knows nothing is not in step", "[controll
   CHECK(std::isnan(bench.state().applied_um[0]));
 }
 
-TEST_CASE("of two bridges the one that came first is heard until it is silent",
-          "[controllers][bridge]") {
+TEST_CASE("of two bridges the first is accepted until it is silent", "[controllers][bridge]") {
   Bench bench;
   bench.report();
   BridgeReport other = bench.told;
@@ -171,14 +170,14 @@ TEST_CASE("offsets count as written with the bridge's next report", "[controller
   bench.report();
   bench.want(5.0, -3.0);
   REQUIRE(bench.report().valid[0]);
-  CHECK_FALSE(written());  // answered, not yet known to be taken
+  CHECK_FALSE(written());  // answered, not yet confirmed
   bench.report();
   CHECK(written());
   for (int i = 0; i < 70; ++i) bench.report();  // the cycle hangs
   CHECK_FALSE(written());
 }
 
-TEST_CASE("a hung cycle's offsets are not sent for ever", "[controllers][bridge]") {
+TEST_CASE("offsets of a hung cycle are not sent for ever", "[controllers][bridge]") {
   Bench bench;
   bench.report();
   bench.want(5.0, -3.0);
@@ -187,7 +186,7 @@ TEST_CASE("a hung cycle's offsets are not sent for ever", "[controllers][bridge]
   CHECK_FALSE(bench.report().valid[0]);  // more than two seconds old
 }
 
-TEST_CASE("what cannot be is refused at the start", "[controllers][bridge]") {
+TEST_CASE("an invalid configuration is refused at the start", "[controllers][bridge]") {
   CHECK_THROWS_AS(BridgeController({"m", 0.0, {"x"}, {}}), InvalidValue);
   CHECK_THROWS_AS(BridgeController({"m", 1.0, std::vector<std::string>(17, "x"), {}}),
                   InvalidValue);

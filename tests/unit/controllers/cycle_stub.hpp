@@ -1,4 +1,4 @@
-// What stands for the daemon's cycle in the tests of the links.
+// Stub of the daemon's cycle for the tests of the links.
 #pragma once
 
 #include <atomic>
@@ -12,8 +12,7 @@
 
 namespace thermocomp::test {
 
-/// A cycle at 100 Hz, which starts the link: takes the state, marks the wanted offsets with its
-/// epoch, offers them.
+/// A cycle at 100 Hz with its link: takes the state and offers the wanted offsets with its epoch.
 template <class Link>
 class Cycle {
  public:
@@ -37,7 +36,7 @@ class Cycle {
     const std::scoped_lock lock(mutex_);
     return state_;
   }
-  /// Stops offering (a hung cycle), while the state is still taken.
+  /// Stops offering (a hung cycle) but still takes the state.
   std::atomic<bool> hung{false};
   /// Commands keep this epoch instead of the newest; 0: the newest.
   std::atomic<std::uint32_t> fixed_epoch;

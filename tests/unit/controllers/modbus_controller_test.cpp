@@ -33,7 +33,7 @@ ModbusValue at(ModbusTable table, std::uint16_t address, Encoding encoding, doub
   return value;
 }
 
-/// Three axes as in the example of the documentation: int32 at 0.01 um a count.
+/// Three axes as in the example of the documentation: int32, 0.01 um per count.
 ModbusControllerConfig three_axes(int port) {
   ModbusControllerConfig config;
   config.name = "cnc";
@@ -57,7 +57,8 @@ std::int32_t int32_of(const ModbusMachine& machine, int address) {
 
 }  // namespace
 
-TEST_CASE("offsets stand in the controller's registers with sign and scale", "[controllers]") {
+TEST_CASE("offsets are written to the controller's registers with sign and scale",
+          "[controllers]") {
   ModbusMachine machine;
   ModbusController link(three_axes(machine.port()));
   Cycle cycle(link);
@@ -70,7 +71,7 @@ TEST_CASE("offsets stand in the controller's registers with sign and scale", "[c
   CHECK(std::abs(int32_of(machine, 4) + 60000.5) <= 0.5);
 }
 
-TEST_CASE("the heartbeat counts up with every write", "[controllers]") {
+TEST_CASE("the heartbeat is incremented by every write", "[controllers]") {
   ModbusMachine machine;
   ModbusController link(three_axes(machine.port()));
   Cycle cycle(link);
@@ -100,7 +101,7 @@ TEST_CASE("an invalid axis keeps its register and clears its bit", "[controllers
   CHECK(int32_of(machine, 2) == 200);
 }
 
-TEST_CASE("what the controller applies and measures is read back", "[controllers]") {
+TEST_CASE("applied offsets and signals are read back", "[controllers]") {
   ModbusMachine machine;
   machine.set_input(0, 0xFFFF);  // -500 counts of 0.01 um
   machine.set_input(1, 0xFE0C);
@@ -144,8 +145,7 @@ TEST_CASE("what the controller applies and measures is read back", "[controllers
   CHECK(link.health().kind == "modbus_tcp");
 }
 
-TEST_CASE("without read-back the registers that are written tell what stands in them",
-          "[controllers]") {
+TEST_CASE("without read-back the written registers give the start", "[controllers]") {
   ModbusMachine machine;
   machine.set_holding(2, 0xFFFF);  // -1500 counts
   machine.set_holding(3, 0xFA24);
@@ -160,7 +160,7 @@ TEST_CASE("without read-back the registers that are written tell what stands in 
   else
     CHECK(std::isnan(cycle.state().applied_um[1]));
   CHECK(cycle.state().applied_um[0] == 0.0);
-  // What is sent then is no reason to begin anew: it is not read back.
+  // Offsets sent afterwards are not read back and begin no new epoch.
   const std::uint32_t epoch = cycle.state().link_epoch;
   cycle.want(1, -14.0);
   REQUIRE(eventually([&] { return int32_of(machine, 2) == -1400; }));
@@ -170,7 +170,7 @@ TEST_CASE("without read-back the registers that are written tell what stands in 
   link.stop();
 }
 
-TEST_CASE("registers that do not hold what is written tell nothing", "[controllers]") {
+TEST_CASE("registers that do not hold the values written give no start", "[controllers]") {
   ModbusMachine machine;
   machine.shows = ModbusMachine::Shows::zeros;
   ModbusControllerConfig config = three_axes(machine.port());
@@ -181,7 +181,7 @@ TEST_CASE("registers that do not hold what is written tell nothing", "[controlle
   CHECK(cycle.state().applied_um[0] == 0.0);
   const std::uint32_t epoch = cycle.state().link_epoch;
   cycle.want(0, 3.0);
-  // Another link, of which nothing is known.
+  // Another link, with unknown offset.
   REQUIRE(eventually([&] {
     const ControllerState state = cycle.state();
     return state.online && !is_same_link(state.link_epoch, epoch);
@@ -191,7 +191,7 @@ TEST_CASE("registers that do not hold what is written tell nothing", "[controlle
   link.stop();
 }
 
-TEST_CASE("a controller that applies something else is seen", "[controllers]") {
+TEST_CASE("a controller that applies something else is detected", "[controllers]") {
   ModbusMachine machine;
   machine.mirrored = 6;
   ModbusController link(three_axes(machine.port()));
@@ -204,7 +204,7 @@ TEST_CASE("a controller that applies something else is seen", "[controllers]") {
   CHECK(int32_of(machine, 0) == 800);
 }
 
-TEST_CASE("a re-homed controller gets nothing that was computed before it was seen",
+TEST_CASE("a re-homed controller gets no offset computed before the re-homing was seen",
           "[controllers]") {
   ModbusMachine machine;
   machine.mirrored = 6;
@@ -213,7 +213,7 @@ TEST_CASE("a re-homed controller gets nothing that was computed before it was se
   cycle.want(0, 30.0);
   REQUIRE(eventually([&] { return cycle.state().applied_um[0] == Approx(30.0); }));
   const std::uint32_t epoch = cycle.state().link_epoch;
-  cycle.fixed_epoch = epoch;  // a cycle that has not noticed
+  cycle.fixed_epoch = epoch;  // the cycle has not noticed
   machine.mirrored = 0;
   machine.set_input(1, 0);  // the offset is gone, the connection is not
   REQUIRE(eventually([&] { return cycle.state().link_epoch > epoch; }));
@@ -238,8 +238,7 @@ TEST_CASE("nothing is written without a command of this epoch, not even a heartb
   REQUIRE(eventually([&] { return int32_of(machine, 0) == 500; }));
 }
 
-TEST_CASE("a controller that was switched off and on is read back before it is written",
-          "[controllers]") {
+TEST_CASE("a power-cycled controller is read back before it is written to", "[controllers]") {
   auto machine = std::make_unique<ModbusMachine>();
   machine->mirrored = 6;
   const int port = machine->port();
@@ -248,7 +247,7 @@ TEST_CASE("a controller that was switched off and on is read back before it is w
   cycle.want(0, 9.0);
   REQUIRE(eventually([&] { return cycle.state().applied_um[0] == Approx(9.0); }));
   const std::uint32_t epoch = cycle.state().link_epoch;
-  cycle.fixed_epoch = epoch;  // a cycle that has not noticed
+  cycle.fixed_epoch = epoch;  // the cycle has not noticed
   machine.reset();
   REQUIRE(eventually([&] { return !cycle.state().online; }));
   CHECK(cycle.state().link_epoch == epoch);
@@ -265,7 +264,7 @@ TEST_CASE("a controller that was switched off and on is read back before it is w
   CHECK(link.health().connects == 2);
 }
 
-TEST_CASE("a write that fails takes a new epoch and is not repeated with the old one",
+TEST_CASE("a failed write begins a new epoch and is not repeated with the old one",
           "[controllers]") {
   ModbusMachine machine;
   machine.mirrored = 6;
@@ -290,7 +289,7 @@ TEST_CASE("a write that fails takes a new epoch and is not repeated with the old
   REQUIRE(eventually([&] { return int32_of(machine, 0) == 400; }));
 }
 
-TEST_CASE("a controller that refuses writes is there, asked once a period, and not written",
+TEST_CASE("a controller that refuses writes is online, retried once a period, and not written",
           "[controllers]") {
   ModbusMachine machine;
   machine.mirrored = 6;
@@ -330,7 +329,7 @@ TEST_CASE("a controller that refuses writes is there, asked once a period, and n
   REQUIRE(eventually([&] { return !cycle.state().written; }));
 }
 
-TEST_CASE("a controller that ignores writes is there and not written", "[controllers]") {
+TEST_CASE("a controller that ignores writes is online and not written", "[controllers]") {
   ModbusMachine machine;
   machine.mirrored = 6;
   ModbusControllerConfig config = three_axes(machine.port());
@@ -349,7 +348,7 @@ TEST_CASE("a controller that ignores writes is there and not written", "[control
   REQUIRE(eventually([&] { return cycle.state().written; }));
 }
 
-TEST_CASE("a controller that is read for longer than a command lasts is written all the same",
+TEST_CASE("a controller whose read takes longer than a command is valid is still written to",
           "[controllers]") {
   ModbusMachine machine;
   machine.read_takes = 700ms;
@@ -373,7 +372,7 @@ TEST_CASE("a controller that is read for longer than a command lasts is written 
   CHECK(link.health().write.late >= 2);
 }
 
-TEST_CASE("a write that is not answered is not repeated before another look", "[controllers]") {
+TEST_CASE("an unanswered write is not repeated before another read", "[controllers]") {
   ModbusMachine machine;
   machine.mirrored = 6;
   ModbusController link(three_axes(machine.port()));
@@ -390,7 +389,7 @@ TEST_CASE("a write that is not answered is not repeated before another look", "[
   CHECK(machine.writes == writes);
 }
 
-TEST_CASE("a controller that cannot be read is offline and is not written", "[controllers]") {
+TEST_CASE("a controller that cannot be read is offline and not written to", "[controllers]") {
   ModbusMachine machine;
   machine.refuse_reads = true;
   ModbusController link(three_axes(machine.port()));
@@ -411,8 +410,7 @@ TEST_CASE("a controller that cannot be read is offline and is not written", "[co
   CHECK(cycle.state().link_epoch > epoch);
 }
 
-TEST_CASE("the heartbeat stops when the cycle stands still, and its return is a new epoch",
-          "[controllers]") {
+TEST_CASE("the heartbeat stops with the cycle, and its return is a new epoch", "[controllers]") {
   ModbusMachine machine;
   ModbusController link(three_axes(machine.port()));
   Cycle cycle(link);
@@ -421,12 +419,12 @@ TEST_CASE("the heartbeat stops when the cycle stands still, and its return is a 
   const std::uint32_t epoch = cycle.state().link_epoch;
   cycle.hung = true;
   std::uint16_t last = 0;
-  REQUIRE(eventually([&] {  // no beat between two looks 300 ms (15 periods) apart
+  REQUIRE(eventually([&] {  // no beat between two checks 300 ms (15 periods) apart
     last = machine.holding(heartbeat_at);
     std::this_thread::sleep_for(300ms);
     return machine.holding(heartbeat_at) == last;
   }));
-  CHECK(cycle.state().online);  // reading goes on
+  CHECK(cycle.state().online);  // still read
   std::this_thread::sleep_for(1200ms);
   CHECK(machine.holding(heartbeat_at) == last);
   cycle.hung = false;
@@ -434,10 +432,11 @@ TEST_CASE("the heartbeat stops when the cycle stands still, and its return is a 
   CHECK(cycle.state().link_epoch > epoch);
 }
 
-TEST_CASE("the link's end writes the newest command once more and nothing else", "[controllers]") {
+TEST_CASE("at its end the link writes the newest command once more and nothing else",
+          "[controllers]") {
   ModbusMachine machine;
   ModbusControllerConfig config = three_axes(machine.port());
-  config.period_s = 30.0;  // the next write of its own would be far away
+  config.period_s = 30.0;  // its own next write is far away
   ModbusController link(config);
   link.start();
   ControllerState state;
@@ -445,7 +444,7 @@ TEST_CASE("the link's end writes the newest command once more and nothing else",
     link.newest(state);
     return state.online;
   }));
-  // The first turn, which looks for a command too, is over.
+  // The first exchange, which looks for a command too, is over.
   int reads = -1;
   REQUIRE(eventually([&] {
     const int before = std::exchange(reads, machine.reads);
@@ -464,7 +463,7 @@ TEST_CASE("the link's end writes the newest command once more and nothing else",
   CHECK(machine.holding(valid_bits_at) == 1);
 }
 
-TEST_CASE("a controller that never answers neither delays the end nor is written",
+TEST_CASE("a controller that never answers does not delay the end and is not written",
           "[controllers]") {
   ModbusMachine machine;
   machine.mute = true;
@@ -475,11 +474,11 @@ TEST_CASE("a controller that never answers neither delays the end nor is written
   REQUIRE(eventually([&] { return machine.reads > 0; }));
   const nanoseconds before = monotonic_now();
   link.stop();
-  CHECK(monotonic_now() - before < 10s);  // the answer's time-out is a minute
+  CHECK(monotonic_now() - before < 10s);  // the time-out is a minute
   CHECK(machine.writes == 0);
 }
 
-TEST_CASE("a controller that is not there is tried again for ever", "[controllers]") {
+TEST_CASE("a missing controller is retried for ever", "[controllers]") {
   int port = 0;
   {
     const ModbusMachine machine;
@@ -493,7 +492,7 @@ TEST_CASE("a controller that is not there is tried again for ever", "[controller
   CHECK(link.health().last_error.empty());
 }
 
-TEST_CASE("a Modbus controller that cannot be is refused", "[controllers]") {
+TEST_CASE("an invalid Modbus controller is refused", "[controllers]") {
   const auto refused = [](auto change) {
     ModbusControllerConfig bad = three_axes(502);
     CHECK_NOTHROW(ModbusController(bad));

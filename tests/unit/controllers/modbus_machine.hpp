@@ -1,4 +1,4 @@
-// A CNC's Modbus TCP server in a thread (libmodbus' server side), for the tests of the link.
+// Modbus TCP server of a CNC in a thread (server side of libmodbus), for the tests of the link.
 #pragma once
 
 #include <algorithm>
@@ -21,8 +21,8 @@
 
 namespace thermocomp::test {
 
-/// Serves one client at a time on 127.0.0.1. Registers live as long as the object runs; start()
-/// begins with zeros, as a controller that was switched off.
+/// Serves one client at a time on 127.0.0.1. Registers live as long as the object; start() begins
+/// with zeros, as after power-on.
 class ModbusMachine {
  public:
   static constexpr int registers = 200;
@@ -71,22 +71,22 @@ class ModbusMachine {
     mapping_->tab_bits[address] = value ? 1 : 0;
   }
 
-  /// Input registers 0..n show what holding registers 0..n hold, as a controller that applies.
+  /// Input registers 0..n mirror holding registers 0..n, as of a controller that applies offsets.
   std::atomic<int> mirrored{0};
   /// Writes are refused with "slave device failure".
   std::atomic<bool> refuse_writes{false};
-  /// Writes are taken off the line and neither done nor answered.
+  /// Writes are received and neither done nor answered.
   std::atomic<bool> ignore_writes{false};
-  /// What a read takes.
+  /// Duration of a read.
   std::atomic<std::chrono::milliseconds> read_takes{std::chrono::milliseconds{0}};
-  /// The next write is lost in a restart: not answered, and what is shown is 0 from then on.
+  /// The next write is lost in a restart: not answered, and reads give 0 from then on.
   std::atomic<bool> restart_on_write{false};
   /// Reads are answered with "slave device failure".
   std::atomic<bool> refuse_reads{false};
-  /// What holding registers below 100 answer to a read: what they hold, an exception, or zeros.
+  /// Answer to a read of holding registers below 100: their content, an exception, or zeros.
   enum class Shows { all, exception, zeros };
   std::atomic<Shows> shows{Shows::all};
-  /// Requests are taken and never answered.
+  /// Requests are received and never answered.
   std::atomic<bool> mute{false};
   std::atomic<int> writes{0};
   std::atomic<int> reads{0};

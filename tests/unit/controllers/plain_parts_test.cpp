@@ -1,4 +1,4 @@
-// The parts of the controller links that need no bus.
+// Parts of the controller links that need no bus.
 #include <chrono>
 #include <cmath>
 
@@ -58,7 +58,7 @@ TEST_CASE("only commands of the newest epoch may be sent", "[controllers]") {
   CHECK(gate.verdict(0s) == SendVerdict::send);
 }
 
-TEST_CASE("a pause of the same link is told from another link", "[controllers]") {
+TEST_CASE("a pause of a link and another link have distinguishable epochs", "[controllers]") {
   WriteGate gate(100ms);
   const std::uint32_t first = gate.synchronised();
   const std::uint32_t looked_again = gate.synchronised();
@@ -70,12 +70,11 @@ TEST_CASE("a pause of the same link is told from another link", "[controllers]")
   CHECK(paused != looked_again);
   CHECK(is_same_link(first, paused));
   gate.lost();
-  gate.paused();  // lost all the same
+  gate.paused();  // now lost
   CHECK_FALSE(is_same_link(first, gate.synchronised()));
 }
 
-TEST_CASE("a link that is new for the millionth time still has an epoch of its own",
-          "[controllers]") {
+TEST_CASE("epochs stay unique after a million links", "[controllers]") {
   WriteGate gate(100ms);
   std::uint32_t before = 0;
   for (std::uint32_t i = 0; i < 3 * epochs_of_a_link / 2; ++i) {
@@ -94,23 +93,23 @@ TEST_CASE("a command computed more than two seconds ago is not sent", "[controll
   CHECK(gate.verdict(12s + 1ns) == SendVerdict::nothing_to_send);
 }
 
-TEST_CASE("written is what was confirmed on this link lately", "[controllers]") {
+TEST_CASE("written() is a recent confirmation on this link", "[controllers]") {
   WriteGate gate(100ms);
   gate.synchronised();
   gate.sent(100s);
-  CHECK_FALSE(gate.written(100s));  // on its way is not there
+  CHECK_FALSE(gate.written(100s));  // on its way is not confirmed
   gate.confirmed(100s);
   CHECK(gate.written(101s));
   CHECK_FALSE(gate.written(101s + 1ns));
   gate.paused();
-  CHECK(gate.written(101s));  // a write that was refused once does not undo the one before
+  CHECK(gate.written(101s));  // a refused write does not undo the one before
   gate.lost();
   CHECK_FALSE(gate.written(100s));
   gate.synchronised();
   CHECK_FALSE(gate.written(100s));
 }
 
-TEST_CASE("a controller that takes seconds for a turn is waited for", "[controllers]") {
+TEST_CASE("a controller whose exchange takes seconds is waited for", "[controllers]") {
   WriteGate gate(100ms);
   gate.synchronised();
   gate.turned(2300ms);
@@ -125,7 +124,7 @@ TEST_CASE("a controller that takes seconds for a turn is waited for", "[controll
   CHECK(gate.verdict(104601ms) == SendVerdict::resynchronise);
 }
 
-TEST_CASE("a long pause between two writes asks for a new epoch", "[controllers]") {
+TEST_CASE("a long pause between two writes requires a new epoch", "[controllers]") {
   const auto verdict_after = [](nanoseconds period, nanoseconds pause) {
     WriteGate gate(period);
     gate.synchronised();
@@ -140,7 +139,7 @@ TEST_CASE("a long pause between two writes asks for a new epoch", "[controllers]
   CHECK(verdict_after(1s, 5s + 1ns) == SendVerdict::resynchronise);
 }
 
-TEST_CASE("the wait for the first command of an epoch is no pause", "[controllers]") {
+TEST_CASE("the wait for the first command of an epoch does not count as a pause", "[controllers]") {
   WriteGate gate(100ms);
   gate.synchronised();
   gate.offered(of_epoch(1), 1000s);
@@ -165,7 +164,7 @@ TEST_CASE("the first command of an epoch is looked for early, a few times", "[co
   CHECK(gate.next_pause() == 100ms);
 }
 
-TEST_CASE("an axis on its way to what it was sent lately is explained, one elsewhere is not",
+TEST_CASE("an axis on its way to an offset sent lately is explained, one elsewhere is not",
           "[controllers]") {
   WriteGate gate(100ms, {0.01});
   static_cast<void>(gate.synchronised());
@@ -182,22 +181,22 @@ TEST_CASE("an axis on its way to what it was sent lately is explained, one elsew
   };
   send(14.0);
   send(12.0);
-  applied_um[0] = 13.9;  // late: still where it was sent before
+  applied_um[0] = 13.9;  // late: still at an earlier offset
   CHECK(gate.explains(applied_um));
   applied_um[0] = 11.0;
   CHECK(gate.explains(applied_um));
-  applied_um[0] = not_a_number;  // not told says nothing
+  applied_um[0] = not_a_number;  // no read-back: no decision
   CHECK(gate.explains(applied_um));
   applied_um[0] = 11.0;
   CHECK(gate.explains(applied_um));
   applied_um[0] = 0.0;  // re-homed
   CHECK_FALSE(gate.explains(applied_um));
-  // A new epoch begins from there.
+  // A new epoch starts from there.
   static_cast<void>(gate.synchronised());
   CHECK(gate.explains(applied_um));
 }
 
-TEST_CASE("what was computed before an axis went elsewhere is not sent", "[controllers]") {
+TEST_CASE("a command computed before an axis moved elsewhere is not sent", "[controllers]") {
   WriteGate gate(100ms);
   std::array<double, axes_max> applied_um{};
   applied_um.fill(not_a_number);
@@ -208,7 +207,7 @@ TEST_CASE("what was computed before an axis went elsewhere is not sent", "[contr
   command.valid[0] = true;
   command.look = gate.look();
   CHECK(gate.explains(applied_um));
-  applied_um[0] = 0.0;  // re-homed; no command of this epoch is known yet
+  applied_um[0] = 0.0;  // re-homed; no command of this epoch yet
   CHECK(gate.explains(applied_um));
   gate.offered(command, 0s);
   CHECK(gate.verdict(0s) == SendVerdict::resynchronise);
@@ -223,7 +222,7 @@ TEST_CASE("what was computed before an axis went elsewhere is not sent", "[contr
   CHECK(gate.verdict(0s) == SendVerdict::send);
 }
 
-TEST_CASE("an axis that was never sent anything may go where it likes", "[controllers]") {
+TEST_CASE("an axis that was never sent an offset is always explained", "[controllers]") {
   WriteGate gate(100ms);
   static_cast<void>(gate.synchronised());
   std::array<double, axes_max> applied_um{};
@@ -232,7 +231,7 @@ TEST_CASE("an axis that was never sent anything may go where it likes", "[contro
   CHECK(gate.explains(applied_um));
 }
 
-TEST_CASE("neighbours are read in one request and far ones are not", "[controllers]") {
+TEST_CASE("neighbours are read in one request, distant registers are not", "[controllers]") {
   const std::vector<ModbusValue> values{
       value_at(ModbusTable::input, 26),
       value_at(ModbusTable::input, 0, Encoding::int32),
@@ -257,7 +256,7 @@ TEST_CASE("neighbours are read in one request and far ones are not", "[controlle
   }
 }
 
-TEST_CASE("a controller's gaps and requests are as it allows", "[controllers]") {
+TEST_CASE("gaps and request sizes follow the configuration", "[controllers]") {
   const std::vector<ModbusValue> values{value_at(ModbusTable::input, 0),
                                         value_at(ModbusTable::input, 4),
                                         value_at(ModbusTable::input, 5)};
@@ -284,7 +283,7 @@ TEST_CASE("no read request is larger than the protocol allows", "[controllers]")
   CHECK(plan_reads({}, {}).requests.empty());
 }
 
-TEST_CASE("touching registers are written together, others are left alone", "[controllers]") {
+TEST_CASE("adjacent registers are written together, others are not touched", "[controllers]") {
   const auto requests = join_writes({{11, WriteStage::heartbeat, {9}},
                                      {2, WriteStage::offset, {3, 4}},
                                      {0, WriteStage::offset, {1, 2}},
@@ -299,8 +298,7 @@ TEST_CASE("touching registers are written together, others are left alone", "[co
   CHECK(requests[2].words == std::vector<std::uint16_t>{7, 9});
 }
 
-TEST_CASE("the heartbeat reaches the controller after the offsets it vouches for",
-          "[controllers]") {
+TEST_CASE("the heartbeat is written after the offsets it confirms", "[controllers]") {
   const auto requests = join_writes({{0, WriteStage::heartbeat, {1}},
                                      {2, WriteStage::valid_bits, {1}},
                                      {4, WriteStage::offset, {1}},
@@ -319,7 +317,7 @@ TEST_CASE("the heartbeat reaches the controller after the offsets it vouches for
   CHECK(split[1].address == 123);
 }
 
-TEST_CASE("a dry run applies what it is offered and shows it", "[controllers]") {
+TEST_CASE("a dry run applies and shows the offered offsets", "[controllers]") {
   const auto link = make_controller(DryRunControllerConfig{"bench", 2});
   ControllerState state;
   link->newest(state);
@@ -359,7 +357,7 @@ TEST_CASE("a dry run applies what it is offered and shows it", "[controllers]") 
 
 namespace {
 
-/// A link that shows what the test says and notes whether it was ever offered anything.
+/// A link with a given state that records whether it was offered anything.
 class ShownLink final : public ControllerLink {
  public:
   ShownLink(ControllerState& shown, int& offers) : shown_(shown), offers_(offers) {}
@@ -380,7 +378,7 @@ class ShownLink final : public ControllerLink {
 
 }  // namespace
 
-TEST_CASE("a dry run passes on what a controller shows and never offers it anything",
+TEST_CASE("a dry run passes on the controller's state and never offers it anything",
           "[controllers]") {
   ControllerState shown;
   int offers = 0;
@@ -398,7 +396,7 @@ TEST_CASE("a dry run passes on what a controller shows and never offers it anyth
   CHECK(state.online);
   CHECK(state.link_epoch == 3);
   CHECK(state.signals[0] == 250.0);
-  CHECK(state.applied_um[0] == 0.0);  // of what it would apply, not of what it does
+  CHECK(state.applied_um[0] == 0.0);  // what it would apply, not what the controller applies
   CHECK(link.health().shown_um->at(0) == 40.0);
   CHECK(link.health().kind == "shown");
 
@@ -422,7 +420,7 @@ TEST_CASE("a dry run passes on what a controller shows and never offers it anyth
   CHECK(offers == 0);
 }
 
-TEST_CASE("a CAN controller that cannot be is refused", "[controllers][can]") {
+TEST_CASE("an invalid CAN controller is refused", "[controllers][can]") {
   CanControllerConfig good;
   good.name = "cnc";
   good.interface = "can0";
@@ -444,7 +442,7 @@ TEST_CASE("a CAN controller that cannot be is refused", "[controllers][can]") {
   refused([](auto& bad) { bad.period_s = -1.0; });
 }
 
-TEST_CASE("a controller that moves between read-back and first command is noticed",
+TEST_CASE("a controller that moves between read-back and first command is detected",
           "[controllers][gate]") {
   WriteGate gate(100ms);
   std::array<double, axes_max> applied_um{};
@@ -456,10 +454,10 @@ TEST_CASE("a controller that moves between read-back and first command is notice
   command.valid[0] = true;
   gate.offered(command, 1s);
   CHECK(gate.explains(applied_um));
-  applied_um[0] = -11.0;  // re-homed before anything was sent in this epoch
+  applied_um[0] = -11.0;  // re-homed before the first command of this epoch
   CHECK_FALSE(gate.explains(applied_um));
-  CHECK_FALSE(gate.explains(applied_um));  // nor is it the next time
-  // An axis that is not to be driven may go where it likes.
+  CHECK_FALSE(gate.explains(applied_um));  // nor the next time
+  // An axis that is not to be driven is always explained.
   command.link_epoch = gate.synchronised(applied_um);
   command.valid[0] = false;
   gate.offered(command, 2s);
@@ -467,7 +465,8 @@ TEST_CASE("a controller that moves between read-back and first command is notice
   CHECK(gate.explains(applied_um));
 }
 
-TEST_CASE("a CAN controller says at its start that the system has no CAN", "[controllers][can]") {
+TEST_CASE("a CAN controller reports at its start that the system has no CAN",
+          "[controllers][can]") {
   if (can_unavailable().empty()) {
     WARN("this system has CAN: nothing to see here");
     return;

@@ -1,4 +1,4 @@
-// Offsets along a travel as a set of CAN frames, and what a reader makes of frames that are lost.
+// Offsets along a travel as a set of CAN frames, and their assembly when frames are lost.
 #include "drivers/controllers/kinds/can/travel_frames.hpp"
 
 #include <algorithm>
@@ -33,7 +33,7 @@ CanSignal number_at(std::uint32_t id, int start_bit, int length_bits = 8) {
   return signal;
 }
 
-/// K0 in 0x210, slope and P0 in 0x211; the number at different places.
+/// K0 in 0x210, slope and P0 in 0x211; the number at different positions.
 CanTravel line() {
   CanTravel travel;
   travel.nodes_mm = {-100.0, 700.0};
@@ -45,7 +45,7 @@ CanTravel line() {
   return travel;
 }
 
-/// Five offsets in so many frames: one of CAN FD, or two or three classic ones.
+/// Five offsets in `frames` frames: one of CAN FD, or two or three classic ones.
 CanTravel table(std::size_t frames) {
   CanTravel travel;
   travel.nodes_mm = {0.0, 100.0, 300.0, 600.0, 800.0};
@@ -82,7 +82,7 @@ std::vector<CanFrame> frames_of(const CanTravel& travel, std::uint64_t number,
   return frames;
 }
 
-/// As a reader has the set, rounded to counts.
+/// The set as received, rounded to counts.
 std::vector<double> rounded(const CanTravel& travel, std::uint64_t number,
                             std::span<const double> offset_um) {
   CanSetReader reader(travel.sent);
@@ -110,7 +110,7 @@ CanControllerConfig config_of(const CanTravel& travel) {
 
 }  // namespace
 
-TEST_CASE("each frame of a set carries its number beside its values", "[controllers][travel]") {
+TEST_CASE("each frame of a set carries its number with its values", "[controllers][travel]") {
   const std::vector<double> offset_um{-4.0, 12.0};  // 20 um/m, 2 um at P0
   const auto frames = frames_of(line(), 0xA7, offset_um);
   REQUIRE(frames.size() == 2);
@@ -122,13 +122,13 @@ TEST_CASE("each frame of a set carries its number beside its values", "[controll
   CHECK(bytes(1) == std::vector<int>{0x20, 0x4E, 0x00, 0xD0, 0x07, 0, 0, 0xA7});  // 20000, 2000
 }
 
-TEST_CASE("a number goes on from 0 when its bits are full", "[controllers][travel]") {
+TEST_CASE("a number wraps to 0", "[controllers][travel]") {
   const std::vector<double> offset_um{1.0, 2.0};
   CHECK(set_numbers(line().sent) == 256);
   CHECK(frames_of(line(), 256 + 3, offset_um)[0].data[3] == 3);
 }
 
-TEST_CASE("what stands beside a set in its frame stays", "[controllers][travel]") {
+TEST_CASE("other bits in a frame of a set are unchanged", "[controllers][travel]") {
   CanFrame frame;
   frame.id = {0x210, false};
   frame.size = 8;
@@ -139,7 +139,7 @@ TEST_CASE("what stands beside a set in its frame stays", "[controllers][travel]"
   CHECK(frame.data[7] == 0xFF);
 }
 
-TEST_CASE("a set is whole when all of its frames have come, in any order",
+TEST_CASE("a set is complete when all of its frames have come, in any order",
           "[controllers][travel]") {
   const CanTravel travel = table(3);
   const std::vector<double> offset_um{1.0, -2.0, 3.0, -4.0, 5.0};
@@ -161,7 +161,7 @@ TEST_CASE("a set is whole when all of its frames have come, in any order",
   } while (std::next_permutation(order.begin(), order.end()));
 }
 
-TEST_CASE("a frame of another identifier or too short is none of the set",
+TEST_CASE("a frame with another identifier or too short is not part of the set",
           "[controllers][travel]") {
   const CanTravel travel = table(2);
   const auto frames = frames_of(travel, 9, std::vector<double>(5, 1.0));
@@ -179,13 +179,13 @@ TEST_CASE("a frame of another identifier or too short is none of the set",
   CHECK(reader.take(frames[1]) == Taken::whole);
 }
 
-TEST_CASE("whatever of two sets comes in whatever order and number, one whole set is in effect",
+TEST_CASE("for any order and numbers of the frames of two sets, one complete set is in effect",
           "[controllers][travel]") {
   const std::size_t count = GENERATE(range(1u, 4u));
   const std::uint64_t first = GENERATE(7u, 254u, 255u);
   CAPTURE(count, first);
   const CanTravel travel = table(count);
-  // All values differ, so that any mixture would be seen.
+  // All values differ, so that any mixture is detected.
   const std::vector<std::vector<double>> offset_um{
       {1.0, 2.0, 3.0, 4.0, 5.0}, {11.0, 12.0, 13.0, 14.0, 15.0}, {-1.0, -2.0, -3.0, -4.0, -5.0}};
   std::vector<std::vector<double>> sets;
@@ -206,7 +206,7 @@ TEST_CASE("whatever of two sets comes in whatever order and number, one whole se
   for (std::size_t sequence = 0; sequence < sequences; ++sequence) {
     CanSetReader reader(travel.sent);
     for (const CanFrame& frame : former) reader.take(frame);
-    std::vector<std::size_t> newest(count, 0);  // the set of each identifier's newest frame
+    std::vector<std::size_t> newest(count, 0);  // set of each identifier's newest frame
     std::size_t expected = 0;
     std::size_t rest = sequence;
     for (std::size_t i = 0; i < length; ++i, rest /= symbols.size()) {
@@ -230,7 +230,7 @@ TEST_CASE("whatever of two sets comes in whatever order and number, one whole se
   CHECK((count == 1 || in_effect[0] > 0));
 }
 
-TEST_CASE("a link that loses, repeats and breaks off frames never makes a mixture",
+TEST_CASE("a link that loses, repeats and breaks off frames never gives a mixture",
           "[controllers][travel][property]") {
   const auto seed = GENERATE(range(0u, 100u));
   CAPTURE(seed);
@@ -245,7 +245,7 @@ TEST_CASE("a link that loses, repeats and breaks off frames never makes a mixtur
   std::uint64_t number = engine();
   for (int turn = 0; turn < 2000; ++turn) {
     now += std::chrono::milliseconds(10);
-    // A sender that begins anew goes on half-way round, after a silence.
+    // A restarted sender continues half-way round, after a silence.
     if (engine() % 400 == 0) {
       now += 1s;
       number += set_numbers(travel.sent) / 2;
@@ -257,7 +257,7 @@ TEST_CASE("a link that loses, repeats and breaks off frames never makes a mixtur
     if (engine() % 8 == 0) frames.push_back(frames[engine() % frames.size()]);
     if (engine() % 8 == 0) std::shuffle(frames.begin(), frames.end(), engine);
     const std::size_t breaks_at = engine() % 8 == 0 ? engine() % frames.size() : frames.size();
-    // At times one identifier does not come through for longer than the numbers go round.
+    // At times one identifier is lost for longer than a round of numbers.
     const bool deaf = turn / 300 % 2 == 1;
     for (std::size_t i = 0; i < breaks_at; ++i) {
       const bool is_lost = engine() % 8 == 0 || (deaf && frames[i].id == frames[0].id);
@@ -278,14 +278,14 @@ TEST_CASE("a link that loses, repeats and breaks off frames never makes a mixtur
   CHECK(lost > 100);
 }
 
-TEST_CASE("a number that has come round completes no set with a frame that is forgotten",
+TEST_CASE("a number that has wrapped around completes no set with an expired frame",
           "[controllers][travel]") {
   const CanTravel travel = table(2);
   const auto old = frames_of(travel, 4, std::vector<double>(5, 1.0), 10s);
   const auto young = frames_of(travel, 4 + 256, std::vector<double>(5, 2.0), 12s);
   CanSetReader careless(travel.sent);
   careless.take(old[0]);
-  CHECK(careless.take(young[1]) == Taken::whole);  // the mixture that the rule is for
+  CHECK(careless.take(young[1]) == Taken::whole);  // the mixture that the rule prevents
   CanSetReader reader(travel.sent);
   reader.take(old[0]);
   reader.forget_before(11s);
@@ -296,7 +296,7 @@ TEST_CASE("a number that has come round completes no set with a frame that is fo
   CHECK(reader.values()[0] == Approx(2.0));
 }
 
-TEST_CASE("a node moves by one count of each value that it is made of", "[controllers][travel]") {
+TEST_CASE("a node moves by one count of each value that it depends on", "[controllers][travel]") {
   CHECK(resolution_um(line(), line().sent, 1) == Approx(0.001 + 0.0005));
   CHECK(resolution_um(line(), table(2).applied, 1) == 0.0);  // not read back
   CHECK(resolution_um(table(2), table(2).sent, 4) == Approx(0.01));
@@ -308,7 +308,7 @@ TEST_CASE("a node moves by one count of each value that it is made of", "[contro
   CHECK(resolution_um(floats, floats.sent, 4) == 0.0);
 }
 
-TEST_CASE("sets that cannot be in frames are refused", "[controllers][travel]") {
+TEST_CASE("impossible sets of frames are refused", "[controllers][travel]") {
   CHECK_NOTHROW(CanController(config_of(line())));
   CHECK_NOTHROW(CanController(config_of(table(3))));
   const auto refused = [](const char* rule, CanTravel travel, auto change) {

@@ -59,11 +59,11 @@ ModbusTravel table() {
   return travel;
 }
 
-/// A controller's reader: `end` first, then the values, then `begin`; may be stopped between any
-/// two registers, and then takes nothing over.
+/// A controller's reader: `end` first, then the values, then `begin`; it may stop between any two
+/// registers, and then takes nothing over.
 class Reader {
  public:
-  /// Reads one register more; takes the set over when all are read and both numbers are equal.
+  /// Reads one more register; takes the set over when all are read and both numbers are equal.
   void read_one(const std::vector<std::uint16_t>& registers) {
     const std::size_t place = registers.size() - 1 - next_;
     copy_.resize(registers.size());
@@ -89,7 +89,7 @@ double value_in(const std::vector<std::uint16_t>& block, const ModbusTravel& tra
       .value;
 }
 
-/// What a controller makes of a set at a position.
+/// Offset that a controller interpolates from a set at a position.
 double interpolated(const std::vector<std::uint16_t>& block, const ModbusTravel& travel,
                     double position_mm) {
   if (travel.p0_mm)
@@ -132,12 +132,12 @@ TEST_CASE("a line is K0 at P0 and its slope", "[controllers][travel]") {
   REQUIRE(field.words.size() == 8);
   CHECK(field.words.front() == 7);
   CHECK(field.words.back() == 7);
-  CHECK(value_in(field.words, line(), 0) == Approx(2.0));   // 300 mm on the way at 20 um/m
+  CHECK(value_in(field.words, line(), 0) == Approx(2.0));   // 300 mm along at 20 um/m
   CHECK(value_in(field.words, line(), 1) == Approx(20.0));  // um/m
   CHECK(value_in(field.words, line(), 2) == Approx(200.0));
 }
 
-TEST_CASE("what is shown gives the offsets at the nodes back, by the P0 that is shown",
+TEST_CASE("a read-back gives the offsets at the nodes, with the P0 read back",
           "[controllers][travel]") {
   std::vector<double> offset_um(2);
   offsets_shown(line(), std::vector<double>{2.0, 20.0, 200.0}, offset_um);
@@ -150,7 +150,7 @@ TEST_CASE("what is shown gives the offsets at the nodes back, by the P0 that is 
   CHECK(shown_resolution_um(line(), 1) == Approx(0.001 + 0.0005));
 }
 
-TEST_CASE("bound and slew hold over the whole travel, the rounding of registers apart",
+TEST_CASE("bound and slew hold over the whole travel, apart from rounding of registers",
           "[controllers][travel][property]") {
   const auto seed = GENERATE(range(0u, 100u));
   CAPTURE(seed);
@@ -180,7 +180,7 @@ TEST_CASE("bound and slew hold over the whole travel, the rounding of registers 
   }
 }
 
-TEST_CASE("a controller that stops reading in between never applies a mixture",
+TEST_CASE("a controller that stops reading half-way never applies a mixture",
           "[controllers][travel][property]") {
   const auto seed = GENERATE(range(0u, 100u));
   CAPTURE(seed);
@@ -191,7 +191,7 @@ TEST_CASE("a controller that stops reading in between never applies a mixture",
   sets.push_back(registers);
   Reader reader;
   std::size_t taken = 0;
-  // Registers are written and read one at a time, in any interleaving, and both may break off.
+  // Registers are written and read one at a time, in any interleaving, and both may stop.
   for (std::uint64_t number = 1; number < 300; ++number) {
     std::vector<double> offset_um(travel.nodes_mm.size());
     for (double& each : offset_um) each = static_cast<double>(engine() % 6000) / 100.0;
@@ -206,16 +206,16 @@ TEST_CASE("a controller that stops reading in between never applies a mixture",
       CHECK(std::find(sets.begin(), sets.end(), *reader.taken) != sets.end());
       reader.taken.reset();
     }
-    // At times the link rests, and a reader gets through.
+    // At times the link rests, and a reader completes a set.
     if (engine() % 2 == 0) continue;
     for (std::size_t reads = engine() % 20; reads > 0; --reads) reader.read_one(registers);
   }
   CHECK(taken > 20);
 }
 
-TEST_CASE("a set goes in one block, and its number counts up", "[controllers][travel]") {
+TEST_CASE("a set is written as one block, and its number counts up", "[controllers][travel]") {
   ModbusMachine machine;
-  machine.set_holding(20, 40);  // a set that was broken off
+  machine.set_holding(20, 40);  // an incomplete set
   machine.set_holding(27, 39);
   machine.mirrored = 28;
   ModbusController link(config_of(machine.port(), line()));
@@ -235,7 +235,7 @@ TEST_CASE("a set goes in one block, and its number counts up", "[controllers][tr
   CHECK(cycle.state().applied_um[2] == Approx(3.0));
 }
 
-TEST_CASE("the first set of a link has another number than the one that stands in `end`",
+TEST_CASE("the first set of a link has another number than the one in `end`",
           "[controllers][travel]") {
   ModbusMachine machine;
   machine.set_holding(27, 0xFFFF);
@@ -248,7 +248,7 @@ TEST_CASE("the first set of a link has another number than the one that stands i
   CHECK(machine.holding(20) == machine.holding(27));
 }
 
-TEST_CASE("while one node must stand, nothing of the set is written and its bit is 0",
+TEST_CASE("while one node must stay, no value of the set is written and its bit is 0",
           "[controllers][travel]") {
   ModbusMachine machine;
   ModbusController link(config_of(machine.port(), table()));
@@ -265,7 +265,7 @@ TEST_CASE("while one node must stand, nothing of the set is written and its bit 
   CHECK(machine.holding(26) == number);
 }
 
-TEST_CASE("sets that cannot be are refused", "[controllers][travel]") {
+TEST_CASE("impossible sets are refused", "[controllers][travel]") {
   const auto refused = [](ModbusTravel travel, auto change) {
     change(travel);
     CHECK_THROWS_AS(ModbusController(config_of(1, travel)), InvalidValue);
@@ -278,7 +278,7 @@ TEST_CASE("sets that cannot be are refused", "[controllers][travel]") {
   refused(table(), [](auto& bad) { bad.begin.encoding = Encoding::float32; });
 }
 
-TEST_CASE("a set that stands in its registers tells the offsets at the nodes", "[controllers]") {
+TEST_CASE("a set in its registers gives the offsets at the nodes", "[controllers]") {
   ModbusAxis axis;
   axis.travel = ModbusTravel{};
   ModbusTravel& travel = *axis.travel;
@@ -297,7 +297,7 @@ TEST_CASE("a set that stands in its registers tells the offsets at the nodes", "
   WriteField field = travel_field(travel, 9, offset_um);
   CHECK(written.decode(field.words)[0] == Approx(-7.5));
   CHECK(written.decode(field.words)[1] == Approx(12.5));
-  field.words.back() = 8;  // broken off
+  field.words.back() = 8;  // incomplete
   CHECK(std::isnan(written.decode(field.words)[0]));
   CHECK(std::isnan(written.decode({})[1]));
 }

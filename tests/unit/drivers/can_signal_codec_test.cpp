@@ -1,4 +1,4 @@
-// Frames written out by hand from the DBC numbering, then the same by seed.
+// Frames written by hand from the DBC numbering, then random ones.
 #include <array>
 #include <bit>
 #include <cmath>
@@ -55,7 +55,7 @@ const std::vector<HandComputed>& hand_computed() {
   static const std::vector<HandComputed> frames{
       {"Intel, 8 bits, byte 0", {0xAB}, intel(0, 8), 0xAB},
       {"Intel, 16 bits, bytes 0-1", {0x34, 0x12}, intel(0, 16), 0x1234},
-      // 22.5 degC at 0.1 degC a count = 225 = 0x00E1
+      // 22.5 degC at 0.1 degC per count = 225 = 0x00E1
       {"Intel, 16 bits signed scaled",
        {0, 0, 0xE1, 0x00},
        scaled(intel(16, 16, true), 0.1, 0.0),
@@ -117,7 +117,7 @@ Frame random_frame(std::mt19937_64& random) {
   return std::bit_cast<Frame>(random());
 }
 
-/// The value of a signal read bit by bit along the numbering's definition.
+/// The value of a signal, read bit by bit by the definition of the numbering.
 std::uint64_t read_bit_by_bit(std::span<const std::uint8_t> frame, const CanSignal& signal) {
   std::uint64_t raw = 0;
   int bit = signal.start_bit;
@@ -147,7 +147,7 @@ TEST_CASE("a CAN signal is decoded as computed by hand", "[can]") {
   }
 }
 
-TEST_CASE("a CAN value is put into exactly its own bits", "[can]") {
+TEST_CASE("a CAN value is written to exactly its own bits", "[can]") {
   for (const HandComputed& example : hand_computed()) {
     CAPTURE(example.what);
     const std::uint64_t own = bits_of(example.signal).to_ullong();
@@ -163,8 +163,7 @@ TEST_CASE("a CAN value is put into exactly its own bits", "[can]") {
   }
 }
 
-TEST_CASE("signals anywhere in 8 and 64 bytes are put in and come out bit by bit",
-          "[can][property]") {
+TEST_CASE("signals anywhere in 8 and 64 bytes are written and read bit by bit", "[can][property]") {
   const int bytes = GENERATE(8, 64);
   const auto seed = GENERATE(range(0u, 300u));
   std::mt19937_64 random(seed);
@@ -178,7 +177,7 @@ TEST_CASE("signals anywhere in 8 and 64 bytes are put in and come out bit by bit
     REQUIRE_NOTHROW(check(signal));
     REQUIRE(bits_of(signal).count() == static_cast<std::size_t>(signal.length_bits));
     auto after = before;
-    // No byte behind the signal is looked at: a frame that ends there will do.
+    // No byte after the signal is read: a frame that ends there is enough.
     const std::span<std::uint8_t> just_enough(after.data(), bytes_needed(signal));
     insert_raw(just_enough, signal, wanted);
     REQUIRE(extract_raw(just_enough, signal) == wanted);
@@ -190,7 +189,7 @@ TEST_CASE("signals anywhere in 8 and 64 bytes are put in and come out bit by bit
   }
 }
 
-TEST_CASE("a multiplexed signal is in the frames that show its page", "[can]") {
+TEST_CASE("a multiplexed signal is in the frames with its page", "[can]") {
   CanSignal signal = intel(8, 16);
   signal.selectors = {{{0, 4, ByteOrder::little_endian}, {{2, 2}, {5, 7}}}};
   const auto carried = [&](std::uint8_t first) {
@@ -203,7 +202,7 @@ TEST_CASE("a multiplexed signal is in the frames that show its page", "[can]") {
   CHECK_FALSE(carried(0));
   CHECK_FALSE(carried(3));
   CHECK_FALSE(carried(8));
-  // The second multiplexor is itself on a page of the first: both must agree.
+  // The second multiplexor is itself on a page of the first: both must match.
   signal.selectors.push_back({{7, 1, ByteOrder::big_endian}, {{1, 1}}});
   CHECK(carried(0x82));
   CHECK_FALSE(carried(0x02));
@@ -221,7 +220,7 @@ TEST_CASE("a frame too short for its multiplexor is bad, not of another page", "
   CHECK(decode(whole.first(2), signal).fault == Fault::bad_frame);
 }
 
-TEST_CASE("a random value survives the frame within half a count", "[can][property]") {
+TEST_CASE("a random value is preserved within half a count", "[can][property]") {
   const auto seed = GENERATE(range(0u, 200u));
   std::mt19937_64 random(seed);
   CanSignal signal = random_signal(random);
@@ -239,7 +238,7 @@ TEST_CASE("a random value survives the frame within half a count", "[can][proper
   CHECK(std::abs(decode(frame, signal).value - value) <= 0.5 * signal.scale + slack);
 }
 
-TEST_CASE("a value beyond a CAN signal is saturated and told", "[can]") {
+TEST_CASE("a value beyond a CAN signal is saturated and reported", "[can]") {
   const double big = 1e300;
   const double infinite = std::numeric_limits<double>::infinity();
   for (const CanSignal& signal :
@@ -267,7 +266,7 @@ TEST_CASE("a value beyond a CAN signal is saturated and told", "[can]") {
   CHECK(decode(frame, floating(intel(0, 32))).value == std::numeric_limits<float>::max());
 }
 
-TEST_CASE("NaN is never put into a frame", "[can]") {
+TEST_CASE("NaN is never written to a frame", "[can]") {
   Frame frame;
   frame.fill(0x5A);
   const Frame before = frame;
@@ -305,7 +304,7 @@ TEST_CASE("a CAN frame too short for the signal is a bad frame", "[can]") {
   CHECK(decode(whole.first(0), intel(0, 1)).fault == Fault::bad_frame);
 }
 
-TEST_CASE("a float that is no number is out of range", "[can]") {
+TEST_CASE("a non-finite float is out of range", "[can]") {
   const CanSignal signal = floating(intel(0, 32));
   const Frame quiet_nan{0x00, 0x00, 0xC0, 0x7F};
   const Frame infinite{0x00, 0x00, 0x80, 0xFF};
@@ -313,7 +312,7 @@ TEST_CASE("a float that is no number is out of range", "[can]") {
   CHECK(decode(infinite, signal).fault == Fault::out_of_range);
 }
 
-TEST_CASE("a CAN signal that cannot be is refused by key", "[can]") {
+TEST_CASE("an invalid CAN signal is refused with its key", "[can]") {
   const auto refused_key = [](const CanSignal& signal) -> std::string {
     try {
       check(signal);
@@ -356,7 +355,7 @@ TEST_CASE("a CAN signal that cannot be is refused by key", "[can]") {
   CHECK(refused_key(wide_id) == "id");
 }
 
-TEST_CASE("a status in the frame decides whether the value is one", "[can]") {
+TEST_CASE("a status in the frame decides whether the value is good", "[can]") {
   CanSignal signal = intel(0, 16);
   signal.sentinels = {{0x7FFF, Fault::open_circuit}};
   signal.status = CanStatus{{16, 8, ByteOrder::little_endian}, 0x07, {}};
@@ -367,7 +366,8 @@ TEST_CASE("a status in the frame decides whether the value is one", "[can]") {
   CHECK(seen({0xFA, 0x00, 0x06}).value == 250.0);                // listed as good
   CHECK(seen({0xFA, 0x00, 0x02}).fault == Fault::out_of_range);
   CHECK(seen({0xFA, 0x00, 0x01}).fault == Fault::device_error);  // listed nowhere
-  CHECK(seen({0xFF, 0x7F, 0x02}).fault == Fault::open_circuit);  // the value's own code says more
+  CHECK(seen({0xFF, 0x7F, 0x02}).fault ==
+        Fault::open_circuit);  // the value's own code takes precedence
   CHECK(seen({0xFA, 0x00}).fault == Fault::bad_frame);
   CHECK(bytes_needed(signal) == 3);
   signal.status->codes = {{2, Fault::out_of_range}};

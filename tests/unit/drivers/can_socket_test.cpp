@@ -1,4 +1,4 @@
-// What of the CAN socket needs no CAN in the kernel; the rest is in tests/vm.
+// Parts of the CAN socket that need no CAN in the kernel; the rest is in tests/vm.
 #include "drivers/can/can_socket.hpp"
 
 #include <chrono>
@@ -11,14 +11,14 @@
 using namespace thermocomp;
 using namespace std::chrono_literals;
 
-TEST_CASE("a frame's wall clock stamp becomes a monotonic time by its age", "[can]") {
+TEST_CASE("a wall clock stamp becomes a monotonic time by its age", "[can]") {
   const nanoseconds realtime = 1'700'000'000s;
   const nanoseconds monotonic = 5000s;
   CHECK(monotonic_stamp(realtime - 3ms, realtime, monotonic) == monotonic - 3ms);
   CHECK(monotonic_stamp(realtime, realtime, monotonic) == monotonic);
 }
 
-TEST_CASE("a step of the wall clock makes no frame younger than now or older than a second",
+TEST_CASE("a step of the wall clock makes no frame newer than now or older than a second",
           "[can]") {
   const nanoseconds realtime = 1'700'000'000s;
   const nanoseconds monotonic = 5000s;
@@ -26,7 +26,7 @@ TEST_CASE("a step of the wall clock makes no frame younger than now or older tha
   CHECK(monotonic_stamp(realtime - 3600s, realtime, monotonic) == monotonic - 1s);
 }
 
-TEST_CASE("a CAN interface that is not there is reported by name and does no harm", "[can]") {
+TEST_CASE("a missing CAN interface is reported by name", "[can]") {
   CanSocket socket("nosuchcan0", {{0x123, false}});
   CHECK_FALSE(socket.open());
   CHECK_FALSE(socket.is_open());
@@ -35,7 +35,7 @@ TEST_CASE("a CAN interface that is not there is reported by name and does no har
   CHECK_FALSE(socket.send(CanFrame{}));
 }
 
-TEST_CASE("a CAN FD frame has one of the sizes that exist", "[can]") {
+TEST_CASE("a CAN FD frame has a valid size", "[can]") {
   for (std::size_t size = 0; size <= 8; ++size) CHECK(whole_frame_bytes(size) == size);
   CHECK(whole_frame_bytes(9) == 12);
   CHECK(whole_frame_bytes(12) == 12);

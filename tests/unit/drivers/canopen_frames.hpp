@@ -1,4 +1,4 @@
-/// Frames as the tests of CANopen write them: identifier and bytes.
+/// Frames in the tests of CANopen: identifier and bytes.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ inline Bytes bytes_of(const CanFrame& frame) {
   return {frame.payload().begin(), frame.payload().end()};
 }
 
-/// What a client has to send: identifier and bytes.
+/// A frame that the client has to send: identifier and bytes.
 struct Sent {
   std::uint32_t id{0};
   Bytes bytes;

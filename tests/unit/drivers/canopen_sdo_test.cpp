@@ -1,4 +1,4 @@
-// SDO and EMCY, with the bytes of CiA 301 written out by hand.
+// SDO and EMCY, with the bytes of CiA 301 written by hand.
 #include <cstdint>
 #include <initializer_list>
 #include <string>
@@ -13,7 +13,7 @@
 using namespace thermocomp;
 using namespace std::chrono_literals;
 
-TEST_CASE("SDO: an expedited read is one question and one answer", "[canopen][sdo]") {
+TEST_CASE("SDO: an expedited read is one request and one answer", "[canopen][sdo]") {
   SdoClient client(5, 100ms);
   client.read({0x2040, 1}, 1s);
   CHECK(sent_by(client) == std::vector<Sent>{{0x605, {0x40, 0x40, 0x20, 0x01, 0, 0, 0, 0}}});
@@ -58,7 +58,7 @@ TEST_CASE("SDO: a segmented read alternates its toggle bit", "[canopen][sdo]") {
   }
 }
 
-TEST_CASE("SDO: an answer may leave out bytes of no use, but none that count", "[canopen][sdo]") {
+TEST_CASE("SDO: an answer may omit unused bytes, but no others", "[canopen][sdo]") {
   SdoClient client(5, 100ms);
   const auto answered = [&](const Bytes& answer) {
     client.cancel();
@@ -88,7 +88,7 @@ TEST_CASE("SDO: an answer may leave out bytes of no use, but none that count", "
   CHECK(client.result()->bytes == Bytes{'s', 'T'});
 }
 
-TEST_CASE("SDO: an announcement beyond the limit is refused", "[canopen][sdo]") {
+TEST_CASE("SDO: an announced size beyond the limit is refused", "[canopen][sdo]") {
   SdoClient client(5, 100ms);
   client.read({0x1008, 0}, 1s);
   sent_by(client);
@@ -97,7 +97,7 @@ TEST_CASE("SDO: an announcement beyond the limit is refused", "[canopen][sdo]") 
   CHECK(sent_by(client).at(0).bytes == Bytes{0x80, 0x08, 0x10, 0x00, 0x05, 0x00, 0x04, 0x05});
 }
 
-TEST_CASE("SDO: expedited writes say how many bytes count", "[canopen][sdo]") {
+TEST_CASE("SDO: expedited writes state the number of bytes used", "[canopen][sdo]") {
   SdoClient client(5, 100ms);
   client.write({0x1017, 0}, Bytes{0xE8, 0x03}, 1s);
   CHECK(sent_by(client) == std::vector<Sent>{{0x605, {0x2B, 0x17, 0x10, 0x00, 0xE8, 0x03, 0, 0}}});
@@ -122,7 +122,7 @@ TEST_CASE("SDO: an abort is reported by name", "[canopen][sdo]") {
   CHECK(sdo_abort_name(0x12345678) == "unknown abort code");
 }
 
-TEST_CASE("SDO: silence ends a transfer, and the node is reported", "[canopen][sdo]") {
+TEST_CASE("SDO: a time-out ends a transfer, and the node is reported", "[canopen][sdo]") {
   SdoClient client(5, 100ms);
   client.read({0x2040, 1}, 1s);
   sent_by(client);
@@ -139,7 +139,7 @@ TEST_CASE("SDO: silence ends a transfer, and the node is reported", "[canopen][s
   }
 }
 
-TEST_CASE("SDO: a second answer betrays a second node", "[canopen][sdo]") {
+TEST_CASE("SDO: a second answer shows a second node", "[canopen][sdo]") {
   SdoClient client(5, 100ms);
   client.read({0x2040, 1}, 1s);
   const Bytes answer{0x4B, 0x40, 0x20, 0x01, 0xE1, 0x00, 0, 0};
@@ -149,7 +149,7 @@ TEST_CASE("SDO: a second answer betrays a second node", "[canopen][sdo]") {
   CHECK(client.second_answers() == 1);
 }
 
-TEST_CASE("SDO: a write confirmed twice while it is read back is no answer to the reading",
+TEST_CASE("SDO: a write confirmed twice during its verification is not taken as the read's answer",
           "[canopen][sdo]") {
   SdoClient client(5, 100ms);
   const Bytes confirmed{0x60, 0x17, 0x10, 0x00, 0, 0, 0, 0};
@@ -163,7 +163,7 @@ TEST_CASE("SDO: a write confirmed twice while it is read back is no answer to th
   CHECK(client.result()->outcome == SdoOutcome::done);
 }
 
-TEST_CASE("EMCY: code, register and what the manufacturer adds", "[canopen][emergency]") {
+TEST_CASE("EMCY: code, register and the manufacturer's bytes", "[canopen][emergency]") {
   const auto emergency = read_emergency(Bytes{0x30, 0x50, 0x01, 0x02, 0x01, 0, 0, 0});
   REQUIRE(emergency);
   CHECK(to_string(*emergency) == "0x5030 device hardware (register 0x01)");

@@ -1,4 +1,4 @@
-// CANopen's state machines, with the bytes of CiA 301 written out by hand.
+// State machines of CANopen, with the bytes of CiA 301 written by hand.
 #include <cstdint>
 #include <initializer_list>
 #include <string>
@@ -55,7 +55,7 @@ CanopenNodeConfig node_5(std::vector<CanopenChannel> channels) {
   return node;
 }
 
-/// A line and the time beside it.
+/// A line and its clock.
 struct Bus {
   explicit Bus(CanopenBusConfig config) : line(std::move(config)) {
     line.opened(now);
@@ -115,13 +115,13 @@ TEST_CASE("EMCY: listed codes fault a channel until no error is left", "[canopen
   bus.put(0x185, {0xE1, 0x00, 0xE2, 0x00});
   CHECK(bus.fault(0) == Fault::device_error);
   bus.put(0x085, {0, 0, 0, 0, 0, 0, 0, 0});
-  CHECK(bus.fault(0) == Fault::device_error);  // the old value stays gone
+  CHECK(bus.fault(0) == Fault::device_error);  // the old value does not return
   bus.put(0x185, {0xE3, 0x00, 0xE2, 0x00});
   CHECK(bus.temp_degC(0) == Approx(22.7));
   CHECK(bus.error().empty());
 }
 
-// ------------------------------------------------------------------ the node's life
+// ------------------------------------------------------------------ states of a node
 
 TEST_CASE("a node is started at once and again after its reboot", "[canopen][node]") {
   Bus bus(bus_of({node_5({in_pdo(0, 0x185, 0)})}));
@@ -137,7 +137,7 @@ TEST_CASE("a node is started at once and again after its reboot", "[canopen][nod
   CHECK(bus.temp_degC() == Approx(22.6));
 }
 
-TEST_CASE("a TPDO on change grows old, or holds while heartbeats come", "[canopen][node]") {
+TEST_CASE("a TPDO on change becomes stale, or holds while heartbeats come", "[canopen][node]") {
   CanopenNodeConfig node = node_5({in_pdo(0, 0x185, 0)});
   node.heartbeat_timeout_s = 2.0;
   const auto live = [](Bus& bus, int seconds, std::uint8_t state) {
@@ -160,7 +160,7 @@ TEST_CASE("a TPDO on change grows old, or holds while heartbeats come", "[canope
   node.pdo_on_change = true;
   Bus bus(bus_of({node}));
   live(bus, 1, 0x05);
-  CHECK(bus.fault() == Fault::no_answer);  // nothing has come that could hold
+  CHECK(bus.fault() == Fault::no_answer);  // nothing has come yet
   bus.put(0x185, {0xE1, 0x00});
   live(bus, 20, 0x05);
   CHECK(age(bus) == 0s);
@@ -181,7 +181,7 @@ TEST_CASE("a TPDO on change grows old, or holds while heartbeats come", "[canope
   }
 }
 
-TEST_CASE("a node that somebody stopped is started again, once a second", "[canopen][node]") {
+TEST_CASE("a stopped node is started again, once a second", "[canopen][node]") {
   Bus bus(bus_of({node_5({in_pdo(0, 0x185, 0)})}));
   bus.sent();
   bus.wait(1s);
@@ -193,7 +193,7 @@ TEST_CASE("a node that somebody stopped is started again, once a second", "[cano
   CHECK(bus.sent().empty());
 }
 
-TEST_CASE("who does not manage the network sends no command", "[canopen][node]") {
+TEST_CASE("without start_nodes no NMT command is sent", "[canopen][node]") {
   CanopenBusConfig config = bus_of({node_5({in_pdo(0, 0x185, 0)})});
   config.start_nodes = false;
   Bus bus(config);
@@ -205,7 +205,7 @@ TEST_CASE("who does not manage the network sends no command", "[canopen][node]")
   CHECK(bus.temp_degC() == Approx(22.5));
 }
 
-TEST_CASE("a lost heartbeat takes the readings away until it is back", "[canopen][node]") {
+TEST_CASE("a lost heartbeat invalidates the readings until it is back", "[canopen][node]") {
   CanopenNodeConfig node = node_5({in_pdo(0, 0x185, 0)});
   node.heartbeat_timeout_s = 0.5;
   Bus bus(bus_of({node}));
@@ -227,13 +227,13 @@ TEST_CASE("a lost heartbeat takes the readings away until it is back", "[canopen
   CHECK(bus.error().empty());
 }
 
-TEST_CASE("settings are written before the start, and read back", "[canopen][node]") {
+TEST_CASE("settings are written before the start and verified", "[canopen][node]") {
   CanopenNodeConfig node = node_5({in_pdo(0, 0x185, 0)});
   node.writes = {{{0x6110, 1}, {0x14, 0x00}}};
   Bus bus(bus_of({node}));
   CHECK(bus.sent() ==
         std::vector<Sent>{pre_operational_5, {0x605, {0x2B, 0x10, 0x61, 0x01, 0x14, 0, 0, 0}}});
-  bus.put(0x185, {0xE1, 0x00});  // of a node that still runs with its old settings
+  bus.put(0x185, {0xE1, 0x00});  // from a node still running with its old settings
   CHECK(bus.fault() == Fault::no_answer);
   bus.put(0x585, {0x60, 0x10, 0x61, 0x01, 0, 0, 0, 0});
   CHECK(bus.sent() == std::vector<Sent>{{0x605, {0x40, 0x10, 0x61, 0x01, 0, 0, 0, 0}}});
@@ -254,7 +254,7 @@ TEST_CASE("settings are written before the start, and read back", "[canopen][nod
   }
 }
 
-TEST_CASE("a refused setting is reported by the name of its abort code", "[canopen][node]") {
+TEST_CASE("a refused setting is reported with the name of its abort code", "[canopen][node]") {
   CanopenNodeConfig node = node_5({in_pdo(0, 0x185, 0)});
   node.heartbeat_s = 1.0;
   Bus bus(bus_of({node}));
@@ -281,7 +281,7 @@ TEST_CASE("a refused setting is reported by the name of its abort code", "[canop
   }
 }
 
-TEST_CASE("a node that is not there is asked again with growing pauses", "[canopen][node]") {
+TEST_CASE("a missing node is retried with growing pauses", "[canopen][node]") {
   CanopenNodeConfig node = node_5({in_pdo(0, 0x185, 0)});
   node.heartbeat_s = 1.0;
   Bus bus(bus_of({node}));
@@ -296,7 +296,7 @@ TEST_CASE("a node that is not there is asked again with growing pauses", "[canop
   CHECK(bus.error() == "1017:00: no answer within sdo_timeout_s = 0.5");
 }
 
-TEST_CASE("mappings are asked for and objects found in them", "[canopen][node]") {
+TEST_CASE("mappings are read and objects found in them", "[canopen][node]") {
   CanopenNodeConfig node = node_5({object_channel(CanopenWay::pdo_object, {0x7130, 2})});
   node.mappings_read = {1};
   Bus bus(bus_of({node}));
@@ -330,7 +330,7 @@ TEST_CASE("mappings are asked for and objects found in them", "[canopen][node]")
   }
 }
 
-TEST_CASE("an object of another length than its type has is not the one that is meant",
+TEST_CASE("an object with another length than its type is not the configured one",
           "[canopen][node]") {
   std::vector<CanopenChannel> channels(1);
   channels[0].way = CanopenWay::pdo_object;
@@ -345,7 +345,7 @@ TEST_CASE("an object of another length than its type has is not the one that is 
   CHECK(channels[0].signal.start_bit == 8);
 }
 
-TEST_CASE("a configured mapping needs no question", "[canopen][node]") {
+TEST_CASE("a configured mapping needs no request", "[canopen][node]") {
   CanopenNodeConfig node = node_5({object_channel(CanopenWay::pdo_object, {0x7130, 2})});
   node.mappings = {{0x285, {{{0x0005, 0}, 8}, {{0x7130, 1}, 16}, {{0x7130, 2}, 16}}}};
   Bus bus(bus_of({node}));
@@ -356,7 +356,7 @@ TEST_CASE("a configured mapping needs no question", "[canopen][node]") {
   CHECK(bus.fault() == Fault::bad_frame);
 }
 
-TEST_CASE("objects are polled, and each way of failing is its own fault", "[canopen][node]") {
+TEST_CASE("objects are polled, and each kind of failure is its own fault", "[canopen][node]") {
   CanopenNodeConfig node = node_5({object_channel(CanopenWay::sdo, {0x2040, 1})});
   Bus bus(bus_of({node}));
   const Bytes question{0x40, 0x40, 0x20, 0x01, 0, 0, 0, 0};
@@ -379,13 +379,13 @@ TEST_CASE("objects are polled, and each way of failing is its own fault", "[cano
     CHECK(bus.fault() == Fault::bad_frame);
   }
   bus.sent();
-  while (bus.sent().empty()) bus.wait(10ms);  // until it is asked again
+  while (bus.sent().empty()) bus.wait(10ms);  // until it is polled again
   bus.put(0x585, {0x4B, 0x40, 0x20, 0x01, 0xE2, 0x00, 0, 0});
   CHECK(bus.temp_degC() == Approx(22.6));
   CHECK(bus.error().empty());
 }
 
-TEST_CASE("a polled value counts between two statuses that call it good", "[canopen][node]") {
+TEST_CASE("a polled value is accepted between two good statuses", "[canopen][node]") {
   CanopenChannel channel = object_channel(CanopenWay::sdo, {0x9130, 1});
   channel.status = {{0x6150, 1}, {{0, 8, ByteOrder::little_endian}, 0x07, {}}};
   channel.status->number.codes = {{3, Fault::out_of_range}};
@@ -398,9 +398,9 @@ TEST_CASE("a polled value counts between two statuses that call it good", "[cano
   value();
   CHECK(bus.fault() == Fault::no_answer);
   status(0x00);
-  CHECK(bus.fault() == Fault::no_answer);  // was it good when the value was taken?
+  CHECK(bus.fault() == Fault::no_answer);  // the status before the value is unknown
   value();
-  status(0x10);  // a bit that nobody looks at
+  status(0x10);  // an unused bit
   CHECK(bus.temp_degC() == Approx(22.5));
   CHECK(bus.line.raw()[0].value == Bytes{0xE1, 0x00});
   CHECK(bus.line.raw()[0].status == Bytes{0x10});
@@ -418,7 +418,7 @@ TEST_CASE("a polled value counts between two statuses that call it good", "[cano
   CHECK(bus.temp_degC() == Approx(22.5));
   bus.wait(1s);
   value();
-  status(0x01);  // a number that nobody explains
+  status(0x01);  // an unlisted number
   CHECK(bus.fault() == Fault::device_error);
   bus.wait(1s);
   value();
@@ -460,9 +460,9 @@ TEST_CASE("a JUMO CANtrans with a broken and a shorted thermocouple", "[canopen]
   CHECK(bus.line.health(bus.now)[0].exceptions == 2);
 }
 
-// ------------------------------------------------------------------ two that say the same
+// ------------------------------------------------------------------ duplicates
 
-TEST_CASE("two nodes of one number are noticed by their heartbeats", "[canopen][duplicate]") {
+TEST_CASE("two nodes with one number are detected by their heartbeats", "[canopen][duplicate]") {
   CanopenNodeConfig node = node_5({in_pdo(0, 0x185, 0)});
   node.heartbeat_s = 0.1;
   Bus bus(bus_of({node}));
@@ -485,7 +485,7 @@ TEST_CASE("two nodes of one number are noticed by their heartbeats", "[canopen][
   CHECK(bus.error().empty());
 }
 
-TEST_CASE("a TPDO that comes twice as often as it should is no value", "[canopen][duplicate]") {
+TEST_CASE("a TPDO at twice its rate gives no value", "[canopen][duplicate]") {
   CanopenNodeConfig node = node_5({in_pdo(0, 0x185, 0), in_pdo(1, 0x285, 0)});
   node.pdo_period_s = 0.1;
   Bus bus(bus_of({node}));
@@ -506,7 +506,7 @@ TEST_CASE("a TPDO that comes twice as often as it should is no value", "[canopen
   CHECK(bus.fault(0) == Fault::none);
 }
 
-TEST_CASE("two answers to one question: neither is believed", "[canopen][duplicate]") {
+TEST_CASE("two answers to one request are both refused", "[canopen][duplicate]") {
   CanopenNodeConfig node = node_5({object_channel(CanopenWay::sdo, {0x2040, 1})});
   Bus bus(bus_of({node}));
   const Bytes one{0x4B, 0x40, 0x20, 0x01, 0xE1, 0x00, 0, 0};
@@ -522,7 +522,7 @@ TEST_CASE("two answers to one question: neither is believed", "[canopen][duplica
   CHECK(bus.fault() == Fault::none);
 }
 
-TEST_CASE("two nodes that tell the same COB-ID are both refused", "[canopen][duplicate]") {
+TEST_CASE("two nodes that report the same COB-ID are both refused", "[canopen][duplicate]") {
   CanopenNodeConfig a = node_5({object_channel(CanopenWay::pdo_object, {0x7130, 1})});
   a.mappings_read = {1};
   CanopenNodeConfig b = a;
@@ -542,7 +542,7 @@ TEST_CASE("two nodes that tell the same COB-ID are both refused", "[canopen][dup
   CHECK(bus.fault(0) == Fault::device_error);
   CHECK(bus.fault(1) == Fault::device_error);
   CHECK(bus.error(0) == "COB-ID 389 is sent by node 6 (other) too");
-  bus.put(0x706, {0x00});  // somebody mended it
+  bus.put(0x706, {0x00});  // repaired
   map(0x586, 0x86);
   bus.put(0x185, {0xE1, 0x00});
   bus.put(0x186, {0xE2, 0x00});
@@ -552,7 +552,7 @@ TEST_CASE("two nodes that tell the same COB-ID are both refused", "[canopen][dup
 
 // ------------------------------------------------------------------ the line
 
-TEST_CASE("SYNC and our heartbeat keep their periods and make up for nothing", "[canopen][line]") {
+TEST_CASE("SYNC and our heartbeat keep their periods and skip missed ones", "[canopen][line]") {
   CanopenBusConfig config = bus_of({node_5({in_pdo(0, 0x185, 0)})});
   config.sync_s = 0.1;
   config.own_node = 127;
@@ -568,12 +568,12 @@ TEST_CASE("SYNC and our heartbeat keep their periods and make up for nothing", "
   }
   CHECK(syncs == 10);
   CHECK(heartbeats == 2);
-  bus.now += 10s;  // the machine stood still
+  bus.now += 10s;  // the process was stopped
   bus.line.advance(bus.now);
   CHECK(bus.sent().size() == 2);
 }
 
-TEST_CASE("a lost bus takes every reading away; it begins anew", "[canopen][line]") {
+TEST_CASE("a lost bus invalidates every reading; set-up starts again", "[canopen][line]") {
   Bus bus(bus_of({node_5({in_pdo(0, 0x185, 0)})}));
   bus.put(0x185, {0xE1, 0x00});
   bus.line.closed(bus.now);
@@ -587,7 +587,7 @@ TEST_CASE("a lost bus takes every reading away; it begins anew", "[canopen][line
   CHECK(bus.fault() == Fault::none);
 }
 
-TEST_CASE("node numbers that cannot be are refused by name", "[canopen][line]") {
+TEST_CASE("impossible node numbers are refused by name", "[canopen][line]") {
   CanopenNodeConfig node = node_5({in_pdo(0, 0x185, 0)});
   CHECK_THROWS_AS(CanopenLine(bus_of({node, node})), InvalidValue);
   node.node = 128;
@@ -597,7 +597,7 @@ TEST_CASE("node numbers that cannot be are refused by name", "[canopen][line]") 
   CHECK_THROWS_AS(CanopenLine(config), InvalidValue);
 }
 
-TEST_CASE("only frames that somebody needs are asked for", "[canopen][line]") {
+TEST_CASE("only needed frames are received", "[canopen][line]") {
   const CanopenLine line(bus_of({node_5({in_pdo(0, 0x185, 0)})}));
   std::vector<std::uint32_t> ids;
   for (const CanFilter& filter : line.wanted()) ids.push_back(filter.id.id);

@@ -1,4 +1,4 @@
-// J1939's state machines, with identifiers and bytes of J1939-21, -71 and -81 written out by hand.
+// State machines of J1939, with identifiers and bytes of J1939-21, -71 and -81 written by hand.
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -15,7 +15,7 @@ namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
-/// SPN 110, engine coolant temperature: PGN 65262, byte 1, 1 degC a bit, -40 degC.
+/// SPN 110, engine coolant temperature: PGN 65262, byte 1, 1 degC per bit, -40 degC.
 J1939Parameter coolant() {
   J1939Parameter parameter;
   parameter.pgn = 65262;
@@ -24,7 +24,7 @@ J1939Parameter coolant() {
   return parameter;
 }
 
-/// SPN 175, engine oil temperature 1: PGN 65262, bytes 3-4, 0.03125 degC a bit, -273 degC.
+/// SPN 175, engine oil temperature 1: PGN 65262, bytes 3-4, 0.03125 degC per bit, -273 degC.
 J1939Parameter oil() {
   J1939Parameter parameter;
   parameter.pgn = 65262;
@@ -96,7 +96,7 @@ Bytes name_bytes(std::uint64_t name) {
 
 }  // namespace
 
-TEST_CASE("identifiers are taken apart and put together", "[j1939]") {
+TEST_CASE("identifiers are decoded and encoded", "[j1939]") {
   const J1939Id broadcast = read_identifier(0x18FEEE80);
   CHECK(broadcast.pgn == 65262);
   CHECK(broadcast.source == 0x80);
@@ -110,7 +110,7 @@ TEST_CASE("identifiers are taken apart and put together", "[j1939]") {
   CHECK(identifier(addressed).id == 0x1CECF980);
 }
 
-TEST_CASE("temperatures of the digital annex", "[j1939]") {
+TEST_CASE("temperatures of the digital annex are decoded", "[j1939]") {
   CHECK(decode(oil_bytes(0x2500), oil()).value == Approx(23.0));
   CHECK(decode(oil_bytes(0x0000), oil()).value == Approx(-273.0));
   CHECK(decode(oil_bytes(0xFAFF), oil()).value == Approx(1734.96875));
@@ -118,7 +118,7 @@ TEST_CASE("temperatures of the digital annex", "[j1939]") {
   CHECK(decode(Bytes{}, coolant()).fault == Fault::bad_frame);
 }
 
-TEST_CASE("codes at the top of 8, 16, 32 and other lengths are no temperatures", "[j1939]") {
+TEST_CASE("indicator codes of 8, 16, 32 and other lengths are not temperatures", "[j1939]") {
   const auto fault = [](unsigned raw) { return decode(oil_bytes(raw), oil()).fault; };
   CHECK(fault(0xFE00) == Fault::device_error);
   CHECK(fault(0xFEFF) == Fault::device_error);
@@ -157,7 +157,7 @@ TEST_CASE("codes at the top of 8, 16, 32 and other lengths are no temperatures",
   CHECK(decode(Bytes{0xF7, 0x0F}, own).value == Approx(1021.0 - 40.0));
 }
 
-TEST_CASE("parameters that cannot be are refused by key", "[j1939]") {
+TEST_CASE("impossible parameters are refused with their key", "[j1939]") {
   const auto key_of = [](const J1939Parameter& parameter) -> std::string {
     try {
       check(parameter);
@@ -170,7 +170,7 @@ TEST_CASE("parameters that cannot be are refused by key", "[j1939]") {
   J1939Parameter bad = oil();
   bad.pgn = 0x40000;
   CHECK(key_of(bad) == "pgn");
-  bad.pgn = 0xEF01;  // sent to one node: the lowest byte is its address
+  bad.pgn = 0xEF01;  // addressed: the lowest byte is the destination
   CHECK(key_of(bad) == "pgn");
   bad = oil();
   bad.length_bits = 33;
@@ -180,7 +180,7 @@ TEST_CASE("parameters that cannot be are refused by key", "[j1939]") {
   CHECK(key_of(bad) == "start_byte");
 }
 
-TEST_CASE("only the device's own groups are its readings", "[j1939]") {
+TEST_CASE("only the device's own groups give its readings", "[j1939]") {
   Bus bus(bus_of(oil()));
   CHECK(bus.reading().fault == Fault::no_answer);
   bus.put(0x18FEEE81, oil_bytes(0x2500));
@@ -197,7 +197,7 @@ TEST_CASE("only the device's own groups are its readings", "[j1939]") {
   CHECK(bus.reading().fault == Fault::no_answer);
 }
 
-TEST_CASE("BAM: a group of several packets", "[j1939][transport]") {
+TEST_CASE("BAM: a group of several packets is assembled", "[j1939][transport]") {
   J1939Parameter parameter = oil();
   parameter.pgn = 0xFF10;
   parameter.start_byte = 8;  // in the second packet
@@ -238,10 +238,10 @@ TEST_CASE("BAM: a group of several packets", "[j1939][transport]") {
   CHECK(bus.sent().empty());
 }
 
-TEST_CASE("BAM: what pads the last packet is no content", "[j1939][transport]") {
+TEST_CASE("BAM: the padding of the last packet is not content", "[j1939][transport]") {
   J1939Parameter parameter = oil();
   parameter.pgn = 0xFF10;
-  parameter.start_byte = 8;  // bytes 9 and 10 of a group that says it has 9
+  parameter.start_byte = 8;  // bytes 9 and 10 of a group that has 9
   Bus bus(bus_of(parameter));
   bus.put(0x1CECFF80, {32, 9, 0, 2, 0xFF, 0x10, 0xFF, 0x00});
   bus.put(0x1CEBFF80, {1, 0, 1, 2, 3, 4, 5, 6});
@@ -249,7 +249,7 @@ TEST_CASE("BAM: what pads the last packet is no content", "[j1939][transport]") 
   CHECK(bus.reading().fault == Fault::bad_frame);
 }
 
-TEST_CASE("an announcement whose numbers disagree begins nothing", "[j1939][transport]") {
+TEST_CASE("an inconsistent announcement begins no transfer", "[j1939][transport]") {
   TransportReceiver receiver({0xFF10});
   const J1939Id id = read_identifier(0x1CECFF80);
   receiver.take(id, Bytes{32, 10, 0, 3, 0xFF, 0x10, 0xFF, 0x00}, 1s);
@@ -260,7 +260,7 @@ TEST_CASE("an announcement whose numbers disagree begins nothing", "[j1939][tran
   CHECK(receiver.failed() == 3);
 }
 
-TEST_CASE("RTS and CTS: a message sent to us is granted, taken and acknowledged",
+TEST_CASE("RTS and CTS: a message sent to us is granted, received and acknowledged",
           "[j1939][transport]") {
   J1939Parameter parameter = oil();
   parameter.pgn = 0xEF00;
@@ -270,7 +270,7 @@ TEST_CASE("RTS and CTS: a message sent to us is granted, taken and acknowledged"
   config.own_name = name_b;
   Bus bus(config);
   CHECK(bus.sent() == std::vector<Sent>{{0x18EEFFF9, name_bytes(name_b)}});
-  // 17 bytes in 3 packets, at most 2 a grant.
+  // 17 bytes in 3 packets, at most 2 per grant.
   bus.put(0x1CECF980, {16, 17, 0, 3, 2, 0x00, 0xEF, 0x00});
   CHECK(bus.sent() == std::vector<Sent>{{0x1CEC80F9, {17, 2, 1, 0xFF, 0xFF, 0x00, 0xEF, 0x00}}});
   bus.put(0x1CEBF980, {1, 0, 1, 2, 3, 4, 5, 6});
@@ -305,11 +305,11 @@ TEST_CASE("RTS and CTS: a message sent to us is granted, taken and acknowledged"
   }
 }
 
-TEST_CASE("a device is found by its NAME, wherever it goes", "[j1939][claim]") {
+TEST_CASE("a device is found by its NAME at any address", "[j1939][claim]") {
   J1939BusConfig config = bus_of(oil(), std::nullopt);
   config.nodes[0].name_claimed = name_a;
   Bus bus(config);
-  // From the address of nobody to everybody: who are you?
+  // Request for all NAMEs, from the null address.
   CHECK(bus.sent() == std::vector<Sent>{{0x18EAFFFE, {0x00, 0xEE, 0x00}}});
   bus.put(0x18FEEE80, oil_bytes(0x2500));
   CHECK(bus.reading().fault == Fault::no_answer);
@@ -330,7 +330,7 @@ TEST_CASE("a device is found by its NAME, wherever it goes", "[j1939][claim]") {
     bus.put(0x18FEEE80, oil_bytes(0x2500));
     CHECK(bus.reading().fault == Fault::no_answer);
     CHECK(bus.error() == "address 128 was claimed by 0x8000FF0087654321");
-    bus.put(0x18EEFF80, name_bytes(name_a));  // it defends it
+    bus.put(0x18EEFF80, name_bytes(name_a));  // it defends its address
     bus.put(0x18FEEE80, oil_bytes(0x2500));
     CHECK(bus.reading().temp_degC == Approx(23.0));
     CHECK(bus.error().empty());
@@ -350,7 +350,8 @@ TEST_CASE("a new NAME at a known address is reported", "[j1939][claim]") {
   CHECK(bus.error() == "address 128: NAME changed from 0x8000FF0012345678 to 0x8000FF0087654321");
 }
 
-TEST_CASE("our address: told when asked, defended, given up to a smaller NAME", "[j1939][claim]") {
+TEST_CASE("our address is announced on request, defended, and given up to a smaller NAME",
+          "[j1939][claim]") {
   J1939BusConfig config = bus_of(oil());
   config.own_address = 0xF9;
   config.own_name = name_a;
@@ -368,7 +369,7 @@ TEST_CASE("our address: told when asked, defended, given up to a smaller NAME", 
   CHECK(bus.sent().empty());
 }
 
-TEST_CASE("the kernel is asked for our groups only", "[j1939]") {
+TEST_CASE("the kernel filters for our groups only", "[j1939]") {
   Bus bus(bus_of(oil()));
   bool own_group = false;
   for (const CanFilter& filter : bus.line.wanted()) {

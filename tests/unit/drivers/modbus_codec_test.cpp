@@ -88,13 +88,13 @@ TEST_CASE("sentinels are faults, and their neighbours are values", "[codec]") {
         Fault::open_circuit);
 }
 
-TEST_CASE("a sentinel is looked for in the raw value, before scale and offset", "[codec]") {
+TEST_CASE("a sentinel is compared with the raw value, before scale and offset", "[codec]") {
   const std::vector<Sentinel> codes{{32767, Fault::open_circuit}};
   const NumberFormat tenths{Encoding::int16, WordOrder::abcd, 0.1, 5.0};
   CHECK(decode(Words{0x7FFF}, tenths, codes).fault == Fault::open_circuit);
 }
 
-TEST_CASE("what is not a finite number is out of range, never a value", "[codec]") {
+TEST_CASE("a non-finite number is out of range, never a value", "[codec]") {
   CHECK(decode(Words{0x7FC0, 0}, {Encoding::float32}, {}).fault == Fault::out_of_range);  // NaN
   CHECK(decode(Words{0x7F80, 0}, {Encoding::float32}, {}).fault == Fault::out_of_range);  // inf
   CHECK(decode(Words{0xFFF0, 0, 0, 0}, {Encoding::float64}, {}).fault == Fault::out_of_range);
@@ -110,7 +110,7 @@ TEST_CASE("a status word is a fault unless it is listed as good, or 0 where noth
   CHECK(decode_status(status, 0xABC0) == Fault::none);
   CHECK(decode_status(status, 0x0001) == Fault::open_circuit);
   CHECK(decode_status(status, 0x0002) == Fault::device_error);
-  // Only what is listed as good is, once something is.
+  // With listed good codes, only those are good.
   status.codes = {{1, Fault::none}};
   CHECK(decode_status(status, 0) == Fault::device_error);
   CHECK(decode_status(status, 1) == Fault::none);
@@ -122,7 +122,7 @@ TEST_CASE("a status word is a fault unless it is listed as good, or 0 where noth
   CHECK(decode_status(bit, 0) == Fault::none);
 }
 
-TEST_CASE("encoding saturates at the ends and says so", "[codec]") {
+TEST_CASE("encoding saturates at the ends and reports it", "[codec]") {
   const NumberFormat hundredths{Encoding::int16, WordOrder::abcd, 0.01};
   const Encoded inside = encode(-1.234, hundredths);
   CHECK(inside.result == EncodeResult::exact);
@@ -139,7 +139,7 @@ TEST_CASE("encoding saturates at the ends and says so", "[codec]") {
   CHECK(encode(1e300, {Encoding::float64}).result == EncodeResult::exact);
 }
 
-TEST_CASE("what is not a finite number is never written", "[codec]") {
+TEST_CASE("a non-finite number is never written", "[codec]") {
   const double infinity = std::numeric_limits<double>::infinity();
   for (const double value : {not_a_number, infinity, -infinity}) {
     const Encoded encoded = encode(value, {Encoding::int32});
@@ -149,7 +149,7 @@ TEST_CASE("what is not a finite number is never written", "[codec]") {
   CHECK(encode(1.0, {Encoding::int16, WordOrder::abcd, 0.0}).result == EncodeResult::refused);
 }
 
-TEST_CASE("what is encoded decodes to the same value in every encoding and order", "[codec]") {
+TEST_CASE("an encoded value decodes to the same value in every encoding and order", "[codec]") {
   const std::array<Encoding, 6> encodings{Encoding::int16,  Encoding::uint16,  Encoding::int32,
                                           Encoding::uint32, Encoding::float32, Encoding::float64};
   for (const Encoding encoding : encodings) {
@@ -172,7 +172,7 @@ TEST_CASE("a code that cannot occur in the encoding is recognised", "[codec]") {
   CHECK(is_representable(4294967295, Encoding::uint32));
   CHECK(is_representable(9999, Encoding::float32));
   CHECK_FALSE(is_representable(16777217, Encoding::float32));
-  // 2^53 + 1 has no neighbour in a double either; 2^63 - 1 is rounded to what no code is.
+  // 2^53 + 1 is not exact in a double either; 2^63 - 1 is rounded to 2^63, which is no code.
   constexpr std::int64_t between = (std::int64_t{1} << 53) + 1;
   constexpr std::int64_t greatest = std::numeric_limits<std::int64_t>::max();
   for (const Encoding encoding : {Encoding::float32, Encoding::float64}) {

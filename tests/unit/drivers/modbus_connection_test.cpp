@@ -32,7 +32,7 @@ Exchange read_inputs(ModbusConnection& connection, int unit, int address, Words&
   return connection.read(unit, ModbusTable::input, static_cast<std::uint16_t>(address), words);
 }
 
-/// Both kinds of line, so that each test runs on both.
+/// Both kinds of line, for tests that run on both.
 struct Lines {
   peer::TcpDevice tcp;
   peer::SerialLine serial;
@@ -67,7 +67,7 @@ TEST_CASE("registers and bits of every table are read, writes are confirmed", "[
   CHECK(connection.write_registers(7, 5, words).ok());
 }
 
-TEST_CASE("exceptions, silence and wrong answers are told apart", "[connection]") {
+TEST_CASE("exceptions, silence and wrong answers are distinguished", "[connection]") {
   Lines lines;
   const bool rtu = GENERATE(false, true);
   CAPTURE(rtu);
@@ -142,7 +142,7 @@ TEST_CASE("a wrong checksum is a bad frame, and the line recovers", "[connection
 }
 
 TEST_CASE("TCP: a late answer is not taken for the present one", "[connection][late]") {
-  // The first request is answered late, while the second - of the same shape - is under way.
+  // The first request is answered late, during the second one of the same form.
   std::atomic<int> count{0};
   peer::TcpDevice device([&count](const peer::Request& request) {
     peer::Reply reply = peer::honest(request);
@@ -158,9 +158,9 @@ TEST_CASE("TCP: a late answer is not taken for the present one", "[connection][l
   CHECK(device.connections() == 1);
 }
 
-TEST_CASE("an answer that comes before its question is none", "[connection][early]") {
+TEST_CASE("an answer that comes before its request is discarded", "[connection][early]") {
   const bool rtu = GENERATE(false, true);
-  // Behind the first answer stands one to the question that will be next: unit 1, two registers.
+  // The first answer is followed by one to the next request: unit 1, two registers.
   Lines lines;
   std::atomic<int> count{0};
   lines.handle([&](const peer::Request& request) {
@@ -204,7 +204,7 @@ struct LateUnit {
   int answers_of_others{0};
 };
 
-/// Seven seconds beside a unit whose answers are always late.
+/// Seven seconds with a unit whose answers are always late.
 LateUnit ask_late_unit(std::chrono::milliseconds lateness) {
   peer::SerialLine serial([lateness](const peer::Request& request) {
     peer::Reply reply = peer::honest(request);
@@ -214,7 +214,7 @@ LateUnit ask_late_unit(std::chrono::milliseconds lateness) {
   ModbusConnection connection(rtu_line(serial.device(), 100.0));
   LateUnit seen;
   if (!connection.connect()) return seen;
-  // As the sensor source does: the same question until it is answered, then the next one.
+  // Like the sensor source: the same request until it is answered, then the next one.
   int address = 10;
   const auto end = peer::steady_clock::now() + 7s;
   while (peer::steady_clock::now() < end) {
@@ -235,7 +235,8 @@ LateUnit ask_late_unit(std::chrono::milliseconds lateness) {
 
 }  // namespace
 
-TEST_CASE("RTU: answers that are always late never land in another request", "[connection][late]") {
+TEST_CASE("RTU: answers that are always late are never taken for those of another request",
+          "[connection][late]") {
   std::vector<std::future<LateUnit>> lines;
   for (const auto lateness : {120ms, 400ms, 1300ms, 2500ms})
     lines.push_back(std::async(std::launch::async, ask_late_unit, lateness));
@@ -246,7 +247,7 @@ TEST_CASE("RTU: answers that are always late never land in another request", "[c
   }
 }
 
-TEST_CASE("RTU: rubbish in place of an answer is not believed and does not last", "[connection]") {
+TEST_CASE("RTU: noise in place of an answer is refused, and the line recovers", "[connection]") {
   std::atomic<bool> rubbish{true};
   peer::SerialLine serial([&rubbish](const peer::Request& request) {
     peer::Reply reply = peer::honest(request);
@@ -288,7 +289,7 @@ TEST_CASE("RTU: the echo of the request and bytes before the answer are skipped"
   CHECK(words == Words{3000, 3001});
   CHECK(connection.write_registers(3, 5, words).ok());
   CHECK(connection.write_register(3, 5, 77).ok());
-  // A request that only the adapter has heard confirms nothing.
+  // A request that only the adapter has received is not confirmed.
   is_silent = true;
   const Exchange written = connection.write_register(3, 5, 78);
   CHECK(written.outcome == ExchangeOutcome::timeout);
@@ -298,7 +299,7 @@ TEST_CASE("RTU: the echo of the request and bytes before the answer are skipped"
   CHECK(connection.write_register(3, 5, 79).ok());
 }
 
-TEST_CASE("what came in place of an answer is said", "[connection]") {
+TEST_CASE("bytes received in place of the answer are described", "[connection]") {
   Lines lines;
   const auto said = [&](bool rtu, const peer::Handler& handler) {
     lines.handle(handler);
@@ -332,7 +333,7 @@ TEST_CASE("what came in place of an answer is said", "[connection]") {
              Catch::Contains("broke off: 5 of 9 bytes (03 04 04 00 07) within timeout_ms = 300"));
 }
 
-TEST_CASE("answers of any transaction are taken where the line says so, late ones are not",
+TEST_CASE("any transaction id is accepted where so configured, late answers are not",
           "[connection][late]") {
   std::atomic<int> count{0};
   peer::TcpDevice device([&](const peer::Request& request) {
@@ -352,7 +353,7 @@ TEST_CASE("answers of any transaction are taken where the line says so, late one
   CHECK(words == Words{30, 30});
 }
 
-TEST_CASE("a connection closed by the peer is lost, not a time-out", "[connection]") {
+TEST_CASE("a connection closed by the peer is a lost line, not a time-out", "[connection]") {
   peer::TcpDevice device([](const peer::Request&) {
     peer::Reply reply;
     reply.close = true;
@@ -369,7 +370,7 @@ TEST_CASE("a connection closed by the peer is lost, not a time-out", "[connectio
   CHECK(read_inputs(connection, 1, 0, words).ok());
 }
 
-TEST_CASE("a connection that is closed after it has answered is opened again", "[connection]") {
+TEST_CASE("a connection that is closed after an answer is reopened", "[connection]") {
   const int answers = GENERATE(1, 3);
   std::atomic<int> count{0};
   peer::TcpDevice device([&](const peer::Request& request) {
@@ -400,7 +401,7 @@ TEST_CASE("TCP: two time-outs in a row end a connection that may be half open", 
   CHECK_FALSE(connection.connected());
 }
 
-TEST_CASE("cancel ends a wait of any length at once", "[connection]") {
+TEST_CASE("cancel ends any wait at once", "[connection]") {
   Lines lines;
   lines.handle([](const peer::Request&) { return peer::Reply{}; });
   const bool rtu = GENERATE(false, true);
@@ -420,7 +421,7 @@ TEST_CASE("cancel ends a wait of any length at once", "[connection]") {
   CHECK_FALSE(connection.connect());
 }
 
-TEST_CASE("a line that cannot be opened says why", "[connection]") {
+TEST_CASE("a line that cannot be opened gives the reason", "[connection]") {
   ModbusConnection absent(rtu_line("/nonexistent/port"));
   CHECK_FALSE(absent.connect());
   CHECK(absent.last_error().find("/nonexistent/port") != std::string::npos);
@@ -437,24 +438,24 @@ TEST_CASE("a line that cannot be opened says why", "[connection]") {
   CHECK(without_rs485.last_error().find("RS-485") != std::string::npos);
 }
 
-TEST_CASE("a host name is looked up", "[connection]") {
+TEST_CASE("a host name is resolved", "[connection]") {
   peer::TcpDevice device;
   ModbusLine line = tcp_line(device.port());
   line.link = ModbusTcp{"localhost", device.port()};
   ModbusConnection connection(line);
   if (!connection.connect()) WARN("localhost: " << connection.last_error());
   Words words(1);
-  // Where "localhost" is ::1 first, nobody listens there: then the refusal must say so.
+  // Where "localhost" is ::1 first, without a server there, the reason must be given.
   CHECK((connection.connected() ? read_inputs(connection, 1, 4, words).ok()
                                 : !connection.last_error().empty()));
 }
 
-TEST_CASE("settings that cannot work are refused before anything is opened", "[connection]") {
+TEST_CASE("impossible settings are refused before anything is opened", "[connection]") {
   const auto refused = [](const ModbusLine& line) {
     CHECK_THROWS_AS(ModbusConnection(line), DriverError);
   };
   ModbusLine line = rtu_line("/dev/null");
-  std::get<ModbusRtu>(line.link).baud = 12345;  // libmodbus would take 9600 without a word
+  std::get<ModbusRtu>(line.link).baud = 12345;  // libmodbus would silently use 9600
   refused(line);
   line = rtu_line("/dev/null");
   std::get<ModbusRtu>(line.link).parity = 'X';
@@ -469,7 +470,7 @@ TEST_CASE("settings that cannot work are refused before anything is opened", "[c
   refused(tcp_line(502, not_a_number));
 }
 
-TEST_CASE("frames keep 3.5 characters apart, 1.75 ms above 19200 baud", "[connection]") {
+TEST_CASE("frames are 3.5 characters apart, 1.75 ms above 19200 baud", "[connection]") {
   ModbusLine line = rtu_line("/dev/null");
   CHECK(inter_frame_delay(line) == 1750us);
   std::get<ModbusRtu>(line.link).baud = 9600;

@@ -1,4 +1,4 @@
-// A gateway that serves its units one after the other, and the poller, in virtual time.
+// A gateway that serves its units one after the other, with the poller, in virtual time.
 #include <deque>
 #include <map>
 
@@ -11,12 +11,12 @@ using namespace std::chrono_literals;
 
 namespace {
 
-/// One request at a time; for a unit without supply it waits and then answers with exception 11, or
-/// not at all. Each register holds 7.
+/// One request at a time; for a dead unit it waits and then answers with exception 11, or not at
+/// all. Each register holds 7.
 class Gateway final : public ModbusPort {
  public:
   nanoseconds waits_for{1s};
-  bool drops_what_waits{false};  ///< requests that come while it waits are lost
+  bool drops_what_waits{false};                               ///< requests during the wait are lost
   std::map<int, std::pair<nanoseconds, nanoseconds>> silent;  ///< from, until
   std::map<int, std::vector<nanoseconds>> asked;
 
@@ -97,7 +97,7 @@ TEST_CASE("a gateway that waits for dead units leaves the others nine tenths of 
   const auto waits_for = GENERATE(200ms, 1000ms, 2500ms);
   const bool drops = GENERATE(false, true);
   CAPTURE(dead, waits_for.count(), drops);
-  // More than a tenth of the time is what so many such waits would take.
+  // Such waits would take more than a tenth of the time.
   if (dead * waits_for > 3000ms || (drops && dead > 1)) return;
   constexpr int good = 2;
   constexpr auto begin = 100s;

@@ -1,5 +1,5 @@
-/// A Modbus device made of raw bytes, on a TCP socket or a pseudo terminal: the tests script what
-/// it answers, when, and how wrongly. Nothing of the code under test is used here.
+/// A Modbus device of raw bytes on a TCP socket or a pseudo terminal: tests script its answers,
+/// their times and errors. It uses no code under test.
 #pragma once
 
 #include <array>
@@ -42,11 +42,11 @@ struct Request {
 struct Reply {
   Bytes pdu{};  ///< function and data; empty: no answer
   milliseconds delay{0};
-  int unit{-1};  ///< -1: the one that was asked
+  int unit{-1};  ///< -1: that of the request
   bool spoil_checksum{false};
-  bool close{false};        ///< TCP: close the connection instead
+  bool close{false};        ///< TCP: close the connection instead of answering
   bool close_after{false};  ///< TCP: close it after the answer
-  Bytes raw{};              ///< sent as it is instead of a frame
+  Bytes raw{};              ///< sent unchanged instead of a frame
 };
 
 using Handler = std::function<Reply(const Request&)>;
@@ -60,7 +60,7 @@ inline Bytes registers_pdu(int function, const std::vector<std::uint16_t>& words
   return pdu;
 }
 
-/// Every register holds unit * 1000 + address; every bit is that number's lowest.
+/// Every register holds unit * 1000 + address; every bit is the lowest bit of that number.
 inline Reply honest(const Request& request) {
   if (request.function == 16 || request.function == 5) {
     return {Bytes(request.pdu.begin(), request.pdu.begin() + 5)};
@@ -143,7 +143,7 @@ class Device {
   std::atomic<int> requests_{0};
 };
 
-/// One connection at a time on a free port (or a given one, to come back at the same place).
+/// One connection at a time on a free port (or a given one, to return at the same address).
 class TcpDevice : public Device {
  public:
   explicit TcpDevice(Handler handler = honest, int port = 0) : Device(std::move(handler)) {
@@ -230,7 +230,7 @@ class TcpDevice : public Device {
 };
 
 /// All units of a serial line behind one pseudo terminal, reached through a link in /tmp so that
-/// the line can vanish and come back under its name.
+/// the line can vanish and return under its name.
 class SerialLine : public Device {
  public:
   explicit SerialLine(Handler handler = honest) : Device(std::move(handler)) {
@@ -306,7 +306,7 @@ class SerialLine : public Device {
   int keep_open_{-1};
 };
 
-/// Waits for something that must happen, for longer than any machine may need.
+/// Waits for a condition that must become true, longer than any machine may need.
 inline bool eventually(const std::function<bool()>& holds, int limit_s = 20) {
   const auto give_up_at = steady_clock::now() + std::chrono::seconds(limit_s);
   while (steady_clock::now() < give_up_at) {

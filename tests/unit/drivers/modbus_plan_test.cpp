@@ -49,7 +49,7 @@ ModbusDeviceConfig random_device(std::mt19937& random) {
   return device;
 }
 
-/// The words of a table that are wanted at all.
+/// The words of a table that are needed.
 std::set<std::tuple<ModbusTable, int>> wanted_words(const ModbusDeviceConfig& device) {
   std::set<std::tuple<ModbusTable, int>> wanted;
   const auto want = [&wanted](ModbusTable table, int address, std::size_t words) {
@@ -91,7 +91,7 @@ void check_gaps(const ModbusPlan& plan, const ModbusDeviceConfig& device) {
 
 }  // namespace
 
-TEST_CASE("every value is read whole, within the limits and the gaps", "[plan][property]") {
+TEST_CASE("every value is read as a whole, within limits and gaps", "[plan][property]") {
   const unsigned seed = GENERATE(range(0U, 300U));
   CAPTURE(seed);
   std::mt19937 random(seed);
@@ -133,13 +133,13 @@ TEST_CASE("neighbours share a request, distant values do not", "[plan]") {
   CHECK(plan.channels[1].value.offset == 4);
 }
 
-TEST_CASE("one register a request gives every value its own request", "[plan]") {
+TEST_CASE("with one register per request every value has its own request", "[plan]") {
   ModbusDeviceConfig device;
   device.one_register_a_request = true;
   device.channels = {channel_at(0, Encoding::float32), channel_at(2, Encoding::float32),
                      channel_at(4), channel_at(4)};
   const ModbusPlan plan = plan_requests(device);
-  REQUIRE(plan.requests.size() == 3);  // the same register is not asked twice
+  REQUIRE(plan.requests.size() == 3);  // the same register is not read twice
   CHECK(plan.requests[0].count == 2);
   CHECK(plan.requests[2].count == 1);
 }
@@ -160,7 +160,7 @@ TEST_CASE("a register of 32 bits is one address and two words", "[plan]") {
   CHECK(plan.channels[0].status->offset == 5);  // its low word
 }
 
-TEST_CASE("back-off doubles up to its end and an answer ends it at once", "[backoff]") {
+TEST_CASE("back-off doubles up to its limit and an answer ends it at once", "[backoff]") {
   UnitBackoff backoff(1s);
   CHECK_FALSE(backoff.dead());
   std::chrono::nanoseconds now = 100s;
@@ -182,20 +182,20 @@ TEST_CASE("dead units keep to their share of the line", "[backoff]") {
   UnitBackoff backoff(1s);
   const auto cost = 200ms;
   backoff.failed(0s, cost, 1, 30s);
-  CHECK(backoff.not_before() == 1s);  // a short outage is found out soon
+  CHECK(backoff.not_before() == 1s);  // a short outage is noticed soon
   backoff.failed(0s, cost, 1, 30s);
   CHECK(backoff.not_before() == 2s);
   backoff.failed(0s, cost, 1, 30s);
   CHECK(backoff.not_before() == 10s);  // 200 ms in 10 s are 2 %
   backoff.failed(0s, cost, 8, 30s);
-  CHECK(backoff.not_before() == 54s);  // 80 s would be 2 %, but no unit waits for longer
+  CHECK(backoff.not_before() == 54s);  // 80 s would be 2 %, but no unit waits longer
 }
 
 namespace {
 constexpr ModbusQuestion question{4, 10, 4};
 }
 
-TEST_CASE("a unit that owes an answer is left alone, longer each time", "[late]") {
+TEST_CASE("a unit with an outstanding answer is not asked, longer each time", "[late]") {
   LateAnswers late;
   CHECK(late.ready_at(question) == 0s);
   late.unanswered(question, 10s, 10200ms);
@@ -204,37 +204,37 @@ TEST_CASE("a unit that owes an answer is left alone, longer each time", "[late]"
   CHECK(late.ready_at(question) == 13400ms);
 }
 
-TEST_CASE("an answer while others are owed may be one of theirs: the last is waited for",
+TEST_CASE("an answer while others are outstanding may be one of theirs: the last is waited for",
           "[late]") {
   LateAnswers late;
-  late.unanswered(question, 10s, 10200ms);    // asked at 10.0
+  late.unanswered(question, 10s, 10200ms);    // sent at 10.0
   late.answered(11200ms, 11300ms);            // arrives at 11.3: may be 1.3 s late
-  CHECK(late.ready_at(question) == 12600ms);  // so that to 11.2 comes by 12.5
+  CHECK(late.ready_at(question) == 12600ms);  // so the answer to 11.2 comes by 12.5
   late.answered(12600ms, 12610ms);
-  CHECK(late.ready_at(question) == 12600ms);  // nothing is owed any more
+  CHECK(late.ready_at(question) == 12600ms);  // nothing outstanding any more
 }
 
-TEST_CASE("another question that the owed answer would fit waits until it cannot come any more",
+TEST_CASE("a request that the outstanding answer would fit waits until it cannot come any more",
           "[late]") {
   const ModbusQuestion other{4, 20, 4};
   LateAnswers late;
   late.unanswered(question, 10s, 10200ms);
   CHECK(late.ready_at(question) == 11200ms);
   CHECK(late.ready_at(other) == 13s);
-  // What shows in the answer, its function or length, need not wait for it.
+  // With another function or length in the answer there is no need to wait.
   CHECK(late.ready_at({4, 20, 6}) == 11200ms);
   CHECK(late.ready_at({3, 20, 4}) == 11200ms);
   CHECK(late.ready_at({16, 20, 4}) == 11200ms);
-  // The first of two answers came: the second may still be late, more than the first.
+  // The first of two answers came: the second may be later still.
   late.answered(11200ms, 11300ms);
   CHECK(late.ready_at(question) == 12600ms);
   CHECK(late.ready_at(other) == 14200ms);
 }
 
-TEST_CASE("after a spoiled frame the true answer may come late too", "[late]") {
+TEST_CASE("after a bad frame the true answer may come late too", "[late]") {
   const ModbusQuestion other{4, 20, 4};
   LateAnswers late;
-  late.spoiled(question, 10s, 300ms);  // of whom is not known
+  late.spoiled(question, 10s, 300ms);  // from an unknown sender
   CHECK(late.ready_at(question) == 10300ms);
   CHECK(late.ready_at(other) == 13s);
   late.answered(10300ms, 10400ms);
@@ -243,7 +243,7 @@ TEST_CASE("after a spoiled frame the true answer may come late too", "[late]") {
   CHECK(late.ready_at(other) == 13300ms);
 }
 
-TEST_CASE("a unit back after a long time is not punished", "[late]") {
+TEST_CASE("a unit back after a long time is not delayed", "[late]") {
   LateAnswers late;
   late.unanswered(question, 10s, 10200ms);
   late.answered(100s, 100010ms);

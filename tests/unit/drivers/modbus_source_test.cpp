@@ -51,7 +51,7 @@ ModbusBusConfig rtu_bus(const std::string& device) {
   return bus;
 }
 
-/// A started source and the readings as the cycle sees them.
+/// A started source with its readings as seen by the cycle.
 struct Running {
   std::unique_ptr<SensorSource> source;
   std::vector<Reading> all;
@@ -75,7 +75,7 @@ struct Running {
 
 }  // namespace
 
-TEST_CASE("readings arrive with value and time, in the places of their sensors", "[source]") {
+TEST_CASE("readings have value and time, at the indices of their sensors", "[source]") {
   peer::TcpDevice device;
   ModbusBusConfig bus = tcp_bus(device.port());
   bus.devices = {device_of(1, 4, {0, 30}), device_of(2, 1, {7})};
@@ -88,7 +88,7 @@ TEST_CASE("readings arrive with value and time, in the places of their sensors",
   CHECK(running.all[1].temp_degC == Approx(200.7));
   CHECK(running.all[1].taken_at > began);
   CHECK(running.all[1].taken_at <= monotonic_now());
-  CHECK(running.all[0].fault == Fault::never_read);  // another bus' sensor is left alone
+  CHECK(running.all[0].fault == Fault::never_read);  // a sensor of another bus is unchanged
   const auto taken_at = running.all[4].taken_at;
   CHECK(peer::eventually([&] { return running.reading(4).taken_at > taken_at; }));
   const BusHealth health = running.source->health();
@@ -98,7 +98,7 @@ TEST_CASE("readings arrive with value and time, in the places of their sensors",
   CHECK(health.units.at(0).answers > 0);
 }
 
-TEST_CASE("before anything has come a reading says so", "[source]") {
+TEST_CASE("before the first answer a reading is never_read", "[source]") {
   peer::SerialLine line([](const peer::Request&) { return peer::Reply{}; });
   ModbusBusConfig bus = rtu_bus(line.device());
   bus.line.timeout_ms = 5000.0;
@@ -128,13 +128,13 @@ TEST_CASE("sentinels and status registers are faults of their channel only", "[s
   CHECK(std::isnan(running.all[1].temp_degC));
 }
 
-TEST_CASE("a value whose status was read before it is as old as the status", "[source]") {
+TEST_CASE("a value whose status was read earlier is as old as the status", "[source]") {
   std::mutex mutex;
   std::vector<std::pair<int, nanoseconds>> asked;  // function, when it was served
   peer::TcpDevice device([&](const peer::Request& request) {
     const std::lock_guard lock(mutex);
     asked.emplace_back(request.function, monotonic_now());
-    if (asked.size() == 2) return peer::Reply{};  // lost: this one is asked first in the next try
+    if (asked.size() == 2) return peer::Reply{};  // lost: the next round begins with this one
     const std::uint16_t word = request.function == 3 ? 250 : 0;
     return peer::Reply{peer::registers_pdu(request.function, {word})};
   });
@@ -155,7 +155,7 @@ TEST_CASE("a value whose status was read before it is as old as the status", "[s
   CHECK(running.all[0].taken_at < asked[3].second);
 }
 
-TEST_CASE("a busy or failing device is a fault, and a value again afterwards", "[source]") {
+TEST_CASE("a busy or failing device gives a fault, and a value again afterwards", "[source]") {
   peer::TcpDevice device;
   ModbusBusConfig bus = tcp_bus(device.port());
   bus.devices = {device_of(1, 0, {0})};
@@ -173,7 +173,7 @@ TEST_CASE("a busy or failing device is a fault, and a value again afterwards", "
   CHECK(running.becomes(0, 1000.0));
 }
 
-TEST_CASE("a dead unit has no answer, the others go on, and it comes back", "[source]") {
+TEST_CASE("a dead unit has no answer, the others continue, and it returns", "[source]") {
   std::atomic<bool> dead{true};
   peer::SerialLine line([&dead](const peer::Request& request) {
     return request.unit == 2 && dead ? peer::Reply{} : peer::honest(request);
@@ -195,7 +195,7 @@ TEST_CASE("a dead unit has no answer, the others go on, and it comes back", "[so
   CHECK(running.becomes(1, 2000.0));
 }
 
-TEST_CASE("a register range that is never answered leaves the rest readable", "[source]") {
+TEST_CASE("registers that are never answered leave the others readable", "[source]") {
   peer::TcpDevice device([](const peer::Request& request) {
     return request.address == 100 ? peer::Reply{} : peer::honest(request);
   });
@@ -246,7 +246,7 @@ TEST_CASE("a serial port that vanishes and returns is read again", "[source][rec
   CHECK(running.becomes(0, 1000.0));
 }
 
-TEST_CASE("while the renewal counter stands still, so do the times", "[source]") {
+TEST_CASE("while the renewal counter does not change, neither do the times", "[source]") {
   std::atomic<std::uint16_t> counter{1};
   peer::TcpDevice device([&counter](const peer::Request& request) {
     if (request.address == 90) return peer::Reply{peer::registers_pdu(4, {counter})};
@@ -265,7 +265,7 @@ TEST_CASE("while the renewal counter stands still, so do the times", "[source]")
   CHECK(peer::eventually([&] { return running.reading(0).taken_at > taken_at; }));
 }
 
-TEST_CASE("stop ends every wait within a second", "[source]") {
+TEST_CASE("stop ends any wait within a second", "[source]") {
   peer::TcpDevice silent([](const peer::Request&) { return peer::Reply{}; });
   ModbusBusConfig bus = tcp_bus(silent.port());
   bus.line.timeout_ms = 60000.0;
@@ -280,7 +280,7 @@ TEST_CASE("stop ends every wait within a second", "[source]") {
   CHECK(peer::steady_clock::now() - began < 1s);
 }
 
-TEST_CASE("a configuration that cannot work is refused with the device's name", "[source]") {
+TEST_CASE("an impossible configuration is refused with the device's name", "[source]") {
   ModbusBusConfig good = tcp_bus(502);
   good.devices = {device_of(1, 0, {0})};
   const auto refused = [&good](const std::function<void(ModbusBusConfig&)>& spoil) {

@@ -1,5 +1,5 @@
-// A data block of an S7 CPU behind the face of a Modbus line: the bytes of both sides, and a server
-// that answers anything.
+// Data block of an S7 CPU behind the interface of a Modbus line: the bytes of both sides, and a
+// server with arbitrary answers.
 #include <deque>
 #include <random>
 
@@ -21,13 +21,13 @@ Bytes granted(std::uint8_t pdu_bytes = 240) {
           8, 0, 0, 0,  0, 0xF0, 0,    0,    1, 0, 1, 0, pdu_bytes};
 }
 
-/// The TCP port below it: each request takes the next of the script's answers. Its clock moves
-/// while somebody waits, and a little with each byte string received.
+/// TCP port below it: each request takes the next of the scripted answers. Its clock advances
+/// during waits, and a little with each byte string received.
 class Server final : public ModbusPort {
  public:
   explicit Server(std::deque<Bytes> script) : script_(std::move(script)) {}
   std::vector<Bytes>* sent{nullptr};
-  Bytes endless;  ///< comes again and again once the script is over
+  Bytes endless;  ///< repeated once the script is over
 
   [[nodiscard]] nanoseconds now() const noexcept override { return clock_; }
   bool open(std::string& /*why*/) override { return true; }
@@ -73,7 +73,7 @@ ModbusLine line_to_db(int db) {
   return line;
 }
 
-/// A connection to DB 100 whose server answers so.
+/// A connection to DB 100 with a server that gives these answers.
 struct Link {
   explicit Link(std::deque<Bytes> script, const Bytes& endless = {}) {
     auto server = std::make_unique<Server>(std::move(script));
@@ -92,7 +92,7 @@ struct Link {
 
 }  // namespace
 
-TEST_CASE("words of a data block are read and written as bytes of it", "[s7]") {
+TEST_CASE("words of a data block are read and written as its bytes", "[s7]") {
   Link link({confirmed,
              granted(),
              {3, 0, 0, 29, 2, 0xF0, 0x80, 0x32, 3, 0,  0,    0,    1,    0,   2,
@@ -113,7 +113,7 @@ TEST_CASE("words of a data block are read and written as bytes of it", "[s7]") {
                               100, 0x84, 0, 0,  48, 0,    4,    0,    16,   0xAB, 0xCD});
 }
 
-TEST_CASE("a refusal of the CPU is said with its remedy", "[s7]") {
+TEST_CASE("a refusal of the CPU is reported with its remedy", "[s7]") {
   const auto refused = [](std::uint8_t code) {
     Link link({confirmed, granted(), {3, 0, 0, 22, 2, 0xF0, 0x80, 0x32, 3, 0, 0,
                                       0, 1, 0, 2,  0, 1,    0,    0,    4, 1, code}});
@@ -121,7 +121,7 @@ TEST_CASE("a refusal of the CPU is said with its remedy", "[s7]") {
     std::array<std::uint16_t, 1> words{};
     const Exchange exchange = link.read(words);
     CHECK(exchange.outcome == ExchangeOutcome::exception);
-    CHECK(exchange.unit_answered());  // 0x0A is no gateway's exception 10
+    CHECK(exchange.unit_answered());  // 0x0A is no gateway exception 10
     return exchange.detail;
   };
   CHECK_THAT(refused(0x03), Catch::Contains("0x03") && Catch::Contains("permit PUT/GET"));
@@ -130,7 +130,7 @@ TEST_CASE("a refusal of the CPU is said with its remedy", "[s7]") {
   CHECK_THAT(refused(0x06), Catch::Contains("0x06"));
 }
 
-TEST_CASE("a CPU that takes no connection is said", "[s7]") {
+TEST_CASE("a CPU that accepts no connection is reported", "[s7]") {
   const auto why = [](std::deque<Bytes> script) {
     const Link link(std::move(script));
     CHECK_FALSE(link.connection->connect());
@@ -144,7 +144,7 @@ TEST_CASE("a CPU that takes no connection is said", "[s7]") {
   CHECK_THAT(why({confirmed, granted(112)}), Catch::Contains("PDUs of 112 bytes"));
 }
 
-TEST_CASE("frames without end that answer nothing end in time", "[s7]") {
+TEST_CASE("an endless stream of unrelated frames ends in time", "[s7]") {
   const Bytes fragment{3, 0, 0, 8, 2, 0xF0, 0, 0x32};
   const Bytes of_another{3,    0, 0, 22, 2, 0xF0, 0x80, 0x32, 3, 0, 0,
                          0x77, 1, 0, 2,  0, 1,    0,    0,    4, 1, 5};
@@ -159,7 +159,7 @@ TEST_CASE("frames without end that answer nothing end in time", "[s7]") {
   }
 }
 
-TEST_CASE("whatever a server sends, an exchange ends and leaves no value", "[s7]") {
+TEST_CASE("for any bytes from a server, an exchange ends and gives no value", "[s7]") {
   std::mt19937 random(7);
   const auto any = [&](int below) {
     return static_cast<std::size_t>(random() % static_cast<unsigned>(below));
@@ -177,7 +177,7 @@ TEST_CASE("whatever a server sends, an exchange ends and leaves no value", "[s7]
     const nanoseconds begun = link.connection->now();
     const Exchange exchange = link.read(words);
     CHECK(link.connection->now() - begun < 2s);
-    // Bytes that are not looked at may have changed: what is ok is what was sent.
+    // Unchecked bytes may have changed: an ok answer is the one sent.
     if (exchange.ok())
       CHECK(words == std::array<std::uint16_t, 2>{0x1234, 0x5678});
     else

@@ -1,4 +1,4 @@
-/// One axis as the daemon drives it, and the controller that it talks to.
+/// One axis as driven by the daemon, with its controller.
 #pragma once
 
 #include "estimator/axes/axis_bank.hpp"
@@ -20,7 +20,7 @@ struct Bench {
     input.written = true;
     input.applied_um = 0.0;
   }
-  /// The controller applies what it was sent in the step before.
+  /// The controller applies the offset of the previous step.
   void step(double target_um) {
     if (obeys && axis().driven()) input.applied_um = axis().offset_um();
     input.now += std::chrono::milliseconds(100);
@@ -31,7 +31,7 @@ struct Bench {
   void steps(int count, double target_um) {
     for (int i = 0; i < count; ++i) step(target_um);
   }
-  /// One step with the input as it stands.
+  /// One step with the present input.
   void look() {
     Targets targets;
     targets.axis_um = {&input.target_um, 1};

@@ -1,4 +1,4 @@
-// The move of an axis by which an indicator confirms its sign.
+// Proving move of an axis, by which an indicator confirms its sign.
 #include <algorithm>
 #include <cmath>
 
@@ -19,7 +19,7 @@ TEST_CASE("a proving move goes out and back and ends where it began", "[axis]") 
   int steps = 0;
   double before_um = bench.axis().offset_um();
   while (bench.axis().proving() && steps < 1000) {
-    bench.step(-30.0);  // the compensation waits
+    bench.step(-30.0);  // the compensation pauses
     if (bench.axis().proving()) CHECK(bench.axis().offset_um() >= 4.0);
     CHECK(std::abs(bench.axis().offset_um() - before_um) <= 0.2 + 1e-12);
     before_um = bench.axis().offset_um();
@@ -47,8 +47,7 @@ TEST_CASE("a proving move stays within the bound", "[axis]") {
   CHECK_FALSE(bench.axis().proving());
 }
 
-TEST_CASE("a proving move that is too long, no number or of an axis not driven is ignored",
-          "[axis]") {
+TEST_CASE("a proving move that is too long, NaN or of an axis not driven is ignored", "[axis]") {
   Bench bench;
   bench.prove(5.0);
   CHECK_FALSE(bench.axis().proving());

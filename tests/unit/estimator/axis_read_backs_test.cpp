@@ -1,4 +1,4 @@
-// What an axis makes of what its controller reads back, on one link and on the next.
+// An axis and its read-backs, on one link and on the next.
 #include <algorithm>
 #include <cmath>
 
@@ -10,7 +10,7 @@ using namespace thermocomp;
 using namespace thermocomp::test;
 using namespace std::chrono_literals;
 
-TEST_CASE("an axis is not driven before the controller has reported what it applies", "[axis]") {
+TEST_CASE("an axis is not driven before the controller has reported its applied offset", "[axis]") {
   Bench bench;
   bench.obeys = false;
   bench.input.online = false;
@@ -24,7 +24,7 @@ TEST_CASE("an axis is not driven before the controller has reported what it appl
   bench.input.applied_um = 12.0;
   bench.step(30.0);
   CHECK(bench.axis().driven());
-  CHECK(bench.axis().offset_um() == Approx(12.2));  // from what is applied, at the rate
+  CHECK(bench.axis().offset_um() == Approx(12.2));  // from the applied offset, at the slew rate
 }
 
 TEST_CASE("an axis of a link that was never connected is not driven", "[axis]") {
@@ -37,7 +37,7 @@ TEST_CASE("an axis of a link that was never connected is not driven", "[axis]") 
   }
 }
 
-TEST_CASE("a new link starts from the read-back, not from what was sent", "[axis]") {
+TEST_CASE("a new link starts from the read-back, not from the offset sent", "[axis]") {
   Bench bench;
   bench.steps(100, 10.0);
   REQUIRE(bench.axis().offset_um() == 10.0);
@@ -55,7 +55,7 @@ TEST_CASE("a new link starts from the read-back, not from what was sent", "[axis
   CHECK_FALSE(bench.axis().mismatch());
 }
 
-TEST_CASE("a read-back that is old when the link is new does not take the offset back", "[axis]") {
+TEST_CASE("an old read-back on a new link does not set the offset back", "[axis]") {
   Bench bench;
   bench.steps(50, 30.0);
   const double sent_um = bench.axis().offset_um();
@@ -76,7 +76,7 @@ TEST_CASE("a read-back that is old when the link is new does not take the offset
   CHECK(bench.axis().offset_um() == Approx(0.2));
 }
 
-TEST_CASE("a new link that shows nonsense while the offset moves ages it too", "[axis]") {
+TEST_CASE("an implausible read-back on a new link ages the offsets sent too", "[axis]") {
   Bench bench;
   bench.steps(20, 40.0);  // from 0.2 to 4 um within the window
   const double sent_um = bench.axis().offset_um();
@@ -93,7 +93,7 @@ TEST_CASE("a new link that shows nonsense while the offset moves ages it too", "
 
 TEST_CASE("an axis that a new link finds on its way back starts from there", "[axis]") {
   Bench bench;
-  bench.steps(145, 30.0);  // the values on the way are of the last moments
+  bench.steps(145, 30.0);  // the last offsets are on the way
   const double sent_um = bench.axis().offset_um();
   bench.obeys = false;
   bench.input.link_epoch = 2;
@@ -106,7 +106,7 @@ TEST_CASE("an axis that a new link finds on its way back starts from there", "[a
   CHECK(bench.axis().offset_um() == Approx(0.9 * sent_um + 0.2));
 }
 
-TEST_CASE("one unexplained read-back pauses the axis, which goes on from its own offset",
+TEST_CASE("one unexplained read-back pauses the axis, which continues from its own offset",
           "[axis]") {
   Bench bench;
   bench.steps(100, 10.0);
@@ -119,25 +119,25 @@ TEST_CASE("one unexplained read-back pauses the axis, which goes on from its own
   bench.step(12.0);
   CHECK(bench.axis().driven());
   CHECK(bench.axis().offset_um() == Approx(10.2));
-  bench.input.applied_um = -40.0;  // once more, soon after: no accident
+  bench.input.applied_um = -40.0;  // once more, soon after: latched
   bench.step(12.0);
   CHECK(bench.axis().latched());
 }
 
-TEST_CASE("a pause of the same link changes nothing that is sent", "[axis]") {
+TEST_CASE("a pause of the same link does not change the offset", "[axis]") {
   Bench bench;
   bench.steps(100, 10.0);
   bench.input.link_epoch += epochs_of_a_link;
   bench.obeys = false;
-  bench.input.applied_um = 9.1;  // within what counts as agreement
+  bench.input.applied_um = 9.1;  // within the tolerance
   bench.steps(2, 12.0);
   CHECK(bench.axis().driven());
-  CHECK(bench.axis().offset_um() == 10.0);  // until a command of the new epoch has been written
+  CHECK(bench.axis().offset_um() == 10.0);  // until a command of the new epoch is written
   bench.step(12.0);
   CHECK(bench.axis().offset_um() == Approx(10.2));
 }
 
-TEST_CASE("a controller that refuses what it is sent finds no pent-up offset later", "[axis]") {
+TEST_CASE("a controller that refuses offsets gets no accumulated offset later", "[axis]") {
   Bench bench;
   bench.steps(100, 10.0);
   bench.obeys = false;
@@ -149,7 +149,7 @@ TEST_CASE("a controller that refuses what it is sent finds no pent-up offset lat
   CHECK(bench.axis().offset_um() == 10.0);
 }
 
-TEST_CASE("a new link that shows neither what was sent nor less of it is not believed", "[axis]") {
+TEST_CASE("a new link that shows neither the offset sent nor less of it is refused", "[axis]") {
   for (const double applied_um : {20.0, -10.0, 13.0}) {
     Bench bench;
     bench.steps(100, 10.0);
@@ -171,7 +171,7 @@ TEST_CASE("after a disagreement an old read-back does not start an axis", "[axis
   bench.input.applied_um = 0.0;
   bench.step(10.0);
   const nanoseconds taken_at = bench.input.taken_at;
-  for (int i = 0; i < 20; ++i) {  // the very same read-back again and again
+  for (int i = 0; i < 20; ++i) {  // the same read-back again and again
     bench.input.now += 100ms;
     bench.input.taken_at = taken_at;
     bench.look();
@@ -179,17 +179,17 @@ TEST_CASE("after a disagreement an old read-back does not start an axis", "[axis
   }
 }
 
-TEST_CASE("a read-back that is late, but of what was sent, is no mismatch", "[axis]") {
+TEST_CASE("a late read-back of an offset sent is no mismatch", "[axis]") {
   Bench bench;
   bench.steps(50, 5.0);
-  bench.obeys = false;  // the read-back stands still while the offset goes on
+  bench.obeys = false;  // the read-back stays while the offset moves
   const double before_um = bench.axis().offset_um();
   for (int i = 0; i < 20; ++i) bench.step(20.0);
   CHECK_FALSE(bench.axis().mismatch());
   CHECK(bench.axis().offset_um() > before_um + 3.9);
 }
 
-TEST_CASE("a controller that ignores what it is sent becomes a mismatch", "[axis]") {
+TEST_CASE("a controller that ignores offsets becomes a mismatch", "[axis]") {
   Bench bench;
   bench.steps(10, 0.0);
   bench.obeys = false;
@@ -223,7 +223,7 @@ TEST_CASE("a read-back rounded just beyond the bound is the bound", "[axis]") {
   CHECK(bench.axis().offset_um() == 50.0);
 }
 
-TEST_CASE("a read-back that is no number changes nothing once in agreement", "[axis]") {
+TEST_CASE("a read-back that is NaN changes nothing once synchronised", "[axis]") {
   Bench bench;
   bench.steps(100, 10.0);
   bench.obeys = false;
@@ -233,7 +233,7 @@ TEST_CASE("a read-back that is no number changes nothing once in agreement", "[a
   CHECK(bench.axis().offset_um() == 12.0);
 }
 
-TEST_CASE("while the controller is silent the offset goes on without comparison", "[axis]") {
+TEST_CASE("while the controller is offline the offset continues without comparison", "[axis]") {
   Bench bench;
   bench.steps(10, 0.0);
   bench.obeys = false;
@@ -245,7 +245,7 @@ TEST_CASE("while the controller is silent the offset goes on without comparison"
   CHECK(bench.axis().offset_um() == 1.0);
 }
 
-TEST_CASE("the surface-aware hold keeps the offset while cutting", "[axis]") {
+TEST_CASE("hold_while_cutting keeps the offset while cutting", "[axis]") {
   Bench bench;
   bench.steps(10, 1.0);
   bench.input.may_change = false;

@@ -1,4 +1,4 @@
-// A latched mismatch of an axis: what is told of it, and what a release believes.
+// Latched mismatch of an axis: its report and its release.
 #include <cmath>
 #include <string>
 
@@ -12,7 +12,7 @@ using namespace std::chrono_literals;
 
 namespace {
 
-/// A controller that applies (and shows) what `answer` makes of an offset.
+/// A controller that applies (and shows) `answer(offset)`.
 template <class Answer>
 Bench lied_to(double target_um, const Answer& answer) {
   Bench bench;
@@ -21,7 +21,7 @@ Bench lied_to(double target_um, const Answer& answer) {
   double before_um = bench.input.applied_um;
   for (int i = 0; i < 400; ++i) {
     bench.step(target_um);
-    // From the first contact on the offset keeps its slew, whatever is read back.
+    // From the first contact on, the offset keeps its slew limit for any read-back.
     CHECK(std::abs(bench.axis().offset_um() - before_um) <= 0.2 + 1e-9);
     before_um = bench.axis().offset_um();
     if (bench.axis().driven()) bench.input.applied_um = answer(bench.axis().offset_um());
@@ -36,12 +36,12 @@ std::string said(const Bench& bench) {
 
 }  // namespace
 
-TEST_CASE("two unexplained read-backs end the driving until an operator releases it", "[axis]") {
+TEST_CASE("two unexplained read-backs stop the axis until an operator releases it", "[axis]") {
   Bench bench;
   bench.steps(100, 10.0);
   CHECK_FALSE(bench.axis().mismatch());
   bench.obeys = false;
-  bench.input.applied_um = 0.0;  // re-homed, and the link has not noticed
+  bench.input.applied_um = 0.0;  // re-homed, not noticed by the link
   bench.step(10.0);
   CHECK(bench.axis().mismatch());
   CHECK_FALSE(bench.axis().driven());
@@ -65,8 +65,7 @@ TEST_CASE("two unexplained read-backs end the driving until an operator releases
   CHECK_FALSE(bench.axis().mismatch());
 }
 
-TEST_CASE("a released axis starts elsewhere only when its slew rate could have gone there",
-          "[axis]") {
+TEST_CASE("a released axis starts elsewhere only within reach of its slew rate", "[axis]") {
   Bench bench;
   bench.steps(100, 10.0);
   bench.obeys = false;
@@ -79,15 +78,15 @@ TEST_CASE("a released axis starts elsewhere only when its slew rate could have g
     bench.step(10.0);
     ++steps;
   }
-  CHECK(steps >= 45);  // 10 um at 2 um/s, less what had passed
+  CHECK(steps >= 45);  // 10 um at 2 um/s, less the time passed
   CHECK(steps <= 50);
   CHECK(bench.axis().offset_um() == Approx(0.2));
 }
 
-TEST_CASE("what is added from some moment on is believed in one release, and in no other",
+TEST_CASE("a constant that appears while running is accepted by one release and no other",
           "[axis]") {
   Bench bench;
-  bench.steps(100, 10.0);  // well for some time, at rest
+  bench.steps(100, 10.0);  // correct for some time, at rest
   bench.obeys = false;
   double added_um = 12.0;
   double applied_um = 10.0 + added_um;
@@ -114,7 +113,7 @@ TEST_CASE("what is added from some moment on is believed in one release, and in 
     CHECK(bench.axis().latched());
     CHECK(bench.axis().offset_um() == sent_um);
   }
-  added_um = 0.0;  // mended
+  added_um = 0.0;  // repaired
   applied_um = sent_um;
   bench.release();
   steps(200);
@@ -122,7 +121,7 @@ TEST_CASE("what is added from some moment on is believed in one release, and in 
   CHECK(bench.axis().offset_um() == Approx(10.0));
 }
 
-TEST_CASE("a release that is said again does not wait anew for the read-backs of a slow link",
+TEST_CASE("a repeated release does not restart the wait for the read-backs of a slow link",
           "[axis]") {
   Bench bench;
   bench.steps(100, 10.0);
@@ -134,14 +133,14 @@ TEST_CASE("a release that is said again does not wait anew for the read-backs of
   for (; !bench.axis().driven() && steps < 1000; ++steps) {
     bench.release();
     bench.input.now += 100ms;
-    if (steps % 10 == 0) bench.input.taken_at = bench.input.now;  // a read-back each second
+    if (steps % 10 == 0) bench.input.taken_at = bench.input.now;  // one read-back per second
     bench.look();
   }
   CHECK(steps <= 61);
 }
 
-TEST_CASE("what was read before the first write is nobody's answer to it", "[axis]") {
-  // It is 3 um beside from the first contact on: not another writer.
+TEST_CASE("a read-back from before the first write is not an answer to it", "[axis]") {
+  // It is 3 um off from the first contact on: not another writer.
   Bench bench;
   bench.obeys = false;
   bench.input.applied_um = 3.0;
@@ -155,7 +154,7 @@ TEST_CASE("what was read before the first write is nobody's answer to it", "[axi
   CHECK(told.find("another writer") == std::string::npos);
 }
 
-TEST_CASE("a factor that explains the older read-backs badly is not sure, and can be released",
+TEST_CASE("a factor that explains the older read-backs badly is not sure and can be released",
           "[axis]") {
   SentAndRead pairs;
   for (const double um : {-1.0, -2.0, -2.7}) pairs.note(um, um);
@@ -164,7 +163,7 @@ TEST_CASE("a factor that explains the older read-backs badly is not sure, and ca
   CHECK_FALSE(found.explains(-6.72, -2.72));
 }
 
-TEST_CASE("the usual mistakes of commissioning are reported by their names", "[axis]") {
+TEST_CASE("the usual mistakes of commissioning are reported by name", "[axis]") {
   CHECK(said(lied_to(-30.0, [](double um) { return 2.0 * um; })) ==
         "reads back twice what is sent: check scale");
   CHECK(said(lied_to(30.0, [](double um) { return 0.5 * um; })) ==
@@ -186,7 +185,7 @@ TEST_CASE("the usual mistakes of commissioning are reported by their names", "[a
   CHECK(said(bench) == "changes without us: another writer?");
 }
 
-TEST_CASE("a sign that flips while running is reported by its name", "[axis]") {
+TEST_CASE("a sign that flips while running is reported by name", "[axis]") {
   for (const bool moves : {false, true}) {
     Bench bench;
     bench.steps(100, 10.0);
@@ -199,11 +198,11 @@ TEST_CASE("a sign that flips while running is reported by its name", "[axis]") {
     CHECK(said(bench) == "opposite sign: check sign");
     bench.release();
     bench.steps(50, 10.0);
-    CHECK(bench.axis().latched());  // it still is opposite
+    CHECK(bench.axis().latched());  // still opposite
   }
 }
 
-TEST_CASE("a release does not believe what is still as wrong as it was", "[axis]") {
+TEST_CASE("a release is refused while the same cause persists", "[axis]") {
   Bench bench = lied_to(-30.0, [](double um) { return 2.0 * um; });
   const double sent_um = bench.axis().offset_um();
   bench.release();
@@ -211,14 +210,14 @@ TEST_CASE("a release does not believe what is still as wrong as it was", "[axis]
   CHECK(bench.axis().latched());
   CHECK_FALSE(bench.axis().releasing());
   CHECK(bench.axis().offset_um() == sent_um);
-  bench.input.applied_um = sent_um;  // the scale is mended
+  bench.input.applied_um = sent_um;  // the scale is corrected
   bench.release();
   bench.steps(2, -30.0);
   CHECK(bench.axis().driven());
   CHECK(bench.axis().offset_um() == Approx(sent_um - 0.2));
 }
 
-TEST_CASE("a latched mismatch outlives a new link and a reload", "[axis]") {
+TEST_CASE("a latched mismatch survives a new link and a reload", "[axis]") {
   Bench bench = lied_to(-30.0, [](double um) { return -um; });
   bench.input.link_epoch = 2;
   bench.input.applied_um = 0.0;

@@ -1,4 +1,4 @@
-// Without read-back: what an axis takes for the offset sent last, and when it is not driven.
+// Without read-back: source of the offset sent last, and when an axis is not driven.
 #include <algorithm>
 #include <cmath>
 #include <random>
@@ -14,7 +14,7 @@ using namespace std::chrono_literals;
 
 namespace {
 
-/// A controller that is not read back. NaN: its registers cannot be read either.
+/// A controller without read-back. NaN: its registers cannot be read either.
 struct Unread : Bench {
   explicit Unread(double register_um, const SentBefore& before = {}) : Bench(false) {
     obeys = false;
@@ -34,7 +34,7 @@ constexpr double none = not_a_number;
 
 }  // namespace
 
-TEST_CASE("registers that were written tell where an axis starts", "[start]") {
+TEST_CASE("written registers give the start of an axis", "[start]") {
   const SentBefore before = GENERATE(SentBefore{}, SentBefore{none, false, 8.4},
                                      SentBefore{7.5, true, none}, SentBefore{-30.0, false, none});
   Unread bench(8.0, before);
@@ -48,8 +48,8 @@ TEST_CASE("registers that were written tell where an axis starts", "[start]") {
   CHECK(bench.axis().offset_um() == Approx(28.2));
 }
 
-TEST_CASE("registers that contradict what was sent are not followed", "[start]") {
-  // A device may answer 0 for what can only be written.
+TEST_CASE("registers that contradict the offset sent are not followed", "[start]") {
+  // A device may answer 0 for write-only registers.
   const SentBefore before = GENERATE(SentBefore{none, false, -15.0}, SentBefore{-15.0, true, none});
   Unread bench(0.0, before);
   bench.steps(20, 30.0);
@@ -67,8 +67,8 @@ TEST_CASE("registers that contradict what was sent are not followed", "[start]")
   CHECK(bench.axis().offset_um() == -15.0);
 }
 
-TEST_CASE("a write that stayed out until the end is no contradiction", "[start]") {
-  Unread bench(10.0, {none, false, 15.0});  // 2.5 s of its slew behind
+TEST_CASE("a write that was unconfirmed until the end is no contradiction", "[start]") {
+  Unread bench(10.0, {none, false, 15.0});  // 2.5 s behind at its slew limit
   bench.step(10.0);
   CHECK(bench.axis().driven());
   CHECK(bench.axis().offset_um() == 10.0);
@@ -87,9 +87,8 @@ TEST_CASE("without registers an axis starts from the record, else from the state
   CHECK(by_file.axis().start() == StartEvidence::corridor);
 }
 
-TEST_CASE("where nothing tells what was sent last, an axis is not driven until released",
-          "[start]") {
-  // Any file may hold an offset; only a corridor was kept.
+TEST_CASE("with an unknown start an axis is not driven until released", "[start]") {
+  // Any file may hold an offset, but only with a corridor is it a start.
   const SentBefore before =
       GENERATE(SentBefore{}, SentBefore{8.0, false, none}, SentBefore{none, true, none},
                SentBefore{300.0, true, -499.0}, SentBefore{50.1, true, none});
@@ -102,7 +101,7 @@ TEST_CASE("where nothing tells what was sent last, an axis is not driven until r
   bench.release();
   CHECK(bench.axis().start() == StartEvidence::released);
   CHECK(bench.axis().offset_um() == 0.0);
-  CHECK_FALSE(bench.axis().driven());  // until the disk knows
+  CHECK_FALSE(bench.axis().driven());  // until the state is on disk
   bench.save();
   bench.steps(100, 30.0);
   CHECK(bench.axis().driven());
@@ -110,7 +109,7 @@ TEST_CASE("where nothing tells what was sent last, an axis is not driven until r
   CHECK(bench.axis().waits_for_disk());
 }
 
-TEST_CASE("a register beyond the bound is nothing to start from", "[start]") {
+TEST_CASE("a register beyond the bound gives no start", "[start]") {
   Unread bench(50.5);
   bench.steps(5, 0.0);
   CHECK(bench.axis().start_unknown());
@@ -122,7 +121,7 @@ TEST_CASE("a register beyond the bound is nothing to start from", "[start]") {
   CHECK(bench.axis().offset_um() == 0.0);
 }
 
-TEST_CASE("without registers an offset stays beside each that may be on disk",
+TEST_CASE("without registers an offset stays within reach of each that may be on disk",
           "[start][property]") {
   std::mt19937 random(GENERATE(range(0u, 50u)));
   const auto between = [&](double low, double high) {
@@ -130,7 +129,7 @@ TEST_CASE("without registers an offset stays beside each that may be on disk",
   };
   Unread bench(none, {5.0, true, none});
   double on_disk_um = 5.0;
-  double written_um = 5.0;  // on its way to the disk
+  double written_um = 5.0;  // being written to disk
   double waiting_um = none;
   double farthest_um = 0.0;
   for (int i = 0; i < 3000; ++i) {
@@ -144,7 +143,7 @@ TEST_CASE("without registers an offset stays beside each that may be on disk",
     bench.bank.saved(0, on_disk_um = written_um);
     if (std::isfinite(waiting_um)) written_um = std::exchange(waiting_um, none);
   }
-  CHECK(farthest_um > 2.0);  // and it goes on
+  CHECK(farthest_um > 2.0);  // and it moves on
 }
 
 TEST_CASE("a state saved before a release does not draw the axis back", "[start]") {
@@ -157,7 +156,7 @@ TEST_CASE("a state saved before a release does not draw the axis back", "[start]
   CHECK(bench.axis().offset_um() == 0.0);
 }
 
-TEST_CASE("a controller that was away goes on from its registers", "[start]") {
+TEST_CASE("a controller that was away continues from its registers", "[start]") {
   Unread bench(0.0);
   bench.steps(50, -15.0);
   REQUIRE(bench.axis().offset_um() == Approx(-10.0));
@@ -180,7 +179,7 @@ TEST_CASE("a controller that was away goes on from its registers", "[start]") {
   }
 }
 
-TEST_CASE("a controller that nothing is known of must not have had the time to restart",
+TEST_CASE("without registers or read-back, a controller must not have had time to restart",
           "[start]") {
   Unread bench(none, {0.0, true, none});
   bench.step(0.4);
@@ -212,7 +211,8 @@ TEST_CASE("a controller that was away before anything was sent may have restarte
   CHECK(bench.axis().start_unknown());
 }
 
-TEST_CASE("a release takes all nodes of a travel to zero where one is unknown", "[start][travel]") {
+TEST_CASE("a release takes all nodes of a travel to zero if the start of one is unknown",
+          "[start][travel]") {
   EstimatorConfig config;
   config.controller_reads_back = false;
   for (const double position_mm : {0.0, 500.0}) {
@@ -249,14 +249,14 @@ TEST_CASE("without read-back an offset does not move while nothing can be sent",
   const double sent_um = bench.axis().offset_um();
   bench.input.online = GENERATE(false, true);
   bench.input.written = false;
-  bench.steps(20, 0.0);  // on_loss = "ramp_to_zero", or nothing is taken
+  bench.steps(20, 0.0);  // on_loss = "ramp_to_zero", or writes are refused
   CHECK(bench.axis().offset_um() == sent_um);
   bench.input.online = bench.input.written = true;
   bench.step(0.0);
   CHECK(bench.axis().offset_um() == Approx(sent_um + 0.2));
 }
 
-TEST_CASE("a reload keeps what an axis is known by", "[start]") {
+TEST_CASE("a reload keeps the source of an axis' start", "[start]") {
   Unread bench(none, {5.0, true, none});
   bench.steps(10, 30.0);
   Unread next(none);

@@ -27,7 +27,7 @@ EstimatorConfig config_of(const std::vector<std::string>& sensors,
   return config;
 }
 
-/// Readings of `now`; NaN stands for a sensor that does not answer.
+/// Readings at `now`; NaN: the sensor does not answer.
 bool step(BlockBank& bank, nanoseconds now, const std::vector<double>& temps_degC) {
   std::vector<Reading> readings;
   for (const double value : temps_degC)
@@ -47,13 +47,13 @@ TEST_CASE("a block's temperature is the mean of its sensors", "[blocks]") {
   CHECK(bank.temps_degC()[1] == 20.5);
 }
 
-TEST_CASE("a sensor that drops out does not shift the mean", "[blocks]") {
+TEST_CASE("the loss of a sensor does not shift the mean", "[blocks]") {
   BlockBank bank(config_of({"a", "b", "c"}, {{"one", "t1_degC", {0, 1, 2}}}), {"t1_degC"});
   step(bank, 1s, {20.0, 23.0, 26.0});
   CHECK(bank.temps_degC()[0] == 23.0);
   CHECK(step(bank, 10s, {20.0, 23.0, not_a_number}));
   CHECK(bank.temps_degC()[0] == 23.0);
-  // The others rise by 1 K, so does the block.
+  // The others rise by 1 K, and so does the block.
   CHECK(step(bank, 12s, {21.0, 24.0, not_a_number}));
   CHECK(bank.temps_degC()[0] == 24.0);
   CHECK(step(bank, 20s, {not_a_number, 24.5, not_a_number}));
@@ -70,7 +70,7 @@ TEST_CASE("a block without a good sensor is lost and keeps its last temperature"
   CHECK_FALSE(bank.good(1));
   CHECK(std::isnan(bank.temps_degC()[1]));
   CHECK(step(bank, 2s, {20.0, 25.0}));
-  CHECK(step(bank, 5s, {20.0, not_a_number}));              // the last reading still serves
+  CHECK(step(bank, 5s, {20.0, not_a_number}));              // the last reading is still used
   CHECK_FALSE(step(bank, 7s + 1ns, {20.0, not_a_number}));  // stale
   CHECK(bank.temps_degC()[1] == 25.0);
   CHECK(step(bank, 9s, {20.0, 25.5}));
@@ -109,8 +109,7 @@ TEST_CASE("sensors, columns or references that do not exist are refused", "[bloc
   refuses("t1_degC", "sensor[a].reference_sensor = 1: must be the index of a sensor");
 }
 
-TEST_CASE("a reload keeps the smoothing of what is the same and begins anew what is not",
-          "[blocks]") {
+TEST_CASE("a reload keeps the smoothing of unchanged sensors and restarts the others", "[blocks]") {
   auto config = config_of({"a", "b", "bed"}, {{"one", "t1_degC", {0}}, {"two", "t2_degC", {1}}});
   for (SensorConfig& sensor : config.sensors) {
     sensor.smoothing.form = SmoothingForm::sliding_line;
@@ -125,6 +124,6 @@ TEST_CASE("a reload keeps the smoothing of what is the same and begins anew what
   after.plan_adoption(before);
   after.adopt(before);
   step(after, 6s, {26.0, 31.0, 20.0});
-  CHECK(after.temps_degC()[0] == Approx(5.3));   // clipped: the history went on
-  CHECK(after.temps_degC()[1] == Approx(31.0));  // begun anew: passes through
+  CHECK(after.temps_degC()[0] == Approx(5.3));   // clipped: the history continued
+  CHECK(after.temps_degC()[1] == Approx(31.0));  // restarted: passes through
 }

@@ -1,4 +1,4 @@
-/// Corrections once a machining cycle, and what is held between.
+/// Update once per machining cycle, and the held state between.
 #include <catch2/catch.hpp>
 
 #include "estimator/learning/cycle_update.hpp"
@@ -8,7 +8,7 @@ using namespace thermocomp;
 
 namespace {
 
-/// Cycle by cycle, one interval ahead, a heat source and a tie, probed as a whole displacement.
+/// Every cycle, one interval ahead, heat source and tie, probed as total displacement.
 EstimatorConfig gate_config() {
   EstimatorConfig config = small_config();
   config.compensation.update = UpdateRule::each_cycle;
@@ -44,7 +44,7 @@ EstimatorConfig guideway_config() {
   return config;
 }
 
-/// The temperatures have arrived when the cycle ends, and the offset when the next one begins.
+/// The temperatures have settled when the cycle ends, and the offset when the next one begins.
 void end_cycle(Machine& machine, const std::vector<double>& temps_degC) {
   machine.steps(5, temps_degC);
   machine.estimator.apply({CommandKind::cycle_end, 0, 0.0});
@@ -75,11 +75,10 @@ TEST_CASE("each_cycle: the offset changes at cycle ends only", "[cycle_hold][est
   CHECK(machine.offset_um() == -16.0);
 }
 
-TEST_CASE("a coil that rises, a counter that changes, and every n-th of them end a cycle",
-          "[cycle_hold]") {
+TEST_CASE("a rising coil, a changing counter, and every n-th of them end a cycle", "[cycle_hold]") {
   CycleEnds coil(1, true);
   for (const double value : {1.0, 1.0, 0.0, not_a_number, 0.0}) coil.signal(value);
-  CHECK(coil.count() == 0);  // standing at 1 when the daemon starts ends nothing
+  CHECK(coil.count() == 0);  // 1 at the daemon's start ends no cycle
   coil.signal(1.0);
   CHECK(coil.count() == 1);
   CHECK(coil.take(false) == false);
@@ -92,7 +91,7 @@ TEST_CASE("a coil that rises, a counter that changes, and every n-th of them end
   CHECK(counter.take(true));
 }
 
-TEST_CASE("one cycle ahead, temperatures go on as they went, and the gains are today's",
+TEST_CASE("one cycle ahead, temperatures are extrapolated and the gains are the present ones",
           "[cycle_hold][estimator]") {
   Machine machine(gate_config(), gate_model());
   machine.step({20.0, 20.0});
@@ -106,16 +105,16 @@ TEST_CASE("one cycle ahead, temperatures go on as they went, and the gains are t
   CHECK(machine.offset_um() == Approx(-8.0));
 }
 
-TEST_CASE("a gain that a probing corrects is no change that goes on", "[cycle_hold][estimator]") {
+TEST_CASE("a gain corrected by a probing is not extrapolated", "[cycle_hold][estimator]") {
   Machine machine(gate_config(), gate_model());
   machine.step({20.0, 20.0});
-  // Phase 1, temperatures constant: the model says 10, 12 are measured, and the next offset is -12.
+  // Phase 1, temperatures constant: model 10, measured 12, and the next offset is -12.
   for (int i = 0; i < 2; ++i) end_cycle(machine, {22.5, 20.0});
   CHECK(machine.offset_um() == Approx(-10.0));
   probe(machine, 12.0, {22.5, 20.0});
   end_cycle(machine, {22.5, 20.0});
   CHECK(machine.offset_um() == Approx(-12.0));
-  // Phase 2: the tie is warm, 1.2 x 10 - 4 = 8 are said, 6.4 are measured.
+  // Phase 2: the tie is warm, model 1.2 x 10 - 4 = 8, measured 6.4.
   for (int i = 0; i < 2; ++i) end_cycle(machine, {22.5, 22.0});
   CHECK(machine.offset_um() == Approx(-8.0));
   probe(machine, 6.4, {22.5, 22.0});
@@ -124,7 +123,7 @@ TEST_CASE("a gain that a probing corrects is no change that goes on", "[cycle_ho
   CHECK(machine.offset_um() == Approx(-6.4));
 }
 
-TEST_CASE("a matrix that has been reloaded counts for the held temperatures, and not as a change",
+TEST_CASE("a reloaded matrix applies to the held temperatures and is not extrapolated",
           "[cycle_hold][estimator]") {
   Machine machine(gate_config(), gate_model());
   machine.step({20.0, 20.0});
@@ -155,7 +154,7 @@ TEST_CASE("temperatures are held between cycle ends, the position is not",
   CHECK(machine.offset_um() == Approx(-33.0));
 }
 
-TEST_CASE("a lag stands still between cycle ends, and goes an interval ahead where that is wanted",
+TEST_CASE("a lag is constant between cycle ends, and goes an interval ahead if configured",
           "[cycle_hold][estimator]") {
   const auto ahead = GENERATE(0.0, 1.0);
   ThermalModel model = gate_model();
@@ -185,7 +184,7 @@ TEST_CASE("a lag stands still between cycle ends, and goes an interval ahead whe
   CHECK(machine.offset_um() == Approx(-live.report().displacement_um[0]).epsilon(1e-9));
 }
 
-TEST_CASE("a new reference is what is held from then on", "[cycle_hold][estimator]") {
+TEST_CASE("a new reference is the held state from then on", "[cycle_hold][estimator]") {
   Machine machine(gate_config(), gate_model());
   machine.step({20.0, 20.0});
   for (int i = 0; i < 2; ++i) end_cycle(machine, {22.5, 20.0});
@@ -196,7 +195,7 @@ TEST_CASE("a new reference is what is held from then on", "[cycle_hold][estimato
   CHECK(machine.offset_um() == Approx(-2.0));
 }
 
-TEST_CASE("what is held survives a restart, at any position", "[cycle_hold][estimator]") {
+TEST_CASE("the held state survives a restart, at any position", "[cycle_hold][estimator]") {
   Machine machine(guideway_config(), guideway_model());
   machine.controller.signals[3] = 0.0;
   machine.step({20.0, 20.0});
@@ -215,7 +214,7 @@ TEST_CASE("what is held survives a restart, at any position", "[cycle_hold][esti
   CHECK(next.offset_um() == Approx(-30.0));
 }
 
-TEST_CASE("a state with a hole is not held: the offset stays until the next cycle end",
+TEST_CASE("an incomplete state is not held: the offset stays until the next cycle end",
           "[cycle_hold][estimator]") {
   Machine machine(guideway_config(), guideway_model());
   PersistentState state;

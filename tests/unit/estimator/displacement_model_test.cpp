@@ -38,7 +38,7 @@ Vector displacement(DisplacementModel& model, nanoseconds now, const Vector& tem
   return out;
 }
 
-/// One output, reference 0: what it is at `now`.
+/// The only output at `now`, reference 0.
 double single(DisplacementModel& model, nanoseconds now, const Vector& temps_degC,
               const Vector& signals = {}) {
   return displacement(model, now, temps_degC, Vector(temps_degC.size(), 0.0), signals, 1)[0];
@@ -72,7 +72,7 @@ TEST_CASE("a guideway's row is that of the position: at nodes, between, and beyo
   CHECK(z_um(1e6)[1] == Approx(81.0));
 }
 
-TEST_CASE("a lag follows a step exactly, whatever the steps of time", "[displacement]") {
+TEST_CASE("a lag follows a step exactly for any step length", "[displacement]") {
   // d = g (LP(T) - T): after a step of 10 K it is -g 10 exp(-t / tau).
   ThermalModel spec = without_matrix();
   spec.terms = {
@@ -80,7 +80,7 @@ TEST_CASE("a lag follows a step exactly, whatever the steps of time", "[displace
   for (const int step_s : {1, 7, 60, 899, 5000}) {
     DisplacementModel model(spec);
     CHECK(single(model, 0s, {0.0}) == 0.0);
-    // The input of a step is taken as constant over it.
+    // The input is constant over a step.
     int time_s = 0;
     for (int i = 0; i < 20; ++i) {
       time_s += step_s;
@@ -90,7 +90,7 @@ TEST_CASE("a lag follows a step exactly, whatever the steps of time", "[displace
   }
 }
 
-TEST_CASE("a missing heat source warms with the signal, linear or squared", "[displacement]") {
+TEST_CASE("a missing heat source heats up with the signal, linear or squared", "[displacement]") {
   for (const double power : {1.0, 2.0}) {
     ThermalModel spec = without_matrix();
     spec.terms = {{"missing_heat_source",
@@ -106,7 +106,7 @@ TEST_CASE("a missing heat source warms with the signal, linear or squared", "[di
   }
 }
 
-TEST_CASE("a missing temperature acts at once without tau_s and late with it", "[displacement]") {
+TEST_CASE("a missing temperature acts without lag unless tau_s is given", "[displacement]") {
   for (const double tau_s : {0.0, 600.0}) {
     ThermalModel spec = without_matrix();
     spec.terms = {{"missing_temperature",
@@ -123,7 +123,7 @@ TEST_CASE("a missing temperature acts at once without tau_s and late with it", "
   }
 }
 
-TEST_CASE("speed growth follows the squared speed at once", "[displacement]") {
+TEST_CASE("speed growth follows the squared speed without lag", "[displacement]") {
   ThermalModel spec = without_matrix();
   spec.terms = {{"speed_growth", "spindle_rpm", {}, {{"gain_um_per_unit2", {{"z_um", 1e-7}}}}}};
   DisplacementModel model(spec);
@@ -132,7 +132,7 @@ TEST_CASE("speed growth follows the squared speed at once", "[displacement]") {
   CHECK(single(model, 2s, {0.0}, {0.0}) == 0.0);
 }
 
-TEST_CASE("hinges make a curve of straight pieces of a signal", "[displacement]") {
+TEST_CASE("hinges form a piecewise linear curve of a signal", "[displacement]") {
   ThermalModel spec = without_matrix();
   for (const auto& [above, gain] : {std::pair{1000.0, 2e-3}, std::pair{3000.0, -5e-3}})
     spec.terms.push_back({"signal_hinge",
@@ -146,7 +146,7 @@ TEST_CASE("hinges make a curve of straight pieces of a signal", "[displacement]"
   CHECK(single(model, 3s, {0.0}, {5000.0}) == Approx(-2.0));
 }
 
-TEST_CASE("a term acts on the outputs it names, in their order", "[displacement]") {
+TEST_CASE("a term acts on its named outputs, in their order", "[displacement]") {
   ThermalModel spec = without_matrix({"x_um", "y_um", "z_um"});
   spec.terms = {{"speed_growth",
                  "spindle_rpm",
@@ -167,7 +167,7 @@ TEST_CASE("a restart starts the lags at their input's value", "[displacement]") 
   CHECK(single(model, 2s, {10.0}) == 0.0);
 }
 
-TEST_CASE("a reloaded model keeps the past of the terms that are the same", "[displacement]") {
+TEST_CASE("a reloaded model keeps the states of unchanged terms", "[displacement]") {
   ThermalModel spec = without_matrix();
   const TermSpec slow{
       "thermal_lag", "t1_degC", {{"tau_s", 900.0}}, {{"gain_um_per_K", {{"z_um", 1.0}}}}};
@@ -222,7 +222,7 @@ TEST_CASE("a model whose shapes or names do not fit is refused", "[displacement]
 
 namespace {
 
-/// One temperature at two time scales and the square of a speed, beside the matrix.
+/// One temperature on two time scales and the square of a speed, in addition to the matrix.
 ThermalModel with_bank() {
   ThermalModel model = two_by_two();
   TermSpec term;
@@ -243,11 +243,11 @@ TEST_CASE("a bank of lags adds each subject's low passes with their gains", "[di
   CHECK(displacement(model, 1s, {0.0, 0.0}, reference, {0.0}, 2) == Vector{0.0, 0.0});
   const Vector later = displacement(model, 101s, {4.0, 0.0}, reference, {1000.0}, 2);
   CHECK(later[0] == Approx(20.0));
-  // -2 * 4, the lag after one time constant, and 2e-6 * 1000^2 at once.
+  // -2 * 4, the lag after one time constant, and 2e-6 * 1000^2 without lag.
   CHECK(later[1] == Approx(-8.0 + 1.5 * 4.0 * (1.0 - std::exp(-1.0)) + 2.0));
 }
 
-TEST_CASE("a bank of lags says what thermal_lag and missing_heat_source say", "[displacement]") {
+TEST_CASE("a bank of lags equals thermal_lag and missing_heat_source", "[displacement]") {
   ThermalModel plain = two_by_two();
   plain.terms = {
       {"thermal_lag", "t2_degC", {{"tau_s", 700.0}}, {{"gain_um_per_K", {{"x_um", 3.0}}}}},
@@ -274,7 +274,7 @@ TEST_CASE("a bank of lags says what thermal_lag and missing_heat_source say", "[
   }
 }
 
-TEST_CASE("a bank keeps its past over a reload with other gains, and loses it with other lags",
+TEST_CASE("a bank keeps its state over a reload with other gains, and loses it with other lags",
           "[displacement]") {
   const Vector reference{0.0, 0.0};
   DisplacementModel old_model(with_bank());
@@ -294,7 +294,7 @@ TEST_CASE("a bank keeps its past over a reload with other gains, and loses it wi
   CHECK(DisplacementModel(spec).plan_terms(old_model) == std::vector<int>{-1});
 }
 
-TEST_CASE("a large bank's state is saved, loaded and adopted whole", "[displacement]") {
+TEST_CASE("a large bank's state is saved, loaded and adopted completely", "[displacement]") {
   ThermalModel spec = two_by_two();
   TermSpec term;
   term.kind = "lag_bank";
@@ -313,9 +313,9 @@ TEST_CASE("a large bank's state is saved, loaded and adopted whole", "[displacem
         displacement(other, 25s, zero, zero, Vector(60, 1.0), 2));
 }
 
-TEST_CASE("a bank's value without a lag is that of the call, also at the same moment",
+TEST_CASE("a bank's value without lag is that of the call, also at the same time",
           "[displacement]") {
-  // A held state is asked again at its own moment, with the slides elsewhere.
+  // A held state is evaluated again at its own time, with the slides elsewhere.
   ThermalModel spec = without_matrix();
   TermSpec term;
   term.kind = "lag_bank";
@@ -340,7 +340,7 @@ TEST_CASE("a bank whose shapes or names do not fit is refused", "[displacement]"
   CHECK_THROWS_AS(DisplacementModel(spec), InvalidValue);
 }
 
-TEST_CASE("the slope is what a small rise does in the end, whatever the terms", "[displacement]") {
+TEST_CASE("the slope is the steady-state effect of a small rise for all terms", "[displacement]") {
   const auto term = [](const char* kind, const char* subject, const char* gain, double value) {
     TermSpec spec;
     spec.kind = kind;
@@ -365,13 +365,13 @@ TEST_CASE("the slope is what a small rise does in the end, whatever the terms", 
   REQUIRE(spec.temperature_columns().size() == 3);
   const Vector signals{60.0};
   const auto z_um = [&](const Vector& rise_K) {
-    model.restart();  // every lag is over
+    model.restart();  // every lag has settled
     return displacement(model, 1s, rise_K, Vector(3, 0.0), signals, 2)[1];
   };
   const Vector rise_K{4.0, 3.0, 2.0};
   Vector slope(3);
-  z_um(rise_K);  // a term that multiplies two values goes by those of the last step
-  // The slope is taken at the rises that the structure has, which here are exchanged.
+  z_um(rise_K);  // a term that multiplies two values uses those of the last step
+  // The slope is taken at the true rises, which here are exchanged.
   model.slope(1, Vector{3.0, 4.0, 2.0}, signals, slope);
   for (std::size_t i = 0; i < 3; ++i) {
     Vector more = rise_K;
@@ -383,7 +383,7 @@ TEST_CASE("the slope is what a small rise does in the end, whatever the terms", 
   }
 }
 
-TEST_CASE("the slope counts a lag that goes further on the way than in the end", "[displacement]") {
+TEST_CASE("the slope uses a lag's transient where larger than its steady state", "[displacement]") {
   ThermalModel spec = two_by_two();
   TermSpec lag;
   lag.kind = "thermal_lag";
@@ -394,12 +394,12 @@ TEST_CASE("the slope counts a lag that goes further on the way than in the end",
   const DisplacementModel model(spec);
   Vector slope(2);
   model.slope(1, Vector{1.0, 1.0}, {}, slope);
-  CHECK(slope == Vector{-2.0, 5.0});  // 3 + 2 at once, 3 in the end
+  CHECK(slope == Vector{-2.0, 5.0});  // 3 + 2 at first, 3 in steady state
 }
 
-TEST_CASE("the certainty of an offset counts the largest that a bank may still do",
+TEST_CASE("the certainty of an offset uses the largest effect that a bank may still have",
           "[displacement]") {
-  ThermalModel spec = with_bank();  // z: -2 at once, then -0.5
+  ThermalModel spec = with_bank();  // z: -2 at first, then -0.5
   const DisplacementModel model(spec);
   Vector slope(2);
   model.slope(1, Vector{1.0, 1.0}, Vector{0.0}, slope);
@@ -410,7 +410,7 @@ TEST_CASE("the certainty of an offset counts the largest that a bank may still d
   CHECK(slope == Vector{8.0, 3.0});
 }
 
-TEST_CASE("a diameter moves its axis by half, with its sign, whatever the model is made of",
+TEST_CASE("a diameter moves its axis by half, with its sign, for all parts of a model",
           "[model][property]") {
   ThermalModel model = two_by_two();
   model.outputs = {"dia_um", "z_um"};

@@ -11,7 +11,7 @@ using namespace thermocomp;
 
 namespace {
 
-/// Lost data at -30 um with the ramp policy and no time to hold, in the middle of a cut.
+/// Data lost at -30 um with on_loss = ramp_to_zero and hold_s = 0, during a cut.
 Machine lost_mid_cut(EstimatorConfig& config) {
   config.compensation.on_loss = LossPolicy::ramp_to_zero;
   config.compensation.hold_s = 0;
@@ -28,7 +28,7 @@ Machine lost_mid_cut(EstimatorConfig& config) {
 
 }  // namespace
 
-TEST_CASE("lost data never clear an offset mid-cut, nor where no signal tells whether it is one",
+TEST_CASE("loss of data clears no offset during a cut, or where cutting is unknown",
           "[estimator]") {
   auto config = small_config();
   Machine machine = lost_mid_cut(config);
@@ -44,7 +44,7 @@ TEST_CASE("lost data never clear an offset mid-cut, nor where no signal tells wh
 }
 
 TEST_CASE(
-    "an offset outside a new, smaller bound comes in at the slew rate mid-cut too, and waits "
+    "an offset outside a new, smaller bound returns at the slew rate during a cut too and stops "
     "there",
     "[estimator]") {
   auto config = small_config();
@@ -61,7 +61,7 @@ TEST_CASE(
 
 namespace {
 
-/// Both blocks warm together; the column's effect on z is 1 um/K.
+/// Both blocks warm together; the effect of the column on z is 1 um/K.
 ThermalModel model_with_covariance() {
   auto model = small_model();
   model.covariance_K2 = {{4.0, 3.9}, {3.9, 4.0}};
@@ -71,7 +71,7 @@ ThermalModel model_with_covariance() {
 
 }  // namespace
 
-TEST_CASE("a lost block is estimated, and compensation goes on with a stated uncertainty",
+TEST_CASE("a lost block is estimated, and compensation continues with a stated uncertainty",
           "[estimator]") {
   Machine machine(small_config(), model_with_covariance());
   machine.step({20.0, 30.0});
@@ -81,7 +81,7 @@ TEST_CASE("a lost block is estimated, and compensation goes on with a stated unc
   CHECK(machine.report().mode == Mode::compensating);
   CHECK(machine.says(Reason::block_estimated));
   CHECK_FALSE(machine.says(Reason::block_lost));
-  CHECK(machine.offset_um() == -6.0);  // begins where it was
+  CHECK(machine.offset_um() == -6.0);  // starts at the last offset
   machine.steps(100, {23.0, lost});
   const InputReport column = machine.report().inputs[1];
   CHECK(column.estimated);
@@ -95,7 +95,8 @@ TEST_CASE("a lost block is estimated, and compensation goes on with a stated unc
   CHECK(machine.report().axes[0].offset_sd_um == 0.0);
 }
 
-TEST_CASE("beyond offset_sd_um_max, or told not to estimate, the offset holds", "[estimator]") {
+TEST_CASE("beyond offset_sd_um_max, or without estimate_lost_blocks, the offset holds",
+          "[estimator]") {
   auto config = small_config();
   const bool too_uncertain = GENERATE(true, false);
   if (too_uncertain)
@@ -127,7 +128,7 @@ TEST_CASE("no reference is taken while a block is estimated", "[estimator]") {
   CHECK(machine.report().inputs[0].reference_degC == 20.0);
 }
 
-TEST_CASE("a reload and a saved state carry an estimate on", "[estimator]") {
+TEST_CASE("a reload and a saved state continue an estimate", "[estimator]") {
   Machine machine(small_config(), model_with_covariance());
   machine.step({20.0, 30.0});
   machine.steps(20, {21.0, lost});
@@ -148,7 +149,7 @@ TEST_CASE("a reload and a saved state carry an estimate on", "[estimator]") {
   CHECK(twin.offset_um() == Approx(offset_um).margin(1e-9));
 }
 
-TEST_CASE("a restart with a sensor still lost goes on from the stored temperatures",
+TEST_CASE("a restart with a sensor still lost continues from the stored temperatures",
           "[estimator]") {
   auto config = small_config();
   Machine machine(config, model_with_covariance());
@@ -166,7 +167,7 @@ TEST_CASE("a restart with a sensor still lost goes on from the stored temperatur
   CHECK(machine.report().inputs[1].sd_K > 0.3);
 }
 
-TEST_CASE("the spread of an offset knows guideways and terms", "[estimator]") {
+TEST_CASE("the standard deviation of an offset includes guideways and terms", "[estimator]") {
   auto model = model_with_covariance();
   auto config = small_config();
   config.compensation.offset_sd_um_max = 500.0;
@@ -179,6 +180,6 @@ TEST_CASE("the spread of an offset knows guideways and terms", "[estimator]") {
   machine.step({20.0, 30.0});
   machine.steps(20, {20.0, lost});
   const double sd_K = machine.report().inputs[1].sd_K;
-  // 1 of the matrix, 2 half-way along the guideway, and 2 more until the lag has caught up.
+  // 1 from the matrix, 2 half-way along the guideway, and 2 more until the lag has settled.
   CHECK(machine.report().axes[0].offset_sd_um == Approx(5.0 * sd_K));
 }

@@ -29,7 +29,7 @@ TEST_CASE("the reference is the first valid sample and stays", "[estimator]") {
   CHECK(machine.report().axes[0].displacement_um == 6.0);
 }
 
-TEST_CASE("an axis that the controller counts the other way gets the other sign", "[estimator]") {
+TEST_CASE("an axis with sign -1 gets the offset with the opposite sign", "[estimator]") {
   auto config = small_config();
   config.axes[0].sign = -1.0;
   Machine machine(config);
@@ -38,13 +38,13 @@ TEST_CASE("an axis that the controller counts the other way gets the other sign"
   CHECK(machine.offset_um() == 6.0);
 }
 
-TEST_CASE("what is not written is not compensated", "[estimator]") {
+TEST_CASE("without confirmed writes nothing is compensated", "[estimator]") {
   Machine machine;
   machine.controller.written = false;
   machine.steps(5, {20.0, 30.0});
   CHECK(machine.report().mode == Mode::starting);
   CHECK(machine.says(Reason::not_written));
-  CHECK(machine.command.valid[0]);  // or it never would be
+  CHECK(machine.command.valid[0]);  // else it would never be written
   machine.controller.written = true;
   machine.steps(5, {21.0, 30.0});
   CHECK(machine.report().mode == Mode::compensating);
@@ -61,7 +61,7 @@ TEST_CASE("what is not written is not compensated", "[estimator]") {
   CHECK_FALSE(machine.says(Reason::not_written));
 }
 
-TEST_CASE("a signal that is missing or garbled holds the offset and leaves nothing behind",
+TEST_CASE("a signal that is missing or garbled holds the offset and has no later effect",
           "[estimator]") {
   auto model = small_model();
   model.terms = {{"missing_heat_source",
@@ -105,7 +105,7 @@ TEST_CASE("disable and enable move at the slew rate", "[estimator]") {
   }
 }
 
-TEST_CASE("measured and cycle end are remembered for the report and move nothing", "[estimator]") {
+TEST_CASE("measured and cycle end are reported and move nothing", "[estimator]") {
   Machine machine;
   machine.steps(3, {20.0, 30.0});
   machine.estimator.apply({CommandKind::measured, 0, 3.5});
@@ -117,7 +117,7 @@ TEST_CASE("measured and cycle end are remembered for the report and move nothing
   CHECK(machine.offset_um() == 0.0);
 }
 
-TEST_CASE("a part measured later than the past reaches back is counted as refused", "[estimator]") {
+TEST_CASE("a part measured later than the kept past is counted as refused", "[estimator]") {
   Machine machine;
   machine.steps(3, {20.0, 30.0});
   Command part{CommandKind::measured, 0, 3.5};
@@ -130,7 +130,8 @@ TEST_CASE("a part measured later than the past reaches back is counted as refuse
   CHECK(machine.report().axes[0].correction.taken == 0);
 }
 
-TEST_CASE("a kept reference that no sensor could show is refused with its key", "[estimator]") {
+TEST_CASE("a restored reference outside the sensors' range is refused with its key",
+          "[estimator]") {
   for (const double reference_degC : {1e300, -300.0, 200.1, -30.1}) {
     PersistentState state;
     state.reference_degC = {{"t1_degC", 20.0}, {"t2_degC", reference_degC}};
@@ -139,7 +140,7 @@ TEST_CASE("a kept reference that no sensor could show is refused with its key", 
     REQUIRE(refused.size() == 1);
     CHECK(refused[0].find("reference_degC.t2_degC = ") == 0);
     CHECK(refused[0].find("must be in [-30, 200]") != std::string::npos);
-    // A reference taken now would be that of a machine in any state: nothing is compensated.
+    // A reference taken now would be in an arbitrary state: nothing is compensated.
     machine.steps(5, {40.0, 50.0});
     CHECK(machine.report().mode == Mode::disabled);
     CHECK(machine.offset_um() == 0.0);
@@ -151,7 +152,7 @@ TEST_CASE("a kept reference that no sensor could show is refused with its key", 
   }
 }
 
-TEST_CASE("a reference in the model that no sensor could show is refused", "[estimator]") {
+TEST_CASE("a reference in the model outside the sensors' range is refused", "[estimator]") {
   for (const double reference_degC : {1e300, -300.0, 200.1}) {
     ThermalModel model = small_model();
     model.reference_degC = {20.0, reference_degC};
@@ -164,7 +165,7 @@ TEST_CASE("a reference in the model that no sensor could show is refused", "[est
   }
 }
 
-TEST_CASE("a target that is no finite number holds the offset, with a reason", "[estimator]") {
+TEST_CASE("a non-finite target holds the offset, with a reason", "[estimator]") {
   ThermalModel model = small_model();
   model.matrix_um_per_K = {{1e308, 1e308}};
   Machine machine(small_config(), model);
@@ -190,7 +191,7 @@ TEST_CASE("while compensating the target is a number, also before the first cycl
   CHECK(machine.report().axes[0].target_um == 0.0);
 }
 
-TEST_CASE("an operator releases an axis that was latched, and no other", "[estimator]") {
+TEST_CASE("an operator releases a latched axis and no other", "[estimator]") {
   Machine machine;
   machine.steps(3, {20.0, 30.0});
   machine.steps(20, {24.0, 30.0});
@@ -209,7 +210,7 @@ TEST_CASE("an operator releases an axis that was latched, and no other", "[estim
   CHECK(machine.controller.applied_um[0] == Approx(-20.0));
 }
 
-TEST_CASE("a restart goes on with switch, reference and offset", "[estimator]") {
+TEST_CASE("a restart continues with switch, reference and offset", "[estimator]") {
   Machine machine;
   PersistentState state;
   state.enabled = true;
@@ -230,8 +231,7 @@ TEST_CASE("a restart goes on with switch, reference and offset", "[estimator]") 
   CHECK(disabled.offset_um() == 0.0);
 }
 
-TEST_CASE("numbers newly written into the model file take the place of the stored reference",
-          "[estimator]") {
+TEST_CASE("new numbers in the model file replace the stored reference", "[estimator]") {
   ThermalModel model = small_model();
   model.reference_degC = {18.0, 30.0};
   PersistentState state;
@@ -262,8 +262,7 @@ TEST_CASE("a reload does not move the axis by itself", "[estimator]") {
   CHECK(machine.report().cycle == 12);
 }
 
-TEST_CASE("a reload takes numbers newly written as the reference, and keeps an old one",
-          "[estimator]") {
+TEST_CASE("a reload takes new numbers as the reference and keeps an old one", "[estimator]") {
   Machine machine;
   machine.step({20.0, 30.0});
   machine.steps(5, {21.0, 30.0});
@@ -279,7 +278,7 @@ TEST_CASE("a reload takes numbers newly written as the reference, and keeps an o
   CHECK(machine.report().inputs[0].reference_degC == 21.0);
 }
 
-TEST_CASE("an estimator that loads a state goes on bit for bit", "[estimator]") {
+TEST_CASE("an estimator with a loaded state continues bit for bit", "[estimator]") {
   auto config = small_config();
   for (SensorConfig& sensor : config.sensors) {
     sensor.smoothing.form = SmoothingForm::sliding_line;
@@ -332,7 +331,7 @@ TEST_CASE("configuration and model that do not fit are refused", "[estimator]") 
   refused([](auto&, auto& model) { model.matrix_um_per_K[0].pop_back(); });
   refused([](auto&, auto& model) { model.matrix_um_per_K[0][1] = not_a_number; });
   refused([](auto&, auto& model) { model.matrix_um_per_K[0][0] = HUGE_VAL; });
-  // Whatever else reads the rows: it comes after the model's own check.
+  // The model's own check comes before any other use of its rows.
   refused([](auto& config, auto& model) {
     config.correction.form = CorrectionForm::recursive;
     config.correction.groups = {{model.inputs[0]}};

@@ -12,7 +12,7 @@ LimiterConfig bounds(double offset_um_max, double rate_um_per_s_max) {
 }
 }  // namespace
 
-TEST_CASE("the offset goes to its target at the slew rate and lands on it exactly", "[limiter]") {
+TEST_CASE("the offset goes to its target at the slew rate and reaches it exactly", "[limiter]") {
   Limiter limiter(bounds(50, 2));
   limiter.step(3.3, 0.5);
   CHECK(limiter.offset_um() == 1.0);
@@ -24,7 +24,7 @@ TEST_CASE("the offset goes to its target at the slew rate and lands on it exactl
   CHECK(limiter.offset_um() == Approx(2.8));
 }
 
-TEST_CASE("the offset stops at its bound and says so", "[limiter]") {
+TEST_CASE("the offset stops at its bound and reports it", "[limiter]") {
   Limiter limiter(bounds(5, 100));
   limiter.step(5.0, 1);
   CHECK_FALSE(limiter.at_bound());
@@ -38,13 +38,13 @@ TEST_CASE("the offset stops at its bound and says so", "[limiter]") {
   CHECK_FALSE(limiter.at_bound());
 }
 
-TEST_CASE("a long pause makes no leap: at most one second counts", "[limiter]") {
+TEST_CASE("a long pause causes no jump: at most one second counts", "[limiter]") {
   Limiter limiter(bounds(50, 2));
   limiter.step(40.0, 3600.0);
   CHECK(limiter.offset_um() == 2.0);
 }
 
-TEST_CASE("no time, backward time or a time that is no number moves nothing", "[limiter]") {
+TEST_CASE("a time step that is zero, negative or NaN moves nothing", "[limiter]") {
   Limiter limiter(bounds(50, 2));
   for (const double dt_s : {0.0, -1.0, not_a_number}) {
     limiter.step(40.0, dt_s);
@@ -52,7 +52,7 @@ TEST_CASE("no time, backward time or a time that is no number moves nothing", "[
   }
 }
 
-TEST_CASE("a target that is no number moves nothing", "[limiter]") {
+TEST_CASE("a non-finite target moves nothing", "[limiter]") {
   Limiter limiter(bounds(50, 2));
   limiter.start_from(7.0);
   for (const double target_um : {not_a_number, std::numeric_limits<double>::infinity(),
@@ -62,7 +62,8 @@ TEST_CASE("a target that is no number moves nothing", "[limiter]") {
   }
 }
 
-TEST_CASE("an offset outside the bound comes in at the slew rate, target or not", "[limiter]") {
+TEST_CASE("an offset outside the bound returns at the slew rate, with or without a target",
+          "[limiter]") {
   Limiter limiter(bounds(10, 2));
   limiter.start_from(15.0);
   limiter.step(40.0, 1.0);
@@ -75,7 +76,7 @@ TEST_CASE("an offset outside the bound comes in at the slew rate, target or not"
   CHECK(limiter.offset_um() == 10.0);
 }
 
-TEST_CASE("bounds that have no meaning are refused", "[limiter]") {
+TEST_CASE("impossible bounds are refused", "[limiter]") {
   CHECK_THROWS_WITH(Limiter(bounds(0, 1)), Catch::Contains("offset_um_max"));
   CHECK_THROWS_WITH(Limiter(bounds(501, 1)), Catch::Contains("offset_um_max"));
   CHECK_THROWS_WITH(Limiter(bounds(not_a_number, 1)), Catch::Contains("offset_um_max"));

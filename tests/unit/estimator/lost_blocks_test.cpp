@@ -14,7 +14,7 @@ using namespace std::chrono_literals;
 
 namespace {
 
-/// n inputs that mostly move together, by seed.
+/// n inputs that mostly move together, random by seed.
 ThermalModel model_of(std::size_t n, unsigned seed = 1) {
   std::mt19937_64 engine(seed);
   const auto chance = [&] { return 2.0 * static_cast<double>(engine() >> 11) * 0x1p-53 - 1.0; };
@@ -50,7 +50,7 @@ struct Bank {
   nanoseconds now{};
 };
 
-/// B of x_L = a_L + B (x_O - a_O) by the covariance itself.
+/// B of x_L = a_L + B (x_O - a_O) from the covariance itself.
 Eigen::MatrixXd gains(const ThermalModel& model, const std::vector<std::size_t>& lost,
                       const std::vector<std::size_t>& seen) {
   const auto part = [&](const auto& rows, const auto& columns) {
@@ -99,13 +99,13 @@ TEST_CASE("a lost block follows the others by the conditional expectation", "[lo
   CHECK(bank.lost.sd_K(seen[0]) == 0.0);
 }
 
-TEST_CASE("an estimate begins at the last good value and becomes uncertain with time",
+TEST_CASE("an estimate starts at the last good value and becomes uncertain with time",
           "[lost_blocks]") {
   Bank bank(model_of(5));
   bank.temps_degC = {20, 21, 22, 23, 24};
   bank.step();
   bank.good[2] = 0;
-  bank.temps_degC[2] = 99.0;  // what a block shows that is not good is not looked at
+  bank.temps_degC[2] = 99.0;  // the value of a block that is not good is not used
   bank.step();
   CHECK(bank.lost.temps_degC()[2] == 22.0);
   double before_K = bank.lost.sd_K(2);
@@ -119,7 +119,7 @@ TEST_CASE("an estimate begins at the last good value and becomes uncertain with 
   CHECK(bank.lost.sd_of(gain) == Approx(3.0 * before_K));
 }
 
-TEST_CASE("a second loss moves no estimate and forgets no uncertainty", "[lost_blocks]") {
+TEST_CASE("a second loss changes no estimate and keeps the uncertainty", "[lost_blocks]") {
   Bank bank(model_of(6));
   bank.step();
   bank.good[1] = 0;
@@ -136,7 +136,7 @@ TEST_CASE("a second loss moves no estimate and forgets no uncertainty", "[lost_b
   CHECK(bank.lost.sd_K(1) >= sd_K);
 }
 
-TEST_CASE("a block that comes back tells about one that is still lost", "[lost_blocks]") {
+TEST_CASE("a returning block corrects one that is still lost", "[lost_blocks]") {
   ThermalModel model = model_of(3);
   model.covariance_K2 = {{4.0, 3.9, 0.0}, {3.9, 4.0, 0.0}, {0.0, 0.0, 4.0}};
   Bank bank(model);
@@ -152,7 +152,8 @@ TEST_CASE("a block that comes back tells about one that is still lost", "[lost_b
   CHECK(bank.lost.sd_K(0) < 0.4 * sd_K);
 }
 
-TEST_CASE("with nothing measured, or a value never had, nothing is estimated", "[lost_blocks]") {
+TEST_CASE("without a measured block, or without a first value, nothing is estimated",
+          "[lost_blocks]") {
   Bank bank(model_of(3));
   bank.step();
   bank.good = {0, 0, 0};
@@ -189,7 +190,7 @@ TEST_CASE("without a covariance a lost block stays lost", "[lost_blocks]") {
   CHECK_FALSE(bank.lost.estimated(0));
 }
 
-TEST_CASE("after a restart a lost block goes on from what was stored, with the whole drift",
+TEST_CASE("after a restart a lost block continues from its stored value, with fully grown drift",
           "[lost_blocks]") {
   const ThermalModel model = model_of(4);
   Bank bank(model, 60s);
@@ -197,7 +198,7 @@ TEST_CASE("after a restart a lost block goes on from what was stored, with the w
   bank.good[3] = 0;
   bank.temps_degC = {31.0, 30.5, 30.0, not_a_number};
   bank.step(3);
-  CHECK_FALSE(bank.lost.complete());  // its sensor may still be coming up
+  CHECK_FALSE(bank.lost.complete());  // its sensor may still be starting up
   bank.step(10);
   REQUIRE(bank.lost.complete());
   const Eigen::Vector3d change_K(1.0, 0.5, 0.0);
@@ -210,11 +211,11 @@ TEST_CASE("after a restart a lost block goes on from what was stored, with the w
   CHECK(bank.lost.sd_K(3) >= 0.99 * grown.lost.sd_K(3));
 }
 
-TEST_CASE("what is said of a block that stays measured is forgotten: a saved state tells all",
+TEST_CASE("a value given for a block that stays measured is dropped and not part of the state",
           "[lost_blocks]") {
   Bank bank(model_of(4));
   bank.step(3);
-  bank.lost.say(1, 19.0, 2.0);  // another sensor of the block goes on
+  bank.lost.say(1, 19.0, 2.0);  // the block continues with another sensor
   bank.step();
   StateArchive count;
   bank.lost.visit_state(count);
@@ -233,7 +234,7 @@ TEST_CASE("what is said of a block that stays measured is forgotten: a saved sta
   CHECK(bank.lost.temps_degC()[1] == 20.0);
 }
 
-TEST_CASE("a reload carries estimates over by name", "[lost_blocks]") {
+TEST_CASE("a reload continues estimates by name", "[lost_blocks]") {
   const ThermalModel model = model_of(4);
   Bank bank(model);
   bank.step();
@@ -254,12 +255,12 @@ TEST_CASE("a reload carries estimates over by name", "[lost_blocks]") {
   CHECK(next.lost.sd_K(0) >= bank.lost.sd_K(2));
 }
 
-TEST_CASE("whatever is lost and returns, estimates and their spread stay finite",
+TEST_CASE("for any losses and returns, estimates and their deviations stay finite",
           "[lost_blocks][property]") {
   const auto seed = GENERATE(range(0u, 60u));
   std::mt19937_64 engine(seed);
   ThermalModel model = model_of(2 + engine() % 12, seed);
-  if (seed % 3 == 0)  // all of them the same: the matrix is singular
+  if (seed % 3 == 0)  // all inputs equal: the matrix is singular
     for (auto& row : model.covariance_K2) std::fill(row.begin(), row.end(), 2.0);
   model.covariance_growth.scatter_factor.assign(model.inputs.size(), 1.5);
   if (seed % 2 == 0) model.covariance_growth.drift_time_s = 0.0;

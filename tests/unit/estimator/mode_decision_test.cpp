@@ -1,4 +1,4 @@
-/// The rule of the mode, case by case.
+/// Rule of the mode, case by case.
 #include <catch2/catch.hpp>
 
 #include "estimator/pipeline/mode.hpp"
@@ -18,7 +18,7 @@ CompensationConfig config(LossPolicy on_loss = LossPolicy::hold) {
   return config;
 }
 
-/// All that a step needs to compensate, `second` seconds after the first one.
+/// Input that lets a step compensate, `second` seconds after the first one.
 ModeInput working(int second) {
   ModeInput input;
   input.time = {std::chrono::seconds(second), 1.0, second == 0};
@@ -50,19 +50,18 @@ TEST_CASE("it compensates once displacement and controller are known and the off
   CHECK(decision.step(working(3)) == Mode::compensating);
 }
 
-TEST_CASE("before the first data it starts, however long that takes, and never holds", "[mode]") {
+TEST_CASE("before the first data the mode is starting, for any time, and never holding", "[mode]") {
   ModeDecision decision(config());
   for (int second = 0; second < 100; ++second) CHECK(decision.step(lost(second)) == Mode::starting);
 }
 
-TEST_CASE("after hold_s without data it goes to zero where so configured, and comes back",
-          "[mode]") {
+TEST_CASE("after hold_s without data it ramps to zero if so configured, and returns", "[mode]") {
   ModeDecision holds(config(LossPolicy::hold));
   ModeDecision ramps(config(LossPolicy::ramp_to_zero));
   for (ModeDecision* decision : {&holds, &ramps}) {
     CHECK(decision->step(working(0)) == Mode::compensating);
     CHECK(decision->step(lost(1)) == Mode::holding);
-    CHECK(decision->step(lost(10)) == Mode::holding);  // hold_s exactly
+    CHECK(decision->step(lost(10)) == Mode::holding);  // exactly hold_s
   }
   CHECK(holds.step(lost(11)) == Mode::holding);
   CHECK(ramps.step(lost(11)) == Mode::ramping_to_zero);
@@ -70,7 +69,7 @@ TEST_CASE("after hold_s without data it goes to zero where so configured, and co
   CHECK(ramps.step(lost(22)) == Mode::holding);  // counted anew
 }
 
-TEST_CASE("time without data counts from the first step where there never were any", "[mode]") {
+TEST_CASE("without any data so far, the loss counts from the first step", "[mode]") {
   ModeDecision decision(config(LossPolicy::ramp_to_zero));
   ModeInput late = lost(1000);
   late.time.first = true;
@@ -79,7 +78,7 @@ TEST_CASE("time without data counts from the first step where there never were a
   CHECK(decision.step(lost(1011)) == Mode::ramping_to_zero);
 }
 
-TEST_CASE("either switch disables, whatever else holds", "[mode]") {
+TEST_CASE("either switch disables, in any state", "[mode]") {
   ModeDecision decision(config(LossPolicy::ramp_to_zero));
   CHECK(decision.step(working(0)) == Mode::compensating);
   decision.enable(false);
@@ -94,7 +93,7 @@ TEST_CASE("either switch disables, whatever else holds", "[mode]") {
   CHECK(decision.step(working(103)) == Mode::ramping_to_zero);  // stopping
 }
 
-TEST_CASE("a stop goes to zero with good data and without, and leaves the switch alone", "[mode]") {
+TEST_CASE("a stop ramps to zero with and without good data, and keeps the switch", "[mode]") {
   ModeDecision decision(config());
   CHECK(decision.step(working(0)) == Mode::compensating);
   decision.stop();
@@ -103,7 +102,7 @@ TEST_CASE("a stop goes to zero with good data and without, and leaves the switch
   CHECK(decision.state().enabled);
 }
 
-TEST_CASE("the mode has been so since it changed", "[mode]") {
+TEST_CASE("mode_since is the time of the last change", "[mode]") {
   ModeDecision decision(config());
   (void)decision.step(working(5));
   (void)decision.step(working(6));
@@ -113,7 +112,7 @@ TEST_CASE("the mode has been so since it changed", "[mode]") {
   CHECK(decision.state().mode_since == 7s);
 }
 
-TEST_CASE("a reload goes on in the same mode, with the time already lost", "[mode]") {
+TEST_CASE("a reload continues in the same mode, with the time already lost", "[mode]") {
   ModeDecision before(config(LossPolicy::ramp_to_zero));
   (void)before.step(working(0));
   (void)before.step(lost(9));

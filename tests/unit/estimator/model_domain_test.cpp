@@ -44,7 +44,7 @@ EstimatorConfig config_with(OutsidePolicy policy) {
 
 }  // namespace
 
-TEST_CASE("the distance is that of the covariance, a feature being 1 at its own spread",
+TEST_CASE("the distance uses the covariance: a feature at its own standard deviation gives 1",
           "[domain]") {
   ModelDomain domain(made_model());
   domain.step(1s, Vector{21.0, 0.0}, Vector{19.0, 0.0}, {});
@@ -60,13 +60,13 @@ TEST_CASE("the distance is that of the covariance, a feature being 1 at its own 
   CHECK(domain.sd_um(0) == Approx(std::hypot(1.5, 3.0)));  // its runs count as one
 }
 
-TEST_CASE("a cold morning is outside though the machine has not moved", "[domain]") {
+TEST_CASE("a cold morning is outside although the machine has not moved", "[domain]") {
   ModelDomain domain(made_model());
   domain.step(1s, Vector{12.0, 12.0}, Vector{12.0, 12.0}, {});
   CHECK(domain.outside());
 }
 
-TEST_CASE("a domain whose matrix is no covariance is refused", "[domain]") {
+TEST_CASE("a domain with a matrix that is no covariance is refused", "[domain]") {
   ThermalModel model = made_model();
   model.made_from->covariance = {{1.0, 3.0}, {3.0, 1.0}};
   CHECK_THROWS_AS(ModelDomain(model), InvalidValue);
@@ -102,13 +102,13 @@ TEST_CASE("outside its domain the offset follows, stays, or shrinks, as configur
     CHECK(last_um > -6.0);
   }
   CHECK(machine.report().mode == Mode::compensating);
-  step_all(22.0, 200);  // it comes back, and so does the offset
+  step_all(22.0, 200);  // it returns, and so does the offset
   CHECK(last_um == Approx(-10.0));
   CHECK_FALSE(machine.says(Reason::outside_domain));
   CHECK(machine.report().domain.outside_share_24h == Approx(200.0 / 519.0).margin(0.02));
 }
 
-TEST_CASE("with hold, an offset moves no further while the machine is outside", "[domain]") {
+TEST_CASE("with hold, an offset does not move while the machine is outside", "[domain]") {
   Machine machine(config_with(OutsidePolicy::hold), made_model());
   for (int i = 0; i < 60; ++i) machine.step({22.0, 20.0});
   for (int i = 0; i < 3; ++i) machine.step({40.0, 20.0});
@@ -129,17 +129,17 @@ TEST_CASE("the domain's state is saved and loaded bit for bit", "[domain]") {
   CHECK(std::memcmp(state.data(), again.data(), state.size()) == 0);
 }
 
-TEST_CASE("the share of the last day forgets what is older", "[domain]") {
+TEST_CASE("the share of the last day drops older hours", "[domain]") {
   OutsideShare share;
   for (int minute = 0; minute < 24 * 60; ++minute) share.step(minute * 60s, true);
   CHECK(share.share() == 1.0);
   for (int minute = 24 * 60; minute < 49 * 60; ++minute) share.step(minute * 60s, false);
   CHECK(share.share() == Approx(0.0).margin(0.05));
-  share.step(100h, true);  // a gap was not looked at
+  share.step(100h, true);  // a gap is not observed
   CHECK(share.share() == Approx(0.0).margin(0.05));
 }
 
-TEST_CASE("probings tell how far the model was off", "[domain]") {
+TEST_CASE("probings measure the model's error", "[domain]") {
   ProbedError error;
   CHECK(std::isnan(error.rms_um()));
   error.take(3.0);

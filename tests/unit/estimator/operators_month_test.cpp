@@ -1,6 +1,6 @@
-// A month in which operators measure parts and correct at the controller: what remains at the tool
-// without learning, with it, and with contradicting values asked back. `estimator_tests "[month]"
-// -s` prints the figures.
+// A month in which operators measure parts and correct at the controller: error at the tool without
+// learning, with it, and with contradicting values queried. `estimator_tests "[month]" -s` prints
+// the figures.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -29,8 +29,8 @@ struct MonthResult {
   int wrong_believed{0};
 };
 
-/// The machine's head warms 12 K in an hour, its column 5 K in four; both more or less than the
-/// model has it.
+/// The machine's head warms by 12 K in an hour, its column by 5 K in four; both differ from the
+/// model.
 class Month {
  public:
   Month(Lesson lesson, std::uint32_t seed)
@@ -82,7 +82,7 @@ class Month {
     if (command_.valid[0]) controller_.applied_um[0] = command_.offset_um[0];
   }
 
-  /// With what the operator has entered at the controller.
+  /// With the offset entered by the operator.
   [[nodiscard]] double remaining_um() const {
     return 1.3 * 5.0 * head_K_ + 0.5 * column_K_ + controller_.applied_um[0] - entered_um_;
   }
@@ -94,7 +94,7 @@ class Month {
     const bool is_missing = parts_ % 3 == 0;
     const auto slip = std::find(slip_at_.begin(), slip_at_.end(), parts_) - slip_at_.begin();
     if (is_missing && slip == 3) return;
-    // Another tool's; the wrong sign after a day in which 20 um came; ten times 2 um or more.
+    // That of another tool; the wrong sign after a day with 20 um; ten times 2 um or more.
     const double tenfold_um = 10.0 * std::copysign(std::max(2.0, std::abs(true_um)), true_um);
     const std::array<double, 4> typed{31.0, -true_um - 20.0, tenfold_um, true_um};
     const double typed_um = typed[static_cast<std::size_t>(slip)];
@@ -103,7 +103,7 @@ class Month {
     if (lesson_ == Lesson::asked &&
         slip_of(typed_um, expected_um, std::hypot(claimed_um, sd_um)) != Slip::none) {
       ++result_.asked_back;
-      if (slip == 3) give(typed_um, sd_um);  // right all the same, and confirmed
+      if (slip == 3) give(typed_um, sd_um);  // correct, and confirmed
       return;
     }
     if (slip < 3) ++result_.wrong_believed;
@@ -145,7 +145,7 @@ class Month {
 
 }  // namespace
 
-TEST_CASE("operators' corrections teach; what contradicts the claim is asked back, not believed",
+TEST_CASE("operators' corrections are learned; values that contradict the claim are queried",
           "[month]") {
   std::array<double, 4> rms_um{};
   int asked = 0;
@@ -169,7 +169,7 @@ TEST_CASE("operators' corrections teach; what contradicts the claim is asked bac
   CHECK(asked >= 12);
 }
 
-TEST_CASE("an operator's correction moves nothing: it stands at the controller already",
+TEST_CASE("an operator's correction moves nothing: it is already entered at the controller",
           "[estimator][month]") {
   EstimatorConfig config = small_config();
   config.correction.form = CorrectionForm::recursive;
@@ -191,11 +191,11 @@ TEST_CASE("an operator's correction moves nothing: it stands at the controller a
   CHECK(moved_um(MeasuredSource::wear) == Approx(0.0).margin(1e-9));
 }
 
-TEST_CASE("the likely slip of a contradicting value is named", "[month]") {
+TEST_CASE("the likely input error of a contradicting value is named", "[month]") {
   CHECK(slip_of(3.0, 2.0, 1.0) == Slip::none);
   CHECK(slip_of(-20.0, 20.0, 2.0) == Slip::sign);
   CHECK(slip_of(50.0, 5.0, 2.0) == Slip::tenfold);
   CHECK(slip_of(2.0, 20.0, 1.0) == Slip::tenth);
   CHECK(slip_of(90.0, 0.0, 1.0) == Slip::unexplained);
-  CHECK(slip_of(90.0, 0.0, not_a_number) == Slip::none);  // nothing is claimed
+  CHECK(slip_of(90.0, 0.0, not_a_number) == Slip::none);  // no claimed error
 }

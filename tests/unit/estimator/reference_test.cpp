@@ -1,4 +1,4 @@
-/// What displacement is counted from, and when that is taken.
+/// Reference of the displacement, and when it is taken.
 #include <cmath>
 #include <vector>
 
@@ -11,7 +11,7 @@ using namespace thermocomp;
 
 namespace {
 
-/// What a step hands to the reference: two columns and the spindle's speed.
+/// Input of the reference in one step: two columns and the spindle's speed.
 struct Moment {
   std::vector<double> temps_degC{20.0, 21.0};
   std::vector<std::uint8_t> good{1, 1};
@@ -64,7 +64,7 @@ TEST_CASE("without numbers each column's first good value is the reference, and 
   CHECK(state.temps_degC[1] == 26.0);
 }
 
-TEST_CASE("a sampled reference takes the signals of a controller that is there, numbers mean rest",
+TEST_CASE("a sampled reference takes the signals of an online controller; given numbers mean rest",
           "[reference]") {
   Reference sampled(model_with_growth());
   Moment silent;
@@ -91,7 +91,7 @@ TEST_CASE("a commanded reference has its signals from the next step on", "[refer
   CHECK(state.signals[0] == 3000.0);
 }
 
-TEST_CASE("a restart restores what is a number, by name", "[reference]") {
+TEST_CASE("a restart restores finite numbers by name", "[reference]") {
   Reference reference(model_with_growth());
   reference.restore({{"t1_degC", 18.5}, {"t2_degC", not_a_number}, {"t9_degC", 1.0}},
                     {{"spindle_rpm", 500.0}});
@@ -101,7 +101,7 @@ TEST_CASE("a restart restores what is a number, by name", "[reference]") {
 }
 
 TEST_CASE("a reload keeps the reference unless the model file has new numbers", "[reference]") {
-  const std::vector<int> columns{1, 0};  // the new file names them the other way round
+  const std::vector<int> columns{1, 0};  // the new file has the opposite order
   const std::vector<int> signals{-1};
   Reference before(with_numbers({20.0, 20.0}));
   before.take(std::vector<double>{23.0, 24.0});
@@ -116,7 +116,7 @@ TEST_CASE("a reload keeps the reference unless the model file has new numbers", 
   CHECK(other.temps_degC()[1] == 20.0);
 }
 
-TEST_CASE("a first value that a true jump refutes while it is young is taken anew", "[reference]") {
+TEST_CASE("a first value refuted by a confirmed jump while young is taken anew", "[reference]") {
   using namespace std::chrono_literals;
   Reference reference(model_with_growth());
   Moment moment;

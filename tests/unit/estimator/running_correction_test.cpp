@@ -42,7 +42,8 @@ void probe(RunningCorrection& correction, nanoseconds now, double t1_K, double t
 
 }  // namespace
 
-TEST_CASE("in phase 1 the consistent gain makes the estimate what was measured", "[correction]") {
+TEST_CASE("in phase 1 the consistent gain makes the estimate equal the measurement",
+          "[correction]") {
   RunningCorrection correction(config_of(CorrectionForm::two_phase), tie_model(), 0);
   probe(correction, 60s, 5.0, 1.0, {1.2, 1.0});
   CHECK(correction.report().gain[0] == Approx(1.2));
@@ -62,12 +63,12 @@ TEST_CASE("the printed form agrees with it only while the tie is cold", "[correc
   CHECK(model_um(5.0, 1.0) + warm.correction_um() != Approx(1.2 * 20.0 - 2.0));
 }
 
-TEST_CASE("phase 2 begins when the displacement has turned, and then only the tie's gain moves",
+TEST_CASE("phase 2 begins when the displacement has turned, and then only the tie's gain changes",
           "[correction]") {
   RunningCorrection correction(config_of(CorrectionForm::two_phase), tie_model(), 0);
   probe(correction, 60s, 10.0, 0.0, {1.1, 0.8});
   CHECK(correction.report().phase == 1);
-  probe(correction, 120s, 10.0, 1.0, {1.1, 0.8});  // came back by 1.6 um: not yet beyond noise
+  probe(correction, 120s, 10.0, 1.0, {1.1, 0.8});  // back by 1.6 um: not yet beyond noise
   CHECK(correction.report().phase == 1);
   const double first = correction.report().gain[0];
   probe(correction, 180s, 10.0, 6.0, {1.1, 0.8});
@@ -76,7 +77,7 @@ TEST_CASE("phase 2 begins when the displacement has turned, and then only the ti
   CHECK(model_um(10.0, 6.0) + correction.correction_um() == Approx(44.0 - 9.6));
 }
 
-TEST_CASE("a gain is not told from next to nothing", "[correction]") {
+TEST_CASE("a small contribution does not determine its gain", "[correction]") {
   RunningCorrection correction(config_of(CorrectionForm::two_phase), tie_model(), 0);
   probe(correction, 60s, 0.1, 0.0, {1.0, 1.0}, 2.0);
   CHECK(correction.report().gain[0] == 1.0);
@@ -84,7 +85,8 @@ TEST_CASE("a gain is not told from next to nothing", "[correction]") {
   CHECK(correction.correction_um() == 0.0);
 }
 
-TEST_CASE("the recursive form finds gains in noise and says how sure it is", "[correction]") {
+TEST_CASE("the recursive form finds gains in noise and gives their standard deviation",
+          "[correction]") {
   CorrectionConfig config = config_of(CorrectionForm::recursive);
   config.gain_drift_per_sqrt_h = 0.02;
   RunningCorrection correction(config, tie_model(), 0);
@@ -103,7 +105,7 @@ TEST_CASE("the recursive form finds gains in noise and says how sure it is", "[c
   CHECK(report.gain_sd[0] < 0.05);
 }
 
-TEST_CASE("a probing is wanted when the estimate has become too unsure", "[correction]") {
+TEST_CASE("a probing is requested when the estimate has become too uncertain", "[correction]") {
   CorrectionConfig config = config_of(CorrectionForm::recursive);
   RunningCorrection correction(config, tie_model(), 0);
   const std::vector<double> cold{0.0, 0.0};
@@ -118,7 +120,7 @@ TEST_CASE("a probing is wanted when the estimate has become too unsure", "[corre
   CHECK(correction.report().probing_wanted);
 }
 
-TEST_CASE("one wild probing is refused; a second that agrees is believed", "[correction]") {
+TEST_CASE("one outlier is refused; a second one that agrees is accepted", "[correction]") {
   CorrectionConfig config = config_of(CorrectionForm::recursive);
   RunningCorrection correction(config, tie_model(), 0);
   nanoseconds now{};
@@ -131,7 +133,7 @@ TEST_CASE("one wild probing is refused; a second that agrees is believed", "[cor
   CHECK(correction.correction_um() > before + 1.0);
 }
 
-TEST_CASE("no probing moves the estimate beyond its step nor a gain out of its range",
+TEST_CASE("no probing moves the estimate beyond its step or a gain out of its range",
           "[correction][property]") {
   const auto form = GENERATE(CorrectionForm::two_phase, CorrectionForm::recursive);
   const auto seed = GENERATE(range(0u, 50u));
@@ -158,7 +160,7 @@ TEST_CASE("no probing moves the estimate beyond its step nor a gain out of its r
   }
 }
 
-TEST_CASE("what was learned while cutting is used after the cut", "[correction]") {
+TEST_CASE("values learned while cutting are used after the cut", "[correction]") {
   RunningCorrection correction(config_of(CorrectionForm::recursive), tie_model(), 0);
   const std::vector<double> rise{5.0, 1.0};
   correction.step(1s, rise, false);
@@ -169,7 +171,7 @@ TEST_CASE("what was learned while cutting is used after the cut", "[correction]"
   CHECK(correction.correction_um() > 1.0);
 }
 
-TEST_CASE("gains survive a restart by name, foreign values do not come in", "[correction]") {
+TEST_CASE("gains survive a restart by name; invalid values are ignored", "[correction]") {
   RunningCorrection correction(config_of(CorrectionForm::recursive), tie_model(), 0);
   probe(correction, 60s, 5.0, 1.0, {1.3, 1.0});
   std::map<std::string, double> kept;
@@ -185,7 +187,7 @@ TEST_CASE("gains survive a restart by name, foreign values do not come in", "[co
   CHECK(other.report().gain[1] == 1.0);
 }
 
-TEST_CASE("a restart in a cut does not bring in what was learned in it", "[correction]") {
+TEST_CASE("a restart during a cut does not apply values learned in it", "[correction]") {
   CorrectionConfig config = config_of(CorrectionForm::recursive);
   config.bias_drift_um_per_sqrt_h = 5.0;
   RunningCorrection correction(config, tie_model(), 0);
@@ -225,16 +227,17 @@ TEST_CASE("a group that names no input of the model is refused", "[correction]")
   CHECK_THROWS_AS(RunningCorrection(config, tie_model(), 0), InvalidValue);
 }
 
-TEST_CASE("a probing of what remains corrects the estimate, at the slew of the axis",
+TEST_CASE("a probing of the remaining displacement corrects the estimate, at the slew of the axis",
           "[correction][estimator]") {
   EstimatorConfig config = small_config();
   config.correction = config_of(CorrectionForm::recursive);
-  config.correction.gain_sd = 3.0;  // so unsure that the probing is believed at once
+  config.correction.gain_sd = 3.0;  // so uncertain that the probing is accepted at once
   Machine machine(config);
   machine.step({20.0, 30.0});
   machine.steps(20, {22.0, 31.0});  // 11 um
   CHECK(machine.offset_um() == Approx(-11.0));
-  machine.estimator.apply({CommandKind::measured, 0, 4.0});  // 4 um are left: it is 15 um
+  machine.estimator.apply(
+      {CommandKind::measured, 0, 4.0});  // 4 um remain: the displacement is 15 um
   machine.step({22.0, 31.0});
   CHECK(machine.offset_um() > -21.0 - 1e-9);
   machine.steps(20, {22.0, 31.0});
@@ -267,7 +270,7 @@ TEST_CASE("the same history of probings and readings gives the same bits", "[cor
   }
 }
 
-TEST_CASE("a reload keeps what probings taught", "[correction][estimator]") {
+TEST_CASE("a reload keeps learned values", "[correction][estimator]") {
   EstimatorConfig config = small_config();
   config.correction = config_of(CorrectionForm::recursive);
   Machine machine(config);
@@ -284,7 +287,7 @@ TEST_CASE("a reload keeps what probings taught", "[correction][estimator]") {
   CHECK(machine.offset_um() == Approx(before));
 }
 
-TEST_CASE("Ri by eq. 31 is what was measured by the heat source's share alone", "[correction]") {
+TEST_CASE("R1 by eq. 31 is the measurement over the heat source's share alone", "[correction]") {
   CorrectionConfig config = config_of(CorrectionForm::two_phase);
   config.first_gain = FirstGain::eq_31;
   RunningCorrection correction(config, tie_model(), 0);
@@ -295,7 +298,7 @@ TEST_CASE("Ri by eq. 31 is what was measured by the heat source's share alone", 
 
 TEST_CASE("the earlier form Ki (A - B) - Ci keeps its gains and learns Ci", "[correction]") {
   RunningCorrection correction(config_of(CorrectionForm::constant), tie_model(), 0);
-  // By hand: the model says 20 - 2 = 18, measured are 15: Ci = 3, wherever the machine is later.
+  // By hand: model 20 - 2 = 18, measured 15: Ci = 3 in any later state.
   correction.step(60s, std::vector{5.0, 1.0}, true);
   correction.measured({15.0, 18.0});
   correction.step(61s, std::vector{2.0, 0.5}, true);
@@ -307,7 +310,7 @@ TEST_CASE("the earlier form Ki (A - B) - Ci keeps its gains and learns Ci", "[co
   CHECK(correction.correction_um() == Approx(0.0).margin(1e-12));
 }
 
-TEST_CASE("a coarse measurement teaches less than a fine one", "[correction]") {
+TEST_CASE("a coarse measurement changes less than a fine one", "[correction]") {
   const auto learned = [](double sd_um) {
     RunningCorrection correction(config_of(CorrectionForm::recursive), tie_model(), 0);
     correction.step(60s, std::vector{5.0, 0.0}, true);
@@ -320,7 +323,7 @@ TEST_CASE("a coarse measurement teaches less than a fine one", "[correction]") {
   CHECK(learned(0.0) == learned(1.0));  // as configured
 }
 
-TEST_CASE("a part that is measured later teaches by the machine as it was", "[correction]") {
+TEST_CASE("a part measured later corrects by the earlier state of the machine", "[correction]") {
   RunningCorrection correction(config_of(CorrectionForm::recursive), tie_model(), 0);
   correction.step(60s, std::vector{5.0, 0.0}, true);
   const auto then = correction.contributions_um();

@@ -30,7 +30,7 @@ bool look(Screening& screening, nanoseconds at, double temp_degC) {
   return screening.look(at, {temp_degC, at, Fault::none});
 }
 
-/// Once a second in [from, to). @return how many counted
+/// Once per second in [from, to). @return number of confirmed values
 int look_each_second(Screening& screening, std::chrono::seconds from, std::chrono::seconds to,
                      double temp_degC) {
   int counted = 0;
@@ -51,7 +51,7 @@ TEST_CASE("nothing is usable before the first good reading", "[screening]") {
   CHECK(screening.fault(1s) == Fault::none);
 }
 
-TEST_CASE("every fault of a driver refuses the reading; the next good one is taken",
+TEST_CASE("every fault of a driver refuses the reading; the next good one is accepted",
           "[screening]") {
   for (std::size_t code = 2; code < faults_count; ++code) {
     const auto fault = static_cast<Fault>(code);
@@ -62,7 +62,7 @@ TEST_CASE("every fault of a driver refuses the reading; the next good one is tak
     CHECK(screening.fault(2s) == fault);
     CHECK(screening.good_degC() == 20.0);
     CHECK(screening.good_at() == 1s);
-    CHECK(screening.usable(2s));  // the last good one serves until it is stale
+    CHECK(screening.usable(2s));  // the last good one is used until it is stale
     CHECK(screening.usable(6s));
     CHECK_FALSE(screening.usable(6s + 1ns));
     CHECK(screening.rejected() == 1);
@@ -96,8 +96,7 @@ TEST_CASE("a reading is judged once", "[screening]") {
   CHECK(screening.rejected() == 0);
 }
 
-TEST_CASE("a reading that is not renewed becomes stale, and fresh again when it is",
-          "[screening]") {
+TEST_CASE("a reading that is not renewed becomes stale, and fresh when renewed", "[screening]") {
   Screening screening(plain());
   look(screening, 1s, 20.0);
   CHECK(screening.fault(6s) == Fault::none);
@@ -108,7 +107,7 @@ TEST_CASE("a reading that is not renewed becomes stale, and fresh again when it 
   CHECK(screening.fault(10s) == Fault::none);
 }
 
-TEST_CASE("a reading from the future is stale and does not shut out the ones that follow",
+TEST_CASE("a reading from the future is stale and does not block the following ones",
           "[screening]") {
   Screening screening(plain());
   look(screening, 1s, 20.0);
@@ -117,11 +116,11 @@ TEST_CASE("a reading from the future is stale and does not shut out the ones tha
   CHECK(look(screening, 3s, 20.0));
   CHECK_FALSE(screening.look(4s, {20.0, nanoseconds::max(), Fault::none}));
   CHECK_FALSE(screening.look(4s, {20.0, nanoseconds::min(), Fault::none}));
-  // Taken while the cycle was beginning: a little ahead is natural.
+  // Taken during the start of the cycle: slightly ahead is normal.
   CHECK(screening.look(5s, {20.0, 5s + 1ms, Fault::none}));
 }
 
-TEST_CASE("a reading that comes out of order says nothing new", "[screening]") {
+TEST_CASE("a reading out of order has no new information", "[screening]") {
   Screening screening(plain());
   look(screening, 3s, 20.0);
   CHECK_FALSE(screening.look(4s, {20.9, 2s, Fault::none}));
@@ -131,7 +130,7 @@ TEST_CASE("a reading that comes out of order says nothing new", "[screening]") {
   CHECK(screening.fault(5s) == Fault::none);
 }
 
-TEST_CASE("a change faster than the structure can is refused; the allowance is on top",
+TEST_CASE("a change faster than the structure can is refused; the allowance is added",
           "[screening]") {
   Screening screening(plain());
   look(screening, 0s, 20.0);
@@ -145,7 +144,7 @@ TEST_CASE("a change faster than the structure can is refused; the allowance is o
   CHECK_FALSE(look(screening, 6s, 18.4));
 }
 
-TEST_CASE("a step that is there stays refused, however long it lasts", "[screening]") {
+TEST_CASE("a lasting step stays refused, however long it lasts", "[screening]") {
   Screening screening(settling());
   look_each_second(screening, 0s, 20s, 22.0);
   REQUIRE(screening.good_degC() == 22.0);
@@ -164,7 +163,7 @@ TEST_CASE("a step that a module shows late is followed within two seconds", "[sc
   CHECK(look_each_second(screening, 20s, 30s, 22.0) > 0);
 }
 
-TEST_CASE("a step is too_fast while the value before it serves, and then unconfirmed",
+TEST_CASE("a step is too_fast while the value before it is in use, and then unconfirmed",
           "[screening]") {
   Screening screening(settling());
   look_each_second(screening, 0s, 20s, 22.0);
@@ -176,7 +175,7 @@ TEST_CASE("a step is too_fast while the value before it serves, and then unconfi
   CHECK_FALSE(screening.usable(25s));
 }
 
-TEST_CASE("a spike costs no settling; a long fault that ends does", "[screening]") {
+TEST_CASE("a spike needs no settling; the end of a long fault does", "[screening]") {
   Screening screening(settling());
   look_each_second(screening, 0s, 20s, 22.0);
   look(screening, 20s, 71.6);
@@ -206,7 +205,8 @@ TEST_CASE("a return after hours may miss by 10 K/h, but not by more than a quart
   }
 }
 
-TEST_CASE("silence under a jump widens what the past allows, a jump does not", "[screening]") {
+TEST_CASE("missing readings during a jump widen the allowed range, the jump does not",
+          "[screening]") {
   Screening screening(settling());
   look_each_second(screening, 0s, 20s, 22.0);
   look_each_second(screening, 20s, 80s, 30.0);
@@ -237,7 +237,8 @@ TEST_CASE("over an outage the structure changes by outage_K_max and 10 K/h at mo
   }
 }
 
-TEST_CASE("a first value counts after the settling time, and only one that stays", "[screening]") {
+TEST_CASE("a first value is confirmed after the settling time, and only if it lasts",
+          "[screening]") {
   Screening screening(settling());
   CHECK(look_each_second(screening, 0s, 8s, 85.0) == 0);
   CHECK(screening.fault(7s) == Fault::unconfirmed);
@@ -250,7 +251,7 @@ TEST_CASE("a first value counts after the settling time, and only one that stays
   CHECK(screening.good_degC() == 23.3);
 }
 
-TEST_CASE("two readings alike are not enough, however slow they come", "[screening]") {
+TEST_CASE("two equal readings are not enough at any interval", "[screening]") {
   ScreeningConfig config = settling();
   config.stale_after_s = 120;
   Screening screening(config);
@@ -265,18 +266,19 @@ TEST_CASE("an exact zero never settles by itself", "[screening]") {
   Screening at_start(config);
   CHECK(look_each_second(at_start, 0s, 600s, 0.0) == 0);
   CHECK(look_each_second(at_start, 600s, 611s, 23.3) == 1);
-  // After an outage that allows for it.
+  // After an outage that is long enough for it.
   Screening under_way(config);
   look_each_second(under_way, 0s, 20s, 9.0);
   CHECK(look_each_second(under_way, 90s, 135s, 0.0) == 0);
   CHECK(look_each_second(under_way, 135s, 146s, 9.0) == 1);
-  // A course that goes through zero does.
+  // A course through zero does.
   Screening cooling(config);
   look_each_second(cooling, 0s, 20s, 0.4);
   CHECK(look(cooling, 20s, 0.0));
 }
 
-TEST_CASE("what neighbours expect confirms a jump, and refutes what was before", "[screening]") {
+TEST_CASE("the neighbours' expectation confirms a jump and refutes the value before it",
+          "[screening]") {
   Screening screening(settling());
   look_each_second(screening, 0s, 20s, 22.0);
   const auto expect = [&](double degC, double sd_K) { screening.surround({degC, sd_K, false}); };
@@ -306,7 +308,7 @@ TEST_CASE("what neighbours expect confirms a jump, and refutes what was before",
   }
 }
 
-TEST_CASE("what was expected once says nothing after the next outage", "[screening]") {
+TEST_CASE("an expectation does not apply after the next outage", "[screening]") {
   Screening screening(settling());
   look_each_second(screening, 0s, 20s, 22.0);
   screening.surround({22.0, 0.1, false});
@@ -322,7 +324,7 @@ TEST_CASE("a module that is not ready does not settle", "[screening]") {
   CHECK(look(screening, 60s, 25.0));
 }
 
-TEST_CASE("an operator accepts what waits, and only that", "[screening]") {
+TEST_CASE("an operator accepts a waiting value, and only that", "[screening]") {
   Screening screening(settling());
   CHECK_FALSE(screening.accept());
   look(screening, 0s, 20.0);
@@ -345,7 +347,7 @@ TEST_CASE("settle_s = 0: the first value counts at once, also after an outage", 
   CHECK(look(screening, 200s, 10.0));
 }
 
-TEST_CASE("the very same value for too long is a fault until it moves", "[screening]") {
+TEST_CASE("an unchanged value is a fault after stuck_after_s, until it changes", "[screening]") {
   ScreeningConfig config = plain();
   config.stuck_after_s = 10;
   Screening screening(config);
@@ -361,7 +363,7 @@ TEST_CASE("the very same value for too long is a fault until it moves", "[screen
   CHECK_FALSE(look(screening, 24s, 20.0000001));
 }
 
-TEST_CASE("after a reload the new rules judge by the old past", "[screening]") {
+TEST_CASE("after a reload the new limits apply to the old state", "[screening]") {
   Screening before(plain());
   look(before, 1s, 20.0);
   ScreeningConfig narrow = plain();

@@ -1,4 +1,4 @@
-/// A small estimator and a controller that obeys, for tests that state what one step does.
+/// A small estimator with an obedient controller, for tests of single steps.
 #pragma once
 
 #include <chrono>
@@ -13,14 +13,14 @@ namespace thermocomp {
 
 using namespace std::chrono_literals;
 
-/// Two blocks, one axis z, spindle speed with growth; smoothing off so that figures are plain.
+/// Two blocks, one axis z, spindle speed with growth; smoothing off for plain figures.
 inline EstimatorConfig small_config() {
   EstimatorConfig config;
   for (const char* name : {"s1", "s2"}) {
     SensorConfig sensor;
     sensor.name = name;
     sensor.smoothing.form = SmoothingForm::off;
-    // The tests step temperatures at will; what screening refuses has tests of its own.
+    // Tests step temperatures freely; screening has tests of its own.
     sensor.screening.settle_s = 0.0;
     sensor.screening.rate_allowance_K = 50.0;
     config.sensors.push_back(sensor);

@@ -29,7 +29,7 @@ SmoothingConfig form_b(SmoothingHistory history) {
   return config_of(SmoothingForm::line_of_lines, history, 20);
 }
 
-/// A smoother that is given one value a pitch, from time 0.
+/// A smoother with one value per pitch, from time 0.
 struct Fed {
   explicit Fed(const SmoothingConfig& config)
       : pitch(std::chrono::duration_cast<nanoseconds>(seconds_d(config.period_s))),
@@ -62,8 +62,7 @@ TEST_CASE("form A passes everything through until n values are stored", "[smooth
   CHECK(feed.smoother.clipped() == 0);
 }
 
-TEST_CASE("form A passes a value inside the band and on its very edge, clips it beyond",
-          "[smoothing]") {
+TEST_CASE("form A passes a value inside the band and on its edge, clips it beyond", "[smoothing]") {
   for (const auto& [value, expected, clipped] :
        std::vector<std::tuple<double, double, unsigned>>{{0.0, 0.0, 0},
                                                          {0.29, 0.29, 0},
@@ -122,14 +121,14 @@ TEST_CASE("form A, raw history: a genuine step is followed, overshooting by hand
   CHECK(feed(5.0) == 5.0);
 }
 
-TEST_CASE("form A, screened history: a genuine step is believed after three agreeing values",
+TEST_CASE("form A, screened history: a genuine step is accepted after three agreeing values",
           "[smoothing]") {
   Fed feed(form_a(SmoothingHistory::screened));
   for (int i = 0; i < 6; ++i) feed(0.0);
   CHECK(feed(5.0) == 0.3);
   CHECK(feed(5.1) == 0.3);
   CHECK(feed(5.0) == 5.0);
-  // The history has begun anew with the three, so nothing is clipped until six are there again.
+  // The history restarted with the three, so nothing is clipped until six are stored.
   CHECK(feed(5.2) == 5.2);
   CHECK(feed(4.9) == 4.9);
   CHECK(feed(5.0) == 5.0);
@@ -143,7 +142,7 @@ TEST_CASE("a screened history follows a course so steep that its values are far 
     Fed feed(config);
     for (int i = 0; i < 18; ++i) feed(20.0);
     double value_K = 20.0;
-    for (int i = 1; i <= 3; ++i) value_K = feed(20.0 + 2.0 * i);  // 0.9 K is far already
+    for (int i = 1; i <= 3; ++i) value_K = feed(20.0 + 2.0 * i);  // 0.9 K is already far
     CHECK(value_K == 26.0);
     for (int i = 4; i <= 12; ++i) CHECK(feed(20.0 + 2.0 * i) == near(20.0 + 2.0 * i));
   }
@@ -158,8 +157,7 @@ TEST_CASE("far values that do not agree never enter a screened history", "[smoot
   CHECK(feed(0.0) == 0.0);
 }
 
-TEST_CASE("three agreeing values are believed although a stray one came before them",
-          "[smoothing]") {
+TEST_CASE("three agreeing values are accepted after a stray one", "[smoothing]") {
   Fed feed(form_a(SmoothingHistory::screened));
   for (int i = 0; i < 6; ++i) feed(0.0);
   CHECK(feed(-8.0) == near(-0.3));
@@ -169,7 +167,7 @@ TEST_CASE("three agreeing values are believed although a stray one came before t
 }
 
 TEST_CASE("a value outside the band but not far enters a screened history", "[smoothing]") {
-  // 0.9 K is three half-widths: the last that is kept. Kept, it raises the next expectation to 0.6.
+  // 0.9 K is three half-widths: the last value kept. It raises the next expectation to 0.6.
   Fed kept(form_a(SmoothingHistory::screened));
   for (int i = 0; i < 6; ++i) kept(0.0);
   CHECK(kept(0.89) == 0.3);
@@ -180,15 +178,15 @@ TEST_CASE("a value outside the band but not far enters a screened history", "[sm
   CHECK(refused(0.0) == 0.0);
 }
 
-TEST_CASE("how far is far grows with the robust spread of the history", "[smoothing]") {
-  // Values +-1 around 0: residuals near 1, so far is about 3 x 1.48 K and 3 K is not.
+TEST_CASE("the limit of a far value grows with the robust spread of the history", "[smoothing]") {
+  // Values +-1 around 0: residuals near 1, so far is about 3 x 1.48 K, and 3 K is not.
   SmoothingConfig config = form_a(SmoothingHistory::screened);
   Fed feed(config);
   for (const double value : {1.0, -1.0, -1.0, -1.0, -1.0, 1.0}) feed(value);
   // By symmetry the line is flat at -1/3: residuals 4/3 and 2/3, median of six (4th) 2/3;
   // far is 3 x 1.4826 x 2/3 = 2.97 K from -1/3.
   CHECK(feed(2.6) == near(-1.0 / 3 + 0.3));
-  // Kept: -1 -1 -1 -1 1 2.6 -> mean -0.4/6, extended by 3.5 samples of the slope.
+  // Kept: -1 -1 -1 -1 1 2.6 -> mean -0.4/6, extrapolated by 3.5 samples of the slope.
   const double slope = (2.5 + 1.5 + 0.5 - 0.5 + 1.5 * 1.0 + 2.5 * 2.6) / 17.5;
   CHECK(feed(0.0) == near(-0.4 / 6 + 3.5 * slope - 0.3));
 }
@@ -206,7 +204,7 @@ TEST_CASE("a straight course at irregular times is expected exactly", "[smoothin
   CHECK(added(smoother, at, 30.0) == Approx(expected_K + 0.3).margin(1e-9));
 }
 
-TEST_CASE("after an outage the history begins anew", "[smoothing]") {
+TEST_CASE("after an outage the history restarts", "[smoothing]") {
   for (const auto& config : {form_a(SmoothingHistory::raw), form_a(SmoothingHistory::screened)}) {
     Smoother smoother(config);
     for (int i = 0; i < 6; ++i) added(smoother, i * 60s, 0.0);
@@ -221,7 +219,7 @@ TEST_CASE("after an outage the history begins anew", "[smoothing]") {
   }
 }
 
-TEST_CASE("an outage during form B begins anew with the blocks", "[smoothing]") {
+TEST_CASE("an outage during form B restarts its blocks", "[smoothing]") {
   Fed feed(form_b(SmoothingHistory::raw));
   for (int i = 0; i < 20; ++i) feed(0.0);
   feed.next += 301s;
@@ -237,18 +235,17 @@ TEST_CASE("form B passes everything through until three blocks are stored", "[sm
 
 TEST_CASE("form B: slopes C, B, A give D = 3A - 3B + C from the newest block's fitted end",
           "[smoothing]") {
-  // Blocks with slopes 1, 2, 4 K a sample: D = 12 - 6 + 1 = 7 (of 20 s). Steps between blocks are
-  // arbitrary: only slopes and the newest block's end count.
+  // Blocks with slopes 1, 2, 4 K per sample: D = 12 - 6 + 1 = 7 (per 20 s). Steps between blocks
+  // are arbitrary: only slopes and the newest block's end count.
   Fed feed(form_b(SmoothingHistory::raw));
   for (int i = 0; i < 6; ++i) feed(100.0 + 1.0 * i);
   for (int i = 0; i < 6; ++i) feed(50.0 + 2.0 * i);
   for (int i = 0; i < 6; ++i) feed(10.0 + 4.0 * i);
-  // The newest block ends at 30; the same line serves the whole coming block.
+  // The newest block ends at 30; the same line is used for the whole next block.
   for (int i = 1; i <= 6; ++i) CHECK(feed(1000.0) == near(30.0 + 7.0 * i + 0.3));
 }
 
-TEST_CASE("form B: the coming block is measured at its own times when samples are missed",
-          "[smoothing]") {
+TEST_CASE("form B: the next block uses its own times when samples are missed", "[smoothing]") {
   Smoother smoother(form_b(SmoothingHistory::raw));
   for (int i = 0; i < 18; ++i) added(smoother, i * 20s, 0.1 * i);
   CHECK(added(smoother, 18 * 20s, 9.0) == near(2.1));
@@ -279,7 +276,7 @@ TEST_CASE("form B, raw history: a spike late in a block throws the next band off
   Fed feed(form_b(SmoothingHistory::raw));
   for (int i = 0; i < 17; ++i) feed(0.0);
   feed(3.0);
-  // 0 0 0 0 0 3: slope 3/7 K a sample, fitted end 11/7 K, D = 9/7 K a sample.
+  // 0 0 0 0 0 3: slope 3/7 K per sample, fitted end 11/7 K, D = 9/7 K per sample.
   for (int i = 1; i <= 6; ++i) CHECK(feed(0.0) == near((11.0 + 9.0 * i) / 7.0 - 0.3));
 }
 
@@ -299,14 +296,14 @@ TEST_CASE("form B: a genuine step, raw is followed by the next blocks, screened 
     raw(0.0);
     screened(0.0);
   }
-  for (int i = 0; i < 6; ++i) CHECK(raw(5.0) == 0.3);  // the old line serves the whole block
+  for (int i = 0; i < 6; ++i) CHECK(raw(5.0) == 0.3);  // the old line is used for the whole block
   CHECK(raw(5.0) == near(5.0));                        // a flat block at 5: D = 0
   CHECK(screened(5.0) == 0.3);
   CHECK(screened(5.0) == 0.3);
   for (int i = 0; i < 20; ++i) CHECK(screened(5.0) == 5.0);
 }
 
-TEST_CASE("one value a period is taken, on a grid that late samples do not shift", "[smoothing]") {
+TEST_CASE("one value per period is taken on a grid that late samples do not shift", "[smoothing]") {
   SmoothingConfig config = form_a(SmoothingHistory::raw);
   config.period_s = 20;
   config.samples = 32;  // all pass through: value_K() shows which were taken
@@ -333,7 +330,7 @@ TEST_CASE("smoothing off passes every value at any time", "[smoothing]") {
   for (int i = 0; i < 20; ++i) CHECK(added(smoother, i * 1s, 7.0 * (i % 3)) == 7.0 * (i % 3));
 }
 
-TEST_CASE("a smoother that loads another's state goes on as that one, bit for bit", "[smoothing]") {
+TEST_CASE("a smoother with another's loaded state continues bit for bit", "[smoothing]") {
   for (const auto& config : {form_a(SmoothingHistory::raw), form_a(SmoothingHistory::screened),
                              form_b(SmoothingHistory::raw), form_b(SmoothingHistory::screened)}) {
     Fed one(config);
@@ -354,7 +351,7 @@ TEST_CASE("a smoother that loads another's state goes on as that one, bit for bi
   }
 }
 
-TEST_CASE("smoothing refuses a configuration that has no meaning", "[smoothing]") {
+TEST_CASE("smoothing refuses an impossible configuration", "[smoothing]") {
   const auto broken = [](const char* key, auto change) {
     SmoothingConfig config;
     change(config);
@@ -370,8 +367,8 @@ TEST_CASE("smoothing refuses a configuration that has no meaning", "[smoothing]"
 
 TEST_CASE("form B takes one to six blocks, with the slope of the polynomial through theirs",
           "[smoothing]") {
-  // By hand, slopes of the blocks in K a value from the oldest on: 1, 2, 4. One block: 4; two:
-  // 2*4 - 2 = 6; three: 3*4 - 3*2 + 1 = 7. The coming block starts from 18: 6 + 6*2 at its end.
+  // By hand, slopes of the blocks in K per value, oldest first: 1, 2, 4. One block: 4; two: 2*4 - 2
+  // = 6; three: 3*4 - 3*2 + 1 = 7. The next block starts from 18: 6 + 6*2 at its end.
   for (const auto& [blocks, slope] : {std::pair{1u, 4.0}, std::pair{2u, 6.0}, std::pair{3u, 7.0}}) {
     CAPTURE(blocks);
     LineOfLines lines(3, blocks);

@@ -20,8 +20,8 @@ namespace {
 constexpr std::size_t places = 6;
 constexpr double hour_s = 3600.0;
 
-/// A machine with day and night and a spindle that is switched on every 8 h for 4 h; each place
-/// follows both by a share and a lag of its own.
+/// A machine with day and night and a spindle that is on for 4 h in every 8 h; each place follows
+/// both with its own share and lag.
 double true_degC(std::size_t place, double time_s) {
   const double day = std::sin(2.0 * std::numbers::pi *
                               (time_s - 900.0 * static_cast<double>(place)) / (24.0 * hour_s));
@@ -31,19 +31,19 @@ double true_degC(std::size_t place, double time_s) {
   const double end = 1.0 - std::exp(-on_s / tau_s);
   const double heat = in_period_s < on_s ? 1.0 - std::exp(-in_period_s / tau_s)
                                          : end * std::exp(-(in_period_s - on_s) / tau_s);
-  // Noise of a converter: the same in every run.
+  // Noise of a converter, the same in every run.
   const double phase = 12.9898 * time_s + 78.233 * static_cast<double>(place);
   const double noise = 0.02 * std::sin(1000.0 * std::sin(phase));
   return 22.0 + 2.0 * day + (2.0 + static_cast<double>(place)) * heat + noise;
 }
 
-/// Appended, since GCC 12 sees an overflow in sums of strings that is none.
+/// Appended, since GCC 12 reports a false overflow in sums of strings.
 std::string named(const char* head, std::size_t place, const char* tail = "") {
   std::string name(head);
   return name.append(std::to_string(place + 1)).append(tail);
 }
 
-/// What `thermocomp covariance` would say of two days of it.
+/// Result of `thermocomp covariance` for two days of it.
 ThermalModel model_of_machine() {
   ThermalModel model;
   model.outputs = {"z_um"};
@@ -77,7 +77,7 @@ EstimatorConfig config_of(SuspectedPolicy policy, std::size_t sensors_a_block = 
       sensor.smoothing.form = SmoothingForm::off;
       sensor.screening.stale_after_s = 60.0;
       sensor.screening.settle_s = 0.0;
-      sensor.screening.rate_allowance_K = 50.0;  // what screening refuses need not be suspected
+      sensor.screening.rate_allowance_K = 50.0;  // screening must not refuse before suspicion acts
       block.sensors.push_back(config.sensors.size());
       config.sensors.push_back(sensor);
     }
@@ -158,7 +158,7 @@ using Names = std::vector<std::string>;
 
 }  // namespace
 
-TEST_CASE("a sensor that jumps is suspected within ten minutes, with size and moment",
+TEST_CASE("a sensor that jumps is suspected within ten minutes, with size and time",
           "[estimator][suspicion]") {
   Shop shop(config_of(SuspectedPolicy::warn));
   shop.run_until(20.0, honest);
@@ -174,7 +174,7 @@ TEST_CASE("a sensor that jumps is suspected within ten minutes, with size and mo
   CHECK(shop.report.sensors[2].suspected_size_K == Approx(2.0).margin(0.4));
 }
 
-TEST_CASE("to warn changes no offset by one bit", "[estimator][suspicion]") {
+TEST_CASE("a warning changes no offset by one bit", "[estimator][suspicion]") {
   Shop warns(config_of(SuspectedPolicy::warn));
   Shop looks_away(config_of(SuspectedPolicy::off));
   while (warns.time_s < 22.0 * hour_s) {
@@ -186,13 +186,13 @@ TEST_CASE("to warn changes no offset by one bit", "[estimator][suspicion]") {
   CHECK_FALSE(looks_away.ever_any());
 }
 
-TEST_CASE("day and night and the warm-up of all raise no suspicion", "[estimator][suspicion]") {
+TEST_CASE("day, night and a common warm-up raise no suspicion", "[estimator][suspicion]") {
   Shop shop(config_of(SuspectedPolicy::weigh_down));
   shop.run_until(16.0 + 72.0, honest);
   CHECK_FALSE(shop.ever_any());
 }
 
-TEST_CASE("what all sensors show at once is no lie", "[estimator][suspicion]") {
+TEST_CASE("a change of all sensors at once is no error", "[estimator][suspicion]") {
   Shop shop(config_of(SuspectedPolicy::warn));
   shop.run_until(24.0, [](std::size_t, double temp_degC, double time_s) {
     return time_s > 20.0 * hour_s ? temp_degC + 2.0 : temp_degC;
@@ -230,9 +230,8 @@ TEST_CASE("a sensor that works loose is suspected at a warm-up", "[estimator][su
   for (const std::size_t other : {0u, 1u, 2u, 3u, 5u}) CHECK_FALSE(shop.ever(other));
 }
 
-TEST_CASE("two that lie at once are both named, or nobody is", "[estimator][suspicion]") {
-  // Of opposite signs they make each neighbour's expectation wrong by more than they are
-  // themselves.
+TEST_CASE("two sensors wrong at once are both named, or none is", "[estimator][suspicion]") {
+  // With opposite signs they shift the expectation of each neighbour by more than their own errors.
   const double second_K = GENERATE(1.5, -3.0);
   Shop shop(config_of(SuspectedPolicy::warn));
   shop.run_until(20.5, [&](std::size_t sensor, double temp_degC, double time_s) {
@@ -246,7 +245,7 @@ TEST_CASE("two that lie at once are both named, or nobody is", "[estimator][susp
   CHECK(shop.report.sensors[4].suspected_size_K == Approx(second_K).margin(0.3));
 }
 
-TEST_CASE("a second lie does not change the size of the first", "[estimator][suspicion]") {
+TEST_CASE("a second error does not change the size of the first", "[estimator][suspicion]") {
   Shop shop(config_of(SuspectedPolicy::warn));
   shop.run_until(22.5, [](std::size_t sensor, double temp_degC, double time_s) {
     if (sensor == 1 && time_s > 20.0 * hour_s) return temp_degC + 2.0;
@@ -256,7 +255,7 @@ TEST_CASE("a second lie does not change the size of the first", "[estimator][sus
   CHECK(shop.report.sensors[1].suspected_size_K == Approx(2.0).margin(0.4));
 }
 
-TEST_CASE("a faulted neighbour says nothing, and the others still do", "[estimator][suspicion]") {
+TEST_CASE("a faulted neighbour is ignored, the others still count", "[estimator][suspicion]") {
   Shop shop(config_of(SuspectedPolicy::warn));
   shop.run_until(20.5, [](std::size_t sensor, double temp_degC, double time_s) {
     return sensor == 3 && time_s > 19.95 * hour_s ? not_a_number
@@ -279,7 +278,7 @@ TEST_CASE("a suspicion ends when the sensor agrees again", "[estimator][suspicio
   CHECK(shop.report.inputs[2].good);
 }
 
-TEST_CASE("a suspected sensor that is faulted for ten minutes starts anew when it is back",
+TEST_CASE("a suspected sensor that is faulted for ten minutes starts anew on its return",
           "[estimator][suspicion]") {
   Shop shop(config_of(SuspectedPolicy::weigh_down));
   shop.run_until(24.0, [](std::size_t sensor, double temp_degC, double time_s) {
@@ -291,8 +290,7 @@ TEST_CASE("a suspected sensor that is faulted for ten minutes starts anew when i
   CHECK(shop.report.inputs[2].good);
 }
 
-TEST_CASE("a reference taken with the sensors as they are ends suspicions",
-          "[estimator][suspicion]") {
+TEST_CASE("a new reference ends suspicions", "[estimator][suspicion]") {
   Shop shop(config_of(SuspectedPolicy::warn));
   shop.run_until(21.0, jumped);
   REQUIRE(shop.suspected() == Names{"s3"});
@@ -303,7 +301,7 @@ TEST_CASE("a reference taken with the sensors as they are ends suspicions",
   CHECK(shop.suspected().empty());
 }
 
-TEST_CASE("weighed down, the lie leaves the offset, at the slew rate and without a pause",
+TEST_CASE("with weigh_down the error leaves the offset at the slew rate, without a pause",
           "[estimator][suspicion]") {
   Shop lied_to(config_of(SuspectedPolicy::weigh_down));
   Shop true_one(config_of(SuspectedPolicy::off));
@@ -319,12 +317,12 @@ TEST_CASE("weighed down, the lie leaves the offset, at the slew rate and without
   CHECK(lied_to.report.sensors[2].weighed_down);
   CHECK(lied_to.report.inputs[2].estimated);
   CHECK(lied_to.report.inputs[2].sd_K > 0.0);
-  CHECK(worst_um < 1.0);  // of the 2 um that 2 K are
+  CHECK(worst_um < 1.0);  // of the 2 um that 2 K give
   CHECK(lied_to.idle_steps == 0);
   CHECK(lied_to.largest_step_um <= 0.05 * 12.0 + 1e-9);
 }
 
-TEST_CASE("where an estimate would be too uncertain the suspected sensor is used all the same",
+TEST_CASE("where an estimate would be too uncertain the suspected sensor is still used",
           "[estimator][suspicion]") {
   EstimatorConfig config = config_of(SuspectedPolicy::weigh_down);
   config.compensation.offset_sd_um_max = GENERATE(0.001, 0.02, 0.15, 0.3);
@@ -332,13 +330,12 @@ TEST_CASE("where an estimate would be too uncertain the suspected sensor is used
   shop.run_until(32.0, jumped);
   CHECK(shop.suspected() == Names{"s3"});
   CHECK(shop.idle_steps == 0);
-  if (config.compensation.offset_sd_um_max > 0.1) return;  // may serve for long
+  if (config.compensation.offset_sd_um_max > 0.1) return;  // usable for long
   CHECK_FALSE(shop.report.sensors[2].weighed_down);
   CHECK(shop.report.inputs[2].good);
 }
 
-TEST_CASE("a block of several sensors goes on without the one that lies",
-          "[estimator][suspicion]") {
+TEST_CASE("a block of several sensors continues without the wrong one", "[estimator][suspicion]") {
   Shop shop(config_of(SuspectedPolicy::weigh_down, 3));
   const auto lie = [](std::size_t sensor, double temp_degC, double time_s) {
     return sensor == 7 && time_s > 20.0 * hour_s ? temp_degC + 3.0 : temp_degC;
@@ -350,7 +347,7 @@ TEST_CASE("a block of several sensors goes on without the one that lies",
   CHECK(shop.idle_steps == 0);
 }
 
-TEST_CASE("a state in mid suspicion goes on as if it had never been saved",
+TEST_CASE("a state saved during a suspicion continues as if never saved",
           "[estimator][suspicion]") {
   Shop shop(config_of(SuspectedPolicy::weigh_down));
   shop.run_until(20.0 + 0.12, jumped);
@@ -368,7 +365,7 @@ TEST_CASE("a state in mid suspicion goes on as if it had never been saved",
   CHECK_FALSE(loaded.suspected().empty());
 }
 
-TEST_CASE("a reload adopts suspicions by name, and to warn only gives the sensor back",
+TEST_CASE("a reload adopts suspicions by name, and with warn the sensor is used again",
           "[estimator][suspicion]") {
   Shop shop(config_of(SuspectedPolicy::weigh_down));
   shop.run_until(21.0, jumped);
@@ -387,7 +384,7 @@ TEST_CASE("a reload adopts suspicions by name, and to warn only gives the sensor
 
 namespace {
 
-/// Numbers of a world by its seed.
+/// Random numbers by seed.
 struct Dice {
   std::uint64_t state;
   double operator()(double low, double high) {
@@ -396,7 +393,7 @@ struct Dice {
   }
 };
 
-/// Up to four sensors that jump, creep or work loose, for a while each; some that break.
+/// Up to four sensors that jump, creep or work loose for a while each, and some that fail.
 class WrongSensors {
  public:
   explicit WrongSensors(std::uint64_t seed) : dice_{seed} {
@@ -434,7 +431,7 @@ class WrongSensors {
 
 }  // namespace
 
-TEST_CASE("whatever lies and breaks, suspicion keeps slew and bound and ends no compensation",
+TEST_CASE("for any wrong and failing sensors, slew and bound hold and compensation does not end",
           "[estimator][suspicion][property]") {
   const auto seed = GENERATE(range(1u, 25u));
   Dice dice{seed};
@@ -454,7 +451,7 @@ TEST_CASE("whatever lies and breaks, suspicion keeps slew and bound and ends no 
     believes.step(wrong);
     REQUIRE(std::isfinite(weighs.command.offset_um[0]));
     REQUIRE(std::abs(weighs.command.offset_um[0]) <= limits.offset_um_max + 1e-9);
-    // What breaks may end it; what is suspected may not.
+    // A failed sensor may end it; a suspected one may not.
     const std::vector<InputReport>& inputs = believes.report.inputs;
     if (weighs.time_s > 16.1 * hour_s &&
         std::all_of(inputs.begin(), inputs.end(), [](const auto& each) { return each.good; }))

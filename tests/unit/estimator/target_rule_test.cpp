@@ -1,4 +1,4 @@
-/// Where the axes are to go, and what a step tells of the controller's signals.
+/// Targets of the axes, and the controller's signals in a step.
 #include <cmath>
 #include <memory>
 #include <vector>
@@ -25,7 +25,7 @@ Signals cutting(double value, bool online = true) {
 
 Targets targets(Mode mode, const Signals& signals, const EstimatorConfig& config = small_config(),
                 bool held = false) {
-  // A rule's targets live as long as it does.
+  // The spans in Targets need a rule that outlives the call.
   static std::unique_ptr<TargetRule> rule;
   rule = std::make_unique<TargetRule>(config);
   Displacement displacement;
@@ -41,7 +41,7 @@ EstimatorConfig with_cutting_signal() {
 
 }  // namespace
 
-TEST_CASE("the target is the negative of the displacement, zero, or to stay", "[targets]") {
+TEST_CASE("the target is the negative of the displacement, zero, or NaN (stay)", "[targets]") {
   CHECK(targets(Mode::compensating, {}).axis_um[0] == -4.0);
   CHECK(targets(Mode::disabled, {}).axis_um[0] == 0.0);
   CHECK(targets(Mode::ramping_to_zero, {}).axis_um[0] == 0.0);
@@ -54,12 +54,12 @@ TEST_CASE("the target is the negative of the displacement, zero, or to stay", "[
   CHECK(targets(Mode::compensating, {}, reversed).axis_um[0] == 4.0);
 }
 
-TEST_CASE("held outside of the model's domain, a compensating axis stays", "[targets]") {
+TEST_CASE("held outside the model's domain, a compensating axis stays", "[targets]") {
   CHECK(std::isnan(targets(Mode::compensating, {}, small_config(), true).axis_um[0]));
   CHECK(targets(Mode::disabled, {}, small_config(), true).axis_um[0] == 0.0);
 }
 
-TEST_CASE("going to zero waits while it is not clear that nothing is cut", "[targets]") {
+TEST_CASE("the ramp to zero waits while cutting is not excluded", "[targets]") {
   for (const Signals& unclear : {cutting(1.0), cutting(not_a_number), cutting(0.0, false)}) {
     const Targets waiting = targets(Mode::ramping_to_zero, unclear);
     CHECK(waiting.waits_for_cut);
@@ -71,7 +71,7 @@ TEST_CASE("going to zero waits while it is not clear that nothing is cut", "[tar
   CHECK(clear.axis_um[0] == 0.0);
 }
 
-TEST_CASE("hold_while_cutting lets the offset change only on a clear sign", "[targets]") {
+TEST_CASE("hold_while_cutting lets the offset change only on a definite signal", "[targets]") {
   EstimatorConfig config = small_config();
   config.compensation.hold_while_cutting = true;
   CHECK(targets(Mode::compensating, cutting(0.0), config).may_change);
@@ -81,7 +81,7 @@ TEST_CASE("hold_while_cutting lets the offset change only on a clear sign", "[ta
   CHECK(targets(Mode::compensating, cutting(1.0)).may_change);
 }
 
-TEST_CASE("a controller that is silent or old reports nothing, what it reported last stays known",
+TEST_CASE("a controller that is offline or stale gives no signals; the last ones stay known",
           "[signals]") {
   SignalIntake intake(with_cutting_signal(), model_with_growth());
   ControllerState controller;
@@ -97,7 +97,7 @@ TEST_CASE("a controller that is silent or old reports nothing, what it reported 
   CHECK(signals.cutting == 1.0);
   CHECK(std::isnan(signals.cycle_end));
 
-  controller.signals[0] = 1.0;  // as old as it may be, then older
+  controller.signals[0] = 1.0;  // just not stale, then stale
   CHECK(intake.step(12s, controller).online);
   controller.signals[0] = 2.0;
   signals = intake.step(12s + 1ns, controller);
@@ -107,8 +107,7 @@ TEST_CASE("a controller that is silent or old reports nothing, what it reported 
   CHECK(signals.cutting == 1.0);
 }
 
-TEST_CASE("signals are complete with all that the model and the disabling switch need",
-          "[signals]") {
+TEST_CASE("signals are complete with all that the model and the disable switch need", "[signals]") {
   SignalIntake intake(with_cutting_signal(), model_with_growth());
   ControllerState controller;
   controller.online = true;

@@ -26,7 +26,7 @@ ThermalModel with_terms(std::vector<TermSpec> terms) {
   return model;
 }
 
-/// The displacement with all references at 20 degC.
+/// Displacement with all references at 20 degC.
 Vector at(DisplacementModel& model, nanoseconds now, Vector rise_K, const Vector& signals = {}) {
   for (double& value : rise_K) value += 20.0;
   Vector out(2, 99.0);
@@ -74,7 +74,7 @@ TEST_CASE("position dependence is a lever around p0, whichever column comes firs
   CHECK(with_terms({lever("a_mm|t1_degC")}).signal_columns() == std::vector<std::string>{"a_mm"});
 }
 
-TEST_CASE("a day that began otherwise has other coefficients: the published two equations",
+TEST_CASE("the coefficients depend on the start of the day: the two published equations",
           "[terms]") {
   const auto term = [](const std::string& subject, double at_start, double tau_s, double gain) {
     return TermSpec{"start_dependence",
@@ -82,7 +82,7 @@ TEST_CASE("a day that began otherwise has other coefficients: the published two 
                     {{"at_start", at_start}, {"place0_degC", 0.0}, {"tau_s", tau_s}},
                     {{"gain_um_per_unit_K", {{"z_um", gain}}}}};
   };
-  // C1 = [a1 + a2 T0 + a3 T1] dTs with a1 = 2 (the matrix), a2 = 0.1, a3 = -0.03; the room at 23.
+  // C1 = [a1 + a2 T0 + a3 T1] dTs with a1 = 2 (the matrix), a2 = 0.1, a3 = -0.03; room at 23.
   const double tau_s = 1800.0 / std::log(10.0);
   DisplacementModel bed(
       with_terms({term("t1_degC|t1_degC", 1, 0, 0.1), term("t1_degC|room_degC", 0, 0, -0.03)}));
@@ -101,7 +101,7 @@ TEST_CASE("a day that began otherwise has other coefficients: the published two 
         Approx(3000.0 * (5e-3 + 1e-4 * 20.0 - 2e-5 * 23.0) * share));
 }
 
-TEST_CASE("how a day began is what the reference says, not where the place stands now", "[terms]") {
+TEST_CASE("the start of a day is the reference, not the place's present temperature", "[terms]") {
   const TermSpec start{"start_dependence",
                        "t1_degC|t2_degC",
                        {{"at_start", 1.0}, {"place0_degC", 18.0}, {"tau_s", 0.0}},
@@ -118,7 +118,7 @@ TEST_CASE("how a day began is what the reference says, not where the place stand
   CHECK(w_um(20.0, 25.0) - 3.0 * 5.0 == Approx(w_um(20.0, 20.0)));
 }
 
-TEST_CASE("exchanged channels are put back before anything else sees them", "[terms]") {
+TEST_CASE("exchanged channels are corrected before any other term", "[terms]") {
   const TermSpec swap{"sensor_swap", "t1_degC|t2_degC", {}, {}};
   CHECK(at_rest({swap}, {1.0, 4.0}) == Vector{2.0 * 4.0 + 5.0, -4.0 + 3.0});
   // Another term names the place, not the channel.
@@ -126,7 +126,7 @@ TEST_CASE("exchanged channels are put back before anything else sees them", "[te
   CHECK(at_rest({term, swap}, {1.0, 4.0})[0] == Approx(13.0 + 16.0));
 }
 
-TEST_CASE("play follows only when its width is used up, at whatever speed", "[terms]") {
+TEST_CASE("play follows only when its width is used up, at any speed", "[terms]") {
   for (const double step : {0.01, 0.5, 10.0}) {
     Play play(2.0);
     const auto go = [&](double from, double to) {
@@ -162,7 +162,8 @@ TEST_CASE("play of a temperature acts on its part of every output", "[terms]") {
   CHECK(at(model, 2s, {3.0, 0.0}) == Vector{7.0, -3.5});
 }
 
-TEST_CASE("a slow sensor that warms exponentially is led to the true temperature", "[terms]") {
+TEST_CASE("a slow sensor that warms exponentially is corrected to the true temperature",
+          "[terms]") {
   const double structure_s = 3600.0;
   const double sensor_s = 240.0;
   DisplacementModel model(with_terms({{"slow_sensor", "t1_degC", {{"tau_s", sensor_s}}, {}}}));
@@ -177,7 +178,7 @@ TEST_CASE("a slow sensor that warms exponentially is led to the true temperature
   }
 }
 
-TEST_CASE("a lead starts at the reading, bears an outage and a step that takes no time",
+TEST_CASE("a lead starts at the reading, and survives an outage and a step without time",
           "[terms]") {
   Lead lead(100.0);
   CHECK(lead.step(10s, 30.0) == 30.0);
@@ -186,11 +187,11 @@ TEST_CASE("a lead starts at the reading, bears an outage and a step that takes n
   CHECK(after_outage_K == Approx(35.0).margin(0.01));
   lead.restart();
   CHECK(lead.step(100001s, 50.0) == 50.0);
-  // Noise of single readings grows at most fivefold.
+  // Noise of single readings grows by at most five.
   CHECK(lead.step(100001s + 1ms, 51.0) < 50.0 + 5.0);
 }
 
-TEST_CASE("a reload keeps the past of plays and leads", "[terms]") {
+TEST_CASE("a reload keeps the states of plays and leads", "[terms]") {
   const std::vector<TermSpec> terms = {{"hysteresis", "t1_degC", {{"width_K", 2.0}}, {}},
                                        {"slow_sensor", "t2_degC", {{"tau_s", 60.0}}, {}}};
   DisplacementModel before(with_terms(terms));

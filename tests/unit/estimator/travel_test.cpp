@@ -1,4 +1,4 @@
-// Axes whose controller interpolates along the travel: what their nodes are told.
+// Axes whose controller interpolates along the travel: offsets of their nodes.
 #include <algorithm>
 #include <cmath>
 #include <random>
@@ -14,7 +14,7 @@ using namespace thermocomp;
 
 namespace {
 
-/// x depends on where its slide stands: 5 um/K at 0 mm, -15 at 400 mm, 0 at 800 mm; t2 is flat.
+/// x depends on its slide position: 5 um/K at 0 mm, -15 at 400 mm, 0 at 800 mm; t2 is constant.
 ThermalModel curved_model() {
   ThermalModel model;
   model.inputs = {"t1_degC", "t2_degC"};
@@ -32,7 +32,7 @@ AxisConfig node_of(double position_mm, TravelForm form) {
   return axis;
 }
 
-/// x along its travel and z, which takes one offset.
+/// x along its travel, and z with one offset.
 EstimatorConfig travel_config(const std::vector<double>& nodes_mm, TravelForm form) {
   EstimatorConfig config = small_config();
   config.signals = {"x_mm", "cutting_on", "compensation_off_on"};
@@ -42,7 +42,7 @@ EstimatorConfig travel_config(const std::vector<double>& nodes_mm, TravelForm fo
   return config;
 }
 
-/// A controller that applies at once what is valid.
+/// A controller that applies valid offsets at once.
 struct TravelMachine : Machine {
   explicit TravelMachine(const EstimatorConfig& config, const ThermalModel& model = curved_model())
       : Machine(config, model), count(config.axes.size()) {
@@ -80,7 +80,7 @@ double worst_of(const std::vector<double>& x, const std::vector<double>& y, doub
 
 }  // namespace
 
-TEST_CASE("the nearest line lies evenly off a bend and goes through what is straight",
+TEST_CASE("the minimax line is evenly off a bend and exact for a straight line",
           "[estimator][travel]") {
   const std::vector<double> x{0.0, 1.0, 2.0};
   const CurveLine bend = minimax_line(x, std::vector<double>{0.0, 4.0, 2.0});
@@ -94,7 +94,7 @@ TEST_CASE("the nearest line lies evenly off a bend and goes through what is stra
   CHECK(std::isnan(none.at_first));
 }
 
-TEST_CASE("no line is nearer than the nearest line", "[estimator][travel][property]") {
+TEST_CASE("no line is nearer than the minimax line", "[estimator][travel][property]") {
   const auto seed = GENERATE(range(0u, 200u));
   CAPTURE(seed);
   std::mt19937 engine(seed);
@@ -108,7 +108,7 @@ TEST_CASE("no line is nearer than the nearest line", "[estimator][travel][proper
   }
   const CurveLine line = minimax_line(x, y);
   CHECK(worst_of(x, y, line.at_first, line.at_last) == Approx(line.deviation).margin(1e-9));
-  // The least of a convex function: no neighbour is lower.
+  // Minimum of a convex function: no neighbour is lower.
   for (const double step : {1.0, 0.01})
     for (const auto& [a, b] :
          {std::pair(1.0, 0.0), std::pair(-1.0, 0.0), std::pair(0.0, 1.0), std::pair(0.0, -1.0),
@@ -117,8 +117,7 @@ TEST_CASE("no line is nearer than the nearest line", "[estimator][travel][proper
             line.deviation - 1e-9);
 }
 
-TEST_CASE("the nodes of a table are sent the curve, wherever the slide stands",
-          "[estimator][travel]") {
+TEST_CASE("the nodes of a table get the curve, for any slide position", "[estimator][travel]") {
   TravelMachine machine(travel_config({0.0, 400.0, 800.0}, TravelForm::table));
   machine.run(5, cold);
   machine.controller.signals[0] = 123.0;
@@ -133,7 +132,7 @@ TEST_CASE("the nodes of a table are sent the curve, wherever the slide stands",
   CHECK(machine.command.offset_um == before);
 }
 
-TEST_CASE("a line is the nearest to the curve", "[estimator][travel]") {
+TEST_CASE("a line is the minimax line of the curve", "[estimator][travel]") {
   TravelMachine machine(travel_config({0.0, 800.0}, TravelForm::line));
   machine.run(5, cold);
   machine.run(20, warm);
@@ -142,7 +141,7 @@ TEST_CASE("a line is the nearest to the curve", "[estimator][travel]") {
   CHECK(machine.command.offset_um[1] == Approx(-3.0 + 17.5));
 }
 
-TEST_CASE("a node that does not apply what it was sent stops the whole axis, and no other",
+TEST_CASE("a node that does not apply its offset stops the whole axis, and no other",
           "[estimator][travel]") {
   TravelMachine machine(travel_config({0.0, 400.0, 800.0}, TravelForm::table));
   machine.run(5, cold);
@@ -171,7 +170,7 @@ TEST_CASE("a node that does not apply what it was sent stops the whole axis, and
   CHECK(machine.command.offset_um[1] == Approx(75.0));
 }
 
-TEST_CASE("a proving move goes along the whole travel", "[estimator][travel]") {
+TEST_CASE("a proving move covers the whole travel", "[estimator][travel]") {
   TravelMachine machine(travel_config({0.0, 800.0}, TravelForm::line));
   machine.run(5, cold);
   machine.estimator.apply({CommandKind::prove, 0, 5.0});
@@ -181,7 +180,7 @@ TEST_CASE("a proving move goes along the whole travel", "[estimator][travel]") {
   CHECK(machine.command.offset_um[2] == 0.0);
 }
 
-TEST_CASE("what is measured where the slide stands corrects all nodes alike",
+TEST_CASE("a value measured at the slide's position corrects all nodes alike",
           "[estimator][travel]") {
   EstimatorConfig config = travel_config({0.0, 800.0}, TravelForm::line);
   config.correction.form = CorrectionForm::recursive;
@@ -192,7 +191,7 @@ TEST_CASE("what is measured where the slide stands corrects all nodes alike",
   machine.controller.signals[0] = 400.0;
   machine.run(20, warm);
   const auto before_um = machine.command.offset_um;
-  // The curve is 27 there and the line 9.5: that much remains, and the model knows of all of it.
+  // The curve is 27 there and the line 9.5: the rest remains, and the model accounts for all of it.
   machine.estimator.apply({CommandKind::measured, 0, -27.0 + 9.5});
   machine.run(30, warm);
   CHECK(machine.command.offset_um[0] == Approx(before_um[0]).margin(0.05));
@@ -204,7 +203,7 @@ TEST_CASE("what is measured where the slide stands corrects all nodes alike",
   CHECK(machine.command.offset_um[1] - before_um[1] == Approx(change_um).margin(0.01));
 }
 
-TEST_CASE("what a cycle end holds is held along the whole travel", "[estimator][travel]") {
+TEST_CASE("the state held at a cycle end is held along the whole travel", "[estimator][travel]") {
   EstimatorConfig config = travel_config({0.0, 400.0, 800.0}, TravelForm::table);
   config.compensation.update = UpdateRule::each_cycle;
   TravelMachine machine(config);
@@ -218,7 +217,7 @@ TEST_CASE("what a cycle end holds is held along the whole travel", "[estimator][
   CHECK(machine.command.offset_um[2] == Approx(-3.0));
 }
 
-TEST_CASE("nodes that cannot be are refused", "[estimator][travel]") {
+TEST_CASE("impossible nodes are refused", "[estimator][travel]") {
   const auto refused = [](const EstimatorConfig& config) {
     CHECK_THROWS_AS(TravelCurves(config, curved_model()), InvalidValue);
   };

@@ -1,4 +1,4 @@
-/// True changes come through, false ones stay out: whole estimators with the default screening.
+/// True changes are accepted, false ones refused: whole estimators with the default screening.
 #include <cmath>
 #include <map>
 #include <string>
@@ -22,7 +22,7 @@ EstimatorConfig usual_config() {
   return config;
 }
 
-/// Three blocks that warm together, each sensor on a module of its own.
+/// Three blocks that warm together, each sensor on its own module.
 EstimatorConfig three_blocks() {
   EstimatorConfig config = usual_config();
   SensorConfig third = config.sensors[1];
@@ -44,9 +44,8 @@ ThermalModel correlated_model(double correlation = 0.98) {
 
 }  // namespace
 
-TEST_CASE(
-    "a unit that is changed under way holds the offset and is reported, for as long as it lasts",
-    "[estimator]") {
+TEST_CASE("a change of unit while running holds the offset and is reported for as long as it lasts",
+          "[estimator]") {
   Machine machine(usual_config());
   machine.steps(60, {20.0, 20.0});
   machine.steps(200, {22.0 - 1.0, 20.0});
@@ -72,7 +71,7 @@ TEST_CASE("a module whose channels all show the same after an outage is not read
   CHECK(machine.report().mode == Mode::holding);
   machine.steps(11, {23.0, 26.1});
   CHECK(machine.report().mode == Mode::compensating);
-  // In an even machine they do it by right.
+  // In an isothermal machine equal values are correct.
   Machine even(config);
   even.steps(60, {20.0, 20.4});
   even.steps(70, {lost, lost});
@@ -80,7 +79,7 @@ TEST_CASE("a module whose channels all show the same after an outage is not read
   CHECK(even.report().mode == Mode::compensating);
 }
 
-TEST_CASE("an accepted jump of a young machine gives it another reference", "[estimator]") {
+TEST_CASE("an accepted jump soon after the start renews the reference", "[estimator]") {
   Machine machine(usual_config());
   machine.steps(30, {12.0, 24.8});
   machine.steps(60, {23.3, 24.8});
@@ -93,7 +92,7 @@ TEST_CASE("an accepted jump of a young machine gives it another reference", "[es
   CHECK(machine.offset_um() == 0.0);
 }
 
-TEST_CASE("a sensor replaced by one that reads 3 K more is reported, and accepted by the command",
+TEST_CASE("a replaced sensor that reads 3 K more is reported, and accepted by command",
           "[estimator]") {
   const bool unplugged = GENERATE(true, false);
   Machine machine(three_blocks(), correlated_model());
@@ -117,7 +116,7 @@ TEST_CASE("a sensor replaced by one that reads 3 K more is reported, and accepte
   CHECK(machine.report().inputs[0].temp_degC == Approx(26.6));
 }
 
-TEST_CASE("an accepted jump counts at once, whatever was smoothed before it", "[estimator]") {
+TEST_CASE("an accepted jump counts at once, regardless of the smoothing before it", "[estimator]") {
   Machine machine(usual_config());
   machine.steps(600, {20.0, 20.0});
   machine.steps(15, {24.0, 20.0});
@@ -126,7 +125,7 @@ TEST_CASE("an accepted jump counts at once, whatever was smoothed before it", "[
   CHECK(machine.report().sensors[0].smoothed_degC == 24.0);
 }
 
-TEST_CASE("neighbours on other modules confirm what a sensor missed under a fault", "[estimator]") {
+TEST_CASE("neighbours on other modules confirm a change missed during a fault", "[estimator]") {
   EstimatorConfig config = three_blocks();
   Machine machine(config, correlated_model());
   machine.steps(60, {20.0, 20.0, 20.0});
@@ -135,7 +134,7 @@ TEST_CASE("neighbours on other modules confirm what a sensor missed under a faul
     const double temp_degC = 20.0 + 0.001 * i;
     machine.step({2.0, temp_degC, temp_degC});
   }
-  // 3.6 K from where it was: beyond what 70 min of a jump allow where nobody confirms it.
+  // 3.6 K from its last value: beyond the limit for 70 min of a jump without confirmation.
   const double quarter_K = 18.0 / 4.0;
   REQUIRE(3.6 < quarter_K);
   machine.steps(12, {23.6, 23.6, 23.6});
