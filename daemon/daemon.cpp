@@ -103,7 +103,7 @@ struct Locks {
   }
   std::vector<NameLock> controller;
   std::optional<FileLock> state;
-  std::vector<std::string> warnings;  ///< the lock file cannot be created, by other daemons neither
+  std::vector<std::string> warnings;  ///< the state file could not be locked
 };
 
 /// The record beside the status socket. A dry run sends nothing and leaves the record untouched.

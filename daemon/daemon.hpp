@@ -8,7 +8,7 @@ namespace thermocomp {
 
 class Daemon {
  public:
-  /// Loads the configuration and constructs all parts; starts no thread of theirs.
+  /// Loads the configuration and constructs all parts without starting them.
   /// @throws ConfigurationError, DriverError, SocketError, HistoryError, InvalidValue
   explicit Daemon(const std::filesystem::path& config_file);
   ~Daemon();

@@ -30,8 +30,7 @@ std::vector<Problem> flaws_of(const Files& files, bool in_use) {
 /// The electronic data sheets of a configuration's devices.
 class EdsFiles {
  public:
-  /// @param folder  base of relative paths; none: opens no file and leaves out objects given by
-  /// name
+  /// @param folder  base of relative paths; none: opens no file, leaves out objects given by name
   explicit EdsFiles(std::optional<std::filesystem::path> folder) : folder_(std::move(folder)) {}
 
   /// The file of a device's key `eds`; nullptr: not configured, or unreadable.

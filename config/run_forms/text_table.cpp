@@ -55,7 +55,7 @@ bool split(std::string_view line, char separator, std::vector<std::string_view>&
   return true;
 }
 
-/// Replaces doubled quotes by single ones.
+/// Replaces each doubled quote by one.
 std::string unquoted(std::string_view field) {
   std::string text(field);
   for (auto at = text.find("\"\""); at != std::string::npos; at = text.find("\"\"", at + 1))

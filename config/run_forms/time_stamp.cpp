@@ -161,7 +161,7 @@ std::optional<double> take_zone(std::string_view& text) {
   return (west ? -60.0 : 60.0) * (60 * *hours + minutes);
 }
 
-/// "PM", "am".
+/// "PM", "am": adds 12 hours, or makes hour 12 hour 0.
 bool take_half_of_day(std::string_view& text, TimeStamp& stamp) {
   text = trimmed(text);
   if (text.size() != 2 || (text[1] != 'M' && text[1] != 'm')) return text.empty();
@@ -217,7 +217,7 @@ bool take_clock(std::string_view& text, TimeStamp& stamp) {
   return rest.empty();
 }
 
-/// ctime: "Wed Jun 11 11:50:00 2026", with the year at its end.
+/// Moves the year of ctime's "Wed Jun 11 11:50:00 2026" to the front.
 std::string year_in_front(std::string_view text) {
   take_day_name(text);
   if (text.size() < 18 || text[text.size() - 5] != ' ') return {};

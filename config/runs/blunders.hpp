@@ -1,4 +1,4 @@
-/// Finds flaws of runs: outliers of displacement (a missed probe, a misread row), common rows.
+/// Finds flaws of runs: outliers of displacement (a missed probe, a misread row); common rows.
 #pragma once
 
 #include <span>

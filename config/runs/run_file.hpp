@@ -30,9 +30,8 @@ struct RunSelection {
 [[nodiscard]] std::string selected_name(const RunFile& run);
 
 /// Requires at least one row, a strictly increasing time_s, and a selection that is not empty.
-/// @param map  describes files of other forms; may be nullptr. Ignored for a file of our own form
-/// of
-///             which it names no column.
+/// @param map  form of other programs' files; may be nullptr. Ignored for a file of our own form
+///             if it names no column of that file.
 /// @throws ConfigurationError with every problem (the first 100), each with line, column and rule
 [[nodiscard]] RunFile load_run(const RunSelection& selection, const ColumnMap* map = nullptr);
 /// @param name  file name in problems; `selection.file` is not used

@@ -16,9 +16,9 @@
 
 namespace thermocomp {
 
-/// An anytime-valid test by betting (Waudby-Smith and Ramdas 2024). With e the errors of both
-/// models at the probings of an axis and m their mean square so far; at most one bet in two hours,
-/// because neighbouring errors are correlated:
+/// An anytime-valid test by betting (Waudby-Smith and Ramdas 2024). Let e be the errors of
+/// both models at the probings of an axis, m their mean square so far. At most one bet is made in
+/// two hours, because neighbouring errors are correlated:
 ///
 ///     b = 0.95 tanh(lambda sum (e_model^2 - e_candidate^2) / m),   summed since the last bet
 ///     W = mean over lambda of prod (1 + b),   V the same with 1 - b

@@ -15,7 +15,7 @@
 
 namespace thermocomp {
 
-/// Checks whether a new reference may be taken: the machine must be at rest thermally and without
+/// Checks whether a new reference may be taken: the machine must be thermally at rest and without
 /// an offset. Unknown quantities do not count against it.
 /// @return why not (an axis is being proved or offset, the machine warms or cools), or empty
 [[nodiscard]] std::string why_no_reference(const StatusView& view);

@@ -56,7 +56,7 @@ class EventLog {
 
   EventJournal& journal_;
   bool first_{true};
-  nanoseconds settled_at_{};  ///< report time
+  nanoseconds settled_at_{};  ///< in report time
   Mode mode_{Mode::starting};
   std::uint32_t reasons_{0};  ///< reported and not over
   std::vector<bool> suspected_;

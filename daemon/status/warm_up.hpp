@@ -104,9 +104,8 @@ class WarmUp {
 /// [correction] in use, its own standard deviation instead.
 class SinceProbing {
  public:
-  /// @param model  checksum. When it changes, the displacement of the last probing is shifted by
-  /// the
-  ///               present difference of the two models
+  /// @param model  checksum. A change shifts the displacement of the last probing by the present
+  ///               difference of the two models
   void note(std::span<const AxisReport> axes, const std::string& model);
   /// @return NaN: the model file has no data on its origin, or the displacement is unknown
   [[nodiscard]] double error_um(std::size_t axis, const AxisReport& now, const ThermalModel& model,

@@ -35,9 +35,8 @@ struct RunReplaySummary {
 ///
 /// Output: a run file with the selected rows: time_s, then for each axis `<axis>_offset_um` (sent)
 /// and `<axis>_displacement_um` (of its model output, before limits), after the step of the row.
-/// @throws ConfigurationError: missing columns of sensors or the model (all at once); too long a
-/// run
-///         for its step period (500 million steps)
+/// @throws ConfigurationError: columns of sensors or the model are missing (all are named), or the
+///         run needs more than 500 million steps
 RunReplaySummary replay_run_file(const DaemonConfig& config, const RunFile& run, std::ostream& out);
 
 }  // namespace thermocomp

@@ -67,9 +67,7 @@ class HistoryWriter {
   void note(Event event);
   /// Opens the file and starts the thread. A damaged file is moved aside, with an entry in the
   /// news; a failing disk is retried without limit.
-  /// @throws HistoryError when the file is of a newer version or another program, or another
-  /// process
-  ///         writes it
+  /// @throws HistoryError when the file is of a newer version or another program, or in use
   void start();
   /// For callers with their own clock and without the thread: start() without the thread, and the
   /// work that the thread does every 50 ms.
