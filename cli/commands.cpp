@@ -72,14 +72,14 @@ int run_modelling(const std::string& command, const std::vector<std::string>& ar
                 " it comes with the package thermocomp-modelling");
 }
 
-/// structure, place, tiebar, plan, inspect, group, fit, diagnose, thermal-test: all arguments go to
-/// `thermocomp-modelling` beside this program, in its libexec folder or in PATH.
+/// structure, place, tiebar, plan, inspect, group, fit, diagnose, thermal-test: passes all
+/// arguments to `thermocomp-modelling` beside this program, in its libexec folder or in PATH.
 void add_modelling_commands(CLI::App& app, Action& action) {
   for (const ModellingCommand& command : commands) {
     CLI::App* sub = app.add_subcommand(command.name, command.help);
     sub->group("Modelling (carried out by thermocomp-modelling)");
     sub->prefix_command();
-    sub->set_help_flag();  // --help is for the other program
+    sub->set_help_flag();  // --help goes to the other program
     const std::string name = command.name;
     sub->callback([sub, name, &action] {
       action = [sub, name] { return run_modelling(name, sub->remaining()); };
@@ -102,7 +102,7 @@ void declare_command_line(CLI::App& app, GlobalOptions& global, Action& action) 
   add_init_command(app, action);
   add_check_command(app, action);
   add_scan_command(app, action);
-  app.fallthrough();  // `thermocomp status --socket FILE` too
+  app.fallthrough();  // allows `thermocomp status --socket FILE`
   add_observe_commands(app, global, action);
   add_operate_commands(app, global, action);
   app.fallthrough(false);

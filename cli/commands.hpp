@@ -1,37 +1,37 @@
-/// The command line of `thermocomp`. `--help`, the manual page and the completion of the shell are
-/// all made from what is declared here.
+/// Command line of `thermocomp`. `--help`, the manual page and the shell completion are generated
+/// from these declarations.
 #pragma once
 
 #include "report/command.hpp"
 
 namespace thermocomp::cli {
 
-/// Name, description, options before the subcommand and every subcommand. Parsing sets `action`.
-/// @param global, action  outlive the parsing and the action
+/// Declares the global options and all subcommands. Parsing sets `action`.
+/// @param global, action  must outlive parsing and the action
 void declare_command_line(CLI::App& app, GlobalOptions& global, Action& action);
 
-// The groups of commands, each from its folder.
+// Groups of commands, one folder each.
 
-/// init: from a bare machine to a configuration that passes `check`.
+/// init: creates a configuration that passes `check` by asking and scanning.
 void add_init_command(CLI::App& app, Action& action);
-/// check: a daemon's configuration with its model, every problem at once.
+/// check: reports every problem of a daemon's configuration and its model at once.
 void add_check_command(CLI::App& app, Action& action);
-/// scan: every channel of a configuration, live and without the daemon.
+/// scan: reads every channel of a configuration live, without the daemon.
 void add_scan_command(CLI::App& app, Action& action);
-/// status, sensors, watch: what the running daemon does.
+/// status, sensors, watch: show the state of the running daemon.
 void add_observe_commands(CLI::App& app, const GlobalOptions& global, Action& action);
-/// reference, enable, disable, measured, cycle-end, reload, prove, promote: what an operator (or
-/// the CNC's program) asks of the running daemon.
+/// reference, enable, disable, measured, cycle-end, reload, prove, promote: requests of an operator
+/// or a CNC program to the running daemon.
 void add_operate_commands(CLI::App& app, const GlobalOptions& global, Action& action);
-/// admit: models that the office offers.
+/// admit: checks and runs models that the office offers.
 void add_admit_command(CLI::App& app, Action& action);
-/// export, replay: what the daemon's history holds, and whether it can be reproduced.
+/// export, replay: convert the daemon's history, and verify that it can be reproduced.
 void add_history_commands(CLI::App& app, Action& action);
-/// report: a machine's week from its history, as a page.
+/// report: HTML report of a machine's week from its history.
 void add_report_command(CLI::App& app, Action& action);
-/// import: logs of other programs as run files.
+/// import: converts logs of other programs to run files.
 void add_import_command(CLI::App& app, Action& action);
-/// predict, simulate: what a model says about a run, and runs of a machine that does not exist.
+/// predict, simulate: apply a model to a run; generate runs of a simulated machine.
 void add_model_commands(CLI::App& app, Action& action);
 
 }  // namespace thermocomp::cli

@@ -1,5 +1,4 @@
-// thermocomp: the command for operator and engineer. Thin: every command is a few lines over
-// configuration, estimator, history, simulator or the daemon's status socket.
+// thermocomp: command line for operators and engineers.
 #include "cli/commands.hpp"
 #include "cli/common/daemon_client.hpp"
 

@@ -11,14 +11,14 @@
 namespace thermocomp::cli {
 namespace {
 
-/// NaN: it states none.
+/// @return the error that the model states; NaN: none
 double stated_um(const ThermalModel& model, const std::string& output) {
   if (!model.made_from) return not_a_number;
   const auto found = model.made_from->outputs.find(output);
   return found == model.made_from->outputs.end() ? not_a_number : found->second.left_out_rms_um;
 }
 
-/// About their mean; NaN of less than two.
+/// Sample standard deviation; NaN for fewer than two values.
 double sd_of(const std::vector<double>& values) {
   double mean = 0.0;
   for (const double value : values) mean += value;
@@ -28,7 +28,7 @@ double sd_of(const std::vector<double>& values) {
   return values.size() < 2 ? not_a_number : std::sqrt(sum / static_cast<double>(values.size() - 1));
 }
 
-/// Without what was measured: predict() then takes every row.
+/// Removes the measured columns, so that predict() uses every row.
 RunFile unmeasured(RunFile run, const std::vector<std::string>& outputs) {
   for (const std::string& output : outputs)
     if (const auto column = run.find(output)) {
@@ -38,11 +38,11 @@ RunFile unmeasured(RunFile run, const std::vector<std::string>& outputs) {
   return run;
 }
 
-/// One output of both models, in the rows that both have.
+/// One output of both models, in the rows that both predict.
 struct Pair {
-  std::vector<double> in_use_um;   ///< remainders, where it was measured
-  std::vector<double> offered_um;  ///< the same
-  std::vector<double> apart_um;    ///< offered less in use
+  std::vector<double> in_use_um;   ///< remainders of the measured rows
+  std::vector<double> offered_um;  ///< likewise
+  std::vector<double> apart_um;    ///< offered minus in use
 };
 
 const PredictedOutput& output_of(const Prediction& prediction, const std::string& name) {
@@ -50,7 +50,7 @@ const PredictedOutput& output_of(const Prediction& prediction, const std::string
                        [&](const PredictedOutput& output) { return output.name == name; });
 }
 
-/// @pre both have the output
+/// @pre both predictions have the output
 Pair pair_of(const Prediction& in_use, const Prediction& offered, const std::string& output) {
   const PredictedOutput& one = output_of(in_use, output);
   const PredictedOutput& other = output_of(offered, output);
@@ -70,7 +70,7 @@ Pair pair_of(const Prediction& in_use, const Prediction& offered, const std::str
   return pair;
 }
 
-/// By probings. @return why it is refused; empty: it is not
+/// Compares the remainders at the probings. @return reason for refusal; empty: admitted
 std::string judge_probed(const Pair& pair, double stated_um, std::string& found) {
   const double in_use_um = sd_of(pair.in_use_um);
   const double offered_um = sd_of(pair.offered_um);
@@ -81,7 +81,7 @@ std::string judge_probed(const Pair& pair, double stated_um, std::string& found)
   return fmt::format("{}; with the stated error {:.2f} um are allowed", found, allowed_um);
 }
 
-/// Without: by how far the models are apart.
+/// Compares the predictions of the two models where there are too few probings.
 std::string judge_unprobed(const Pair& pair, double stated_um, std::string& found) {
   constexpr double sds_max = 3.0;
   const double apart_um = sd_of(pair.apart_um);

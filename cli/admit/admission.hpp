@@ -1,4 +1,4 @@
-/// Whether an offered model may run beside the one in use: what this computer alone can check.
+/// Checks an offered model against the machine's own history before it runs as the candidate.
 #pragma once
 
 #include <cstddef>
@@ -10,21 +10,20 @@
 namespace thermocomp::cli {
 
 struct AdmissionRules {
-  std::size_t probings_min{3};  ///< of an output, from which on they decide
+  std::size_t probings_min{3};  ///< probings of an output needed to judge it by them
 };
 
-/// Both models over the machine's own last days. An output that was probed often enough decides by
-/// the remainder r = standard deviation of (measured - predicted) at the probings: with s the
-/// smaller of the errors that the two models state (left_out_rms_um; 0 where neither states any),
+/// Compares both models over the machine's last days. An output with enough probings is judged by
+/// the remainder r = standard deviation of (measured - predicted) at the probings; s is the smaller
+/// of the errors that the two models state (left_out_rms_um; 0 if neither states one):
 ///
 ///     refused if  r_offered > sqrt(r_in_use^2 + s^2)
 ///
-/// Another output is refused where the models differ by more than they can:
-/// sd(predicted_offered - predicted_in_use) > 3 sqrt(s_offered^2 + s_in_use^2), or where neither
-/// states an error.
+/// Any other output is refused if neither model states an error, or if sd(predicted_offered -
+/// predicted_in_use) > 3 sqrt(s_offered^2 + s_in_use^2).
 /// @param config  with the offered model as its candidate
-/// @return why it is refused; empty: it is not
-/// @param found  what was compared, in one line
+/// @param found  result of the comparison, one line
+/// @return reason for refusal; empty: admitted
 [[nodiscard]] std::string why_not_admitted(const DaemonConfig& config, const RunFile& days,
                                            const AdmissionRules& rules, std::string& found);
 

@@ -35,9 +35,9 @@ constexpr std::uintmax_t offer_bytes_max = 2 * model_bytes_max;
 
 struct AdmitSettings {
   std::string machine;
-  fs::path config;     ///< the daemon's
-  fs::path offer;      ///< what the uplink brought
-  fs::path folder;     ///< of the candidate and of what was decided
+  fs::path config;     ///< of the daemon
+  fs::path offer;      ///< file written by the uplink
+  fs::path folder;     ///< holds the candidate and the decisions
   fs::path approvers;  ///< folder of public keys; empty: an operator here approves
   double days{3.0};
   AdmissionRules rules;
@@ -63,8 +63,8 @@ AdmitSettings load_settings(const fs::path& file) {
   return settings;
 }
 
-/// As the uplink writes it: {"release", "machine", "model", "content", "withdrawn", "approved",
-/// "rollback"}; the last two are signatures.
+/// The uplink's file: {"release", "machine", "model", "content", "withdrawn", "approved",
+/// "rollback"}; "approved" and "rollback" are signatures.
 struct Offer {
   ReleaseOrder order;
   std::string content;
@@ -84,7 +84,7 @@ Offer read_offer(const fs::path& file) {
           flag_of(read, "withdrawn")};
 }
 
-/// The decisions about the newest release, one a step; the uplink sends them to the store.
+/// Log of the decisions about the newest release; the uplink sends it to the store.
 class Steps {
  public:
   explicit Steps(fs::path file) : file_(std::move(file)) {
@@ -108,7 +108,7 @@ class Steps {
              {"model", offer.order.checksum},
              {"steps", json::array()}};
   }
-  /// On disk when it returns.
+  /// The step is on disk when this returns.
   void add(const std::string& step, const std::string& detail) {
     const std::chrono::nanoseconds now = std::chrono::system_clock::now().time_since_epoch();
     kept_["steps"].push_back({{"step", step}, {"at", utc_text(now.count())}, {"detail", detail}});
@@ -151,7 +151,7 @@ class Admission {
                    "checksum");
   }
 
-  /// A model that was not seen before.
+  /// Checks a release that is new to this machine.
   void receive() {
     std::string found;
     const std::string why = why_refused(found);
@@ -179,7 +179,7 @@ class Admission {
     return why_not_admitted(config_, parse_run(text.str(), history), settings_.rules, found);
   }
 
-  /// @return whose key signed it; empty: nobody's here
+  /// @return owner of the key that signed the order; empty: none of `approvers`
   [[nodiscard]] std::string signer(bool takes_back) const {
     const std::string& signature = takes_back ? offer_.rollback : offer_.approval;
     if (settings_.approvers.empty() || signature.empty()) return "";
@@ -187,7 +187,8 @@ class Admission {
     order.takes_back = takes_back;
     return signer_of(order, signature, settings_.approvers);
   }
-  /// Who did what this program finds done: a signed order before an interruption, or an operator.
+  /// Origin of a change not made by this run: a signed order, interrupted before it was noted, or
+  /// an operator.
   [[nodiscard]] std::string done_by(bool takes_back) const {
     const std::string name = signer(takes_back);
     return name.empty() ? "by an operator at the machine" : "as ordered by " + name;
@@ -197,7 +198,7 @@ class Admission {
                        settings_.approvers.string());
   }
 
-  /// An operator may have promoted it; the daemon may have been restarted without it.
+  /// An operator may have promoted the candidate, or the daemon may have restarted without it.
   void look_at_candidate() {
     if (checksum_in_use() == offer_.order.checksum) return steps_.add("promoted", done_by(false));
     if (offer_.withdrawn) return end_candidate("withdrawn");
@@ -206,7 +207,7 @@ class Admission {
     if (!status.candidate || status.candidate->file != candidate_file())
       run_beside(config_.socket.path, candidate_file());
     else if (const std::string score = score_text(*status.candidate); score != steps_.last_detail())
-      steps_.add("candidate", score);  // by which it is approved
+      steps_.add("candidate", score);  // the score on which it is approved
     if (settings_.approvers.empty() || offer_.approval.empty()) return;
     const std::string name = signer(false);
     if (name.empty()) return end_candidate(signed_by_nobody("approval"));

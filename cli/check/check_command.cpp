@@ -29,13 +29,13 @@ namespace thermocomp::cli {
 namespace {
 
 constexpr double rise_K = 10.0;
-/// Beside the kinks of the model, where a curve is straight from one to the next.
+/// Evenly spaced samples, in addition to the kinks of piecewise linear curves.
 constexpr std::size_t even_places = 201;
 
 struct Deviation {
   double um{0.0};
   double at_mm{0.0};
-  double range_um{0.0};  ///< of the curve over the travel
+  double range_um{0.0};  ///< of the model's curve over the travel
 };
 
 class Deviations {
@@ -60,7 +60,7 @@ class Deviations {
 
   [[nodiscard]] const std::vector<std::string>& columns() const { return columns_; }
 
-  /// @param column  the temperature that has risen; columns().size(): all have
+  /// @param column  the temperature that is rise_K warmer; columns().size(): all of them
   [[nodiscard]] Deviation of(std::size_t column) {
     DisplacementModel model(model_);
     const std::vector<double> reference_degC(columns_.size(), 20.0);
@@ -152,9 +152,8 @@ std::string text_of(const DaemonConfig& config, const AxisSpan& span) {
   return text.append("\n");
 }
 
-/// How far what a controller interpolates lies from the model's curve along a travel: a line for
-/// each axis whose controller interpolates, with the largest deviation of the line or table from
-/// the model, when each temperature alone is 10 K warmer and when all are. Empty: there is no such
+/// One line for each axis whose controller interpolates: the largest deviation of its line or table
+/// from the model's curve when one temperature, or all of them, are 10 K warmer. Empty: no such
 /// axis.
 std::string travel_deviation_text(const DaemonConfig& config) {
   std::string text;
@@ -205,7 +204,7 @@ std::string list_axes(const DaemonConfig& config) {
   return result;
 }
 
-/// Sensors that the model gets nothing from; empty where there is none.
+/// Sensors that no input of the model uses; empty: none.
 std::string unused_sensors_text(const EstimatorConfig& config) {
   std::string names;
   for (std::size_t i = 0; i < config.sensors.size(); ++i) {
@@ -223,7 +222,7 @@ std::string unused_sensors_text(const EstimatorConfig& config) {
   return "in no block: " + names + " (recorded, but nothing is computed from it)\n";
 }
 
-/// Whether sensors are watched that read what their neighbours contradict.
+/// Describes the supervision of sensors whose neighbours contradict them.
 std::string watch_text(const DaemonConfig& config) {
   const SuspectedPolicy policy = config.estimator.compensation.suspected_sensors;
   if (policy == SuspectedPolicy::off)
@@ -235,7 +234,7 @@ std::string watch_text(const DaemonConfig& config) {
                                          : "sensors that creep or jump: reported, and not used";
 }
 
-/// What the model file says of how well it fits a machine.
+/// States how well the model fits a machine, according to its file.
 std::string comparison_text(const ThermalModel& model) {
   if (!is_compared(model))
     return "compared: NEVER, as far as the model file says (no [made_from] with errors on rows "
@@ -334,7 +333,7 @@ int run_check(const CheckOptions& options) {
   } catch (const ConfigurationError& error) {
     const std::size_t count = error.problems().size();
     std::fprintf(stderr, "%s\n", error.what());
-    constexpr std::size_t shown_max = 100;  // the line after them says how many more there are
+    constexpr std::size_t shown_max = 100;  // a further line gives the number left out
     std::fprintf(stderr, "%s: %s\n", file.c_str(),
                  count > shown_max ? "more than 100 problems" : counted(count, "problem").c_str());
     return exit_bad_use;

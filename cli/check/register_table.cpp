@@ -16,13 +16,13 @@
 namespace thermocomp::cli {
 namespace {
 
-/// place, type, meaning, unit and what one count is
+/// Place, type, value, and unit with the size of one count.
 using Row = std::array<std::string, 4>;
 
 constexpr const char* registers = "register";
 constexpr const char* bits = "bits (DBC numbering)";
 
-/// @param places  the title of the first column
+/// @param places  title of the first column
 std::string table_text(const char* places, std::vector<Row> rows) {
   rows.insert(rows.begin(), Row{places, "type", "value", "unit"});
   std::array<std::size_t, 4> widths{};
@@ -50,7 +50,7 @@ std::string unit_of_axis(const AxisConfig& axis) {
   return std::string(unit_of(axis.output).symbol);
 }
 
-/// "bit 0: x, bit 1: z; 1 = the offset is good"
+/// "valid bits; bit 0: x, bit 1: z; 1: take the offset"
 std::string valid_text(const std::vector<AxisConfig>& axes) {
   std::string text("valid bits; ");
   const std::vector<AxisSpan> spans = axis_spans(axes);
@@ -72,7 +72,7 @@ Row axis_row(const ModbusAxis& place, const ModbusValue& value, const AxisConfig
   return {place_name(value), type_name(value), what + meant + axis.name, scaled(unit, value.scale)};
 }
 
-/// A set: the registers that the controller takes over together.
+/// Adds the registers of a set, which the controller takes over together.
 void add_set(const ModbusTravel& travel, const AxisConfig& axis, std::vector<Row>& written,
              std::vector<Row>& read) {
   const std::string of_axis = " of axis " + axis_name(axis);
@@ -94,7 +94,7 @@ void add_set(const ModbusTravel& travel, const AxisConfig& axis, std::vector<Row
   add(travel.applied, "applied ", read);
 }
 
-/// How the controller interpolates, and when it takes a set over.
+/// Describes how the controller interpolates and when it takes over a set.
 template <class Controller>
 std::string set_text(const DaemonConfig& config, const Controller& controller,
                      const std::string& taken_over) {
@@ -118,11 +118,11 @@ std::string set_text(const DaemonConfig& config, const Controller& controller,
          taken_over + "):\n" + text;
 }
 
-/// The registers between values that one request reads along: they must be there.
+/// Lists registers between values that a request also reads, and which must therefore exist.
 std::string gaps_text(const ModbusControllerConfig& controller,
                       const std::vector<ModbusValue>& values) {
   std::string text;
-  if (s7_of(controller.line) != nullptr) return text;  // a data block has no holes
+  if (s7_of(controller.line) != nullptr) return text;  // a data block has no gaps
   const auto add = [&](const ReadRequest& request, std::size_t from, std::size_t to) {
     if (from >= to) return;
     text += (text.empty() ? "" : ", ") + table_name(request.table) + " " + std::to_string(from);
@@ -131,7 +131,7 @@ std::string gaps_text(const ModbusControllerConfig& controller,
   const ReadPlan plan = plan_reads(values, controller);
   for (std::size_t r = 0; r < plan.requests.size(); ++r) {
     const ReadRequest& request = plan.requests[r];
-    std::map<std::size_t, std::size_t> used;  // first register of each value, and the one behind
+    std::map<std::size_t, std::size_t> used;  // first register of each value, and the one after it
     for (std::size_t i = 0; i < values.size(); ++i)
       if (plan.places[i].request == r)
         used[values[i].address] = values[i].address + words_of(values[i].table, values[i].encoding);
@@ -150,7 +150,7 @@ std::string modbus_table(const DaemonConfig& config, const ModbusControllerConfi
   const std::vector<AxisConfig>& axes = config.estimator.axes;
   std::vector<Row> written;
   std::vector<Row> read;
-  std::vector<ModbusValue> values;  // that are read
+  std::vector<ModbusValue> values;  // read by the daemon
   const std::vector<AxisSpan> spans = axis_spans(axes);
   for (std::size_t i = 0; i < spans.size(); ++i) {
     const ModbusAxis& place = controller.axes[i];
@@ -201,7 +201,7 @@ std::string type_of(const CanSignal& signal, bool raw = false) {
   return type + (signal.byte_order == ByteOrder::big_endian ? ", big endian" : ", little endian");
 }
 
-/// Rows by the frame they stand in.
+/// Rows by frame.
 using Frames = std::map<std::pair<std::uint32_t, bool>, std::vector<Row>>;
 
 void add(Frames& frames, const CanSignal& signal, const std::string& what, const std::string& unit,
@@ -221,7 +221,7 @@ std::string frames_text(const Frames& frames) {
   return text;
 }
 
-/// A set: what the controller takes over together.
+/// Adds the frames of a set, which the controller takes over together.
 void add_set(Frames& frames, const CanTravel& travel, const CanSet& set, const AxisConfig& axis,
              const std::string& before) {
   const std::string of_axis = " of axis " + axis_name(axis);
@@ -271,7 +271,7 @@ std::string can_table(const DaemonConfig& config, const CanControllerConfig& con
          number_text(controller.silent_after_s) + " s:\n" + frames_text(read);
 }
 
-/// Of frames, beside their numbers.
+/// Condition for taking over a set from frames.
 std::string taken_over_text(const CanControllerConfig& controller) {
   return "its newest frames carry the same number, none older than " +
          number_text(CanTravel::forgotten_after_s(controller.period_s)) + " s";
@@ -291,7 +291,7 @@ std::string bounds_text(const DaemonConfig& config) {
   return text;
 }
 
-/// What the contract lacks here, for whoever programs the other side.
+/// Lists optional signals that this configuration does not use, for the PLC programmer.
 std::string missing_text(bool valid_bits, bool heartbeat, bool reads_back) {
   std::vector<std::string> lacks;
   if (!valid_bits)

@@ -1,5 +1,4 @@
-/// The contract with the controller's side as a table: which registers or bits, in what unit, who
-/// writes them.
+/// Interface to the controller as a table: registers or bits, units, direction.
 #pragma once
 
 #include <string>
@@ -8,9 +7,9 @@
 
 namespace thermocomp::cli {
 
-/// For a person who programs the PLC: every register (Modbus), every bit of a frame (CAN) that the
-/// configuration names, first what the daemon writes, then what it reads; then bounds and times.
-/// docs/controllers/plc.md says what each part must do. Addresses are 0-based, as on the wire.
+/// Lists for the PLC programmer every register (Modbus) or every bit of a frame (CAN) in the
+/// configuration: written values, read values, bounds and times. docs/controllers/plc.md defines
+/// the behaviour of each. Addresses are 0-based, as on the wire.
 [[nodiscard]] std::string register_table(const DaemonConfig& config);
 
 }  // namespace thermocomp::cli

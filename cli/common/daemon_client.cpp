@@ -12,7 +12,7 @@ namespace thermocomp::cli {
 
 namespace {
 
-// The daemon's "understood, but not now"; every other error is a use that cannot succeed.
+// JSON-RPC error of a valid request that the daemon's state forbids; other errors are misuse.
 constexpr int refused = -32002;
 
 }  // namespace

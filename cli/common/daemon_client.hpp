@@ -1,4 +1,4 @@
-/// One question to the daemon, with errors as this program reports them.
+/// Requests to the daemon, with errors as this program reports them.
 #pragma once
 
 #include <filesystem>
@@ -8,12 +8,12 @@
 
 namespace thermocomp::cli {
 
-/// @throws Failure: status 2 where there is no daemon, no permission or no answer; status 1 where
-///         the daemon understood and refused
+/// @throws Failure: status 2 without a daemon, permission or answer; status 1 if the daemon refuses
+///         a valid request
 nlohmann::json ask_daemon(const std::filesystem::path& socket, const std::string& method,
                           const nlohmann::json& params);
 
-/// The socket that is used where none is named: THERMOCOMP_SOCKET, else the daemon's default.
+/// Default socket: THERMOCOMP_SOCKET, else the daemon's default.
 [[nodiscard]] std::string default_socket();
 
 }  // namespace thermocomp::cli

@@ -1,5 +1,5 @@
-/// Reading an answer of the daemon without trusting its shape: what is absent, null or of another
-/// type is NaN, empty, zero or false.
+/// Reads the daemon's answers: an absent, null or wrongly typed field gives NaN, empty, zero or
+/// false.
 #pragma once
 
 #include <cstdint>
@@ -13,9 +13,9 @@ namespace thermocomp::cli {
 [[nodiscard]] std::uint64_t count_of(const nlohmann::json& object, const char* key);
 [[nodiscard]] std::string text_of(const nlohmann::json& object, const char* key);  ///< one line
 [[nodiscard]] bool flag_of(const nlohmann::json& object, const char* key);
-/// An empty array where there is none.
+/// Empty array if absent.
 [[nodiscard]] const nlohmann::json& list_of(const nlohmann::json& object, const char* key);
-/// An empty object where there is none.
+/// Empty object if absent.
 [[nodiscard]] const nlohmann::json& object_of(const nlohmann::json& object, const char* key);
 
 }  // namespace thermocomp::cli

@@ -55,7 +55,7 @@ std::string encoding_name(Encoding encoding) {
   return "float64";
 }
 
-/// As STEP 7 and TIA Portal write it: "DBD 4".
+/// Address in the notation of STEP 7 and TIA Portal: "DBD 4".
 std::string data_block_place(const ModbusValue& value) {
   const std::size_t words = registers_of(value.encoding);
   const char* width = words == 1 ? "DBW " : words == 2 ? "DBD " : "DBB ";

@@ -1,5 +1,5 @@
-/// Tables, word orders and encodings as a configuration names them; places, lines and exceptions as
-/// people do.
+/// Display names of Modbus values, lines and exceptions, with configuration keywords where they
+/// exist.
 #pragma once
 
 #include <string>
@@ -16,14 +16,15 @@ namespace thermocomp::cli {
 [[nodiscard]] std::string place_name(const ModbusValue& value);
 /// "int32 ABCD", "uint16", "bit"
 [[nodiscard]] std::string type_name(const ModbusValue& value);
-/// As of a value that is a count or bits and has no sign, whatever the configuration calls it.
+/// Returns the value with an unsigned encoding, for counts and bit fields.
 [[nodiscard]] ModbusValue without_sign(ModbusValue value) noexcept;
-/// What a value of a travel's set means: "slope" in "um/m", "offset at 400 mm" in "um", ...
+/// Meaning and unit of a value of a travel's set: "slope" in "um/m", "offset at 400 mm" in "um",
+/// ...
 struct TravelValueText {
   std::string what;
   std::string unit;
 };
-/// @param unit  of the axis' offset: "um", "urad"
+/// @param unit  unit of the axis' offset: "um", "urad"
 [[nodiscard]] TravelValueText travel_value_text(const TravelShape& travel, const std::string& unit,
                                                 std::size_t index);
 /// "127.0.0.1:502", or "/dev/ttyUSB0, 19200 baud, 8N1"

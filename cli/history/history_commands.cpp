@@ -45,7 +45,7 @@ int tell_damage(const std::string& history, const std::vector<HistoryDamage>& da
   return damage.empty() ? exit_success : exit_no;
 }
 
-/// An export that replaced its own history would lose what it came from.
+/// Refuses to overwrite the history being exported.
 void refuse_onto_itself(const std::string& input, const std::string& output) {
   std::error_code error;
   if (output != "-" && std::filesystem::equivalent(input, output, error) && !error)
@@ -80,7 +80,7 @@ int run_export(const ExportOptions& options) {
 }
 
 struct ReplayOptions {
-  std::string input;  ///< history, or run file where config is given
+  std::string input;  ///< history; with `config`, a run file
   std::string config;
   std::string columns;
   std::string output;

@@ -40,8 +40,7 @@ void refuse_onto(const std::string& input, const std::string& output) {
     throw Failure(output + ": is what is read; the output must be another file");
 }
 
-/// A file of our own form whose time_s counts from 1970 is not left so: selections would need ten
-/// digits.
+/// Converts seconds since 1970 to seconds since the first row, since selections would be long.
 void count_from_first_row(RunFile& run) {
   constexpr double since_1970_s_min = 1e9;
   std::vector<double>& time_s = run.values[*run.find("time_s")];

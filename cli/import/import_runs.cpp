@@ -23,8 +23,8 @@ constexpr std::size_t columns_max = 16;
 constexpr double correlation_min = 0.8;
 constexpr double lead_min = 0.15;
 
-/// Changes of a column over `lag` steps of a grid that begins with its first row; over several the
-/// noise of a reading is small beside them.
+/// Changes of a column over `lag` steps of a grid that begins with the run's first row; a longer
+/// lag reduces the share of the readings' noise.
 std::vector<double> changes(const RunFile& run, std::size_t column, double step_s,
                             std::size_t lag) {
   std::vector<double> time_s;
@@ -51,7 +51,7 @@ std::vector<double> changes(const RunFile& run, std::size_t column, double step_
   return changes;
 }
 
-/// Correlation of a_i with b_(i - shift).
+/// Correlation coefficient of a_i and b_(i - shift), without removing means.
 double correlation(const std::vector<double>& a, const std::vector<double>& b,
                    std::ptrdiff_t shift) {
   const auto size_a = static_cast<std::ptrdiff_t>(a.size());
@@ -67,7 +67,7 @@ double correlation(const std::vector<double>& a, const std::vector<double>& b,
     of_a += x * x;
     of_b += y * y;
   }
-  // The parts that only one recording covers count half.
+  // Parts covered by only one recording are weighted by half.
   double all_a = 0.0;
   double all_b = 0.0;
   for (const double x : a) all_a += x * x;
@@ -94,7 +94,7 @@ void try_pair(const std::vector<double>& a, const std::vector<double>& b, double
   best.correlation = by_shift[static_cast<std::size_t>(strongest)];
   best.shift_s = offset_s + best.step_s * static_cast<double>(strongest + common - size_b);
   best.columns = columns;
-  // Beside its peak r falls; where it rises again by more than 0.05, another peak begins.
+  // r falls on both sides of its peak; a rise of more than 0.05 marks another peak.
   best.next = 0.0;
   for (const std::ptrdiff_t way : {-1, 1}) {
     double lowest = best.correlation;
@@ -142,7 +142,7 @@ std::optional<ClockShift> clock_shift(const RunFile& first, const RunFile& secon
 
 namespace {
 
-/// Rows that are closer are one moment.
+/// Rows closer than this share one time.
 constexpr double same_moment_s = 0.001;
 constexpr double gap_s_min = 60.0;
 constexpr double gap_steps = 3.0;
@@ -158,7 +158,7 @@ std::string two_digits(double value) {
   return text;
 }
 
-/// The two recordings may have seen the same events.
+/// Estimates the shift from events that both recordings contain.
 std::optional<ClockShift> seen_shift(const RunFile& first, const RunFile& second,
                                      const std::string& why) {
   const auto shift = clock_shift(first, second);
@@ -204,7 +204,7 @@ bool is_steady(const std::string& column) {
   return is_temperature(column) || kind_of(column) == QuantityKind::position;
 }
 
-/// The value of a column of the first file at a moment between its rows `after` - 1 and `after`.
+/// Value of a column between its rows `after` - 1 and `after`; NaN for outputs and across gaps.
 double value_between(const RunFile& run, std::size_t column, std::size_t after, double at_s,
                      double gap_s) {
   const auto& time_s = run.time_s();

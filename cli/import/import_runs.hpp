@@ -1,4 +1,4 @@
-/// Recordings as one run file: two clocks joined, operators' corrections as displacements.
+/// Joins recordings with different clocks, and converts operators' corrections to displacements.
 #pragma once
 
 #include <optional>
@@ -9,42 +9,42 @@
 
 namespace thermocomp::cli {
 
-/// The shift of two clocks from what both recordings saw.
+/// Shift between two clocks, estimated from columns of both recordings.
 struct ClockShift {
-  double shift_s{0.0};      ///< the second's time_s plus this is the first's
-  double step_s{0.0};       ///< of the grid: the shift is not known better
-  double correlation{0.0};  ///< of the changes of the two columns at that shift
-  double next{0.0};         ///< the best at another shift
+  double shift_s{0.0};      ///< added to the second's time_s it gives the first's
+  double step_s{0.0};       ///< grid step, the resolution of the shift
+  double correlation{0.0};  ///< of the two columns' changes at this shift
+  double next{0.0};         ///< highest correlation at another peak
   std::string columns;      ///< "'bed_degC' and 'probe_degC'"
-  /// Whether the two follow each other, and at no other shift nearly as well.
+  /// The correlation is high, and clearly higher than at any other peak.
   [[nodiscard]] bool is_sure() const noexcept;
 };
 
-/// The pair of columns and the shift k of the greatest |r|, among all shifts that leave a third of
-/// the shorter recording in common. a and b are the changes of a column of each over a fortieth of
-/// the shorter recording,
+/// Finds the pair of columns and the shift k with the largest |r|, over all shifts with at least a
+/// third of the shorter recording in common. a and b are the changes of a column over a fortieth of
+/// the shorter recording:
 /// r(k) = sum a_i b_(i-k) / sqrt(A B), A = (sum of a_i^2 in common + sum of all a_i^2) / 2, B
-/// alike.
-/// @return nullopt where no column of either moves
+/// likewise.
+/// @return nullopt if no column of either recording changes
 [[nodiscard]] std::optional<ClockShift> clock_shift(const RunFile& first, const RunFile& second);
 
-/// Every row of both by the time of the first. In rows that the second brings along, temperatures
-/// and positions of the first are on the line between its rows beside them, its other columns are
-/// those of the row before; a gap of more than a minute, or three usual steps, stays empty.
-/// @param shift_s  the second's time_s plus this is the first's; nullopt: the dates of both files
-///                 tell it or, where they have none, columns that clearly change alike
-/// @throws ConfigurationError when the clocks cannot be compared, columns are there twice, or the
-///         two do not overlap
+/// Merges the rows of both files on the first one's clock. In rows that only the second file has,
+/// temperatures and positions of the first are interpolated, its outputs are empty and its other
+/// columns hold their last value, except across gaps longer than a minute and three usual steps.
+/// @param shift_s  added to the second's time_s it gives the first's; nullopt: from the files'
+///                 dates, else from columns that change alike
+/// @throws ConfigurationError if the shift is unknown, a column exists in both files, or the two do
+///         not overlap
 [[nodiscard]] RunFile joined_runs(const RunFile& first, const RunFile& second,
                                   std::optional<double> shift_s);
 
-/// Whether an entry is added to those before, or is what stands at the controller from then on.
+/// An entry is either an increment or the total at the controller from then on.
 enum class CorrectionEntry { step, total };
 
 /// displacement = -(sum of the steps until then), or -(total), in um, under the axis' name: an
-/// operator who moves a tool by -12 um has found 12 um too much. Of columns called as an axis
-/// (x, Y, z_mm, A_urad, ...); others stay.
-/// @throws ConfigurationError where no column is an axis', or its unit is not said
+/// operator who moves a tool by -12 um has measured +12 um. Converts columns named like an axis (x,
+/// Y, z_mm, A_urad, ...); others are kept.
+/// @throws ConfigurationError if no column is named like an axis, or its unit is missing
 [[nodiscard]] RunFile displacements_of(RunFile corrections, CorrectionEntry entry);
 
 }  // namespace thermocomp::cli

@@ -39,7 +39,7 @@ bool is_used(const InitDraft& draft, const std::string& sensor) {
   return false;
 }
 
-/// Those that the model waits for, in its order; beyond them by unit and channel.
+/// The model's inputs without a sensor, in its order; then names from unit and channel.
 std::vector<std::string> proposed_names(const InitDraft& draft, const InitModule& module) {
   std::vector<std::string> wanted;
   for (const std::string& input : draft.model_inputs) {
@@ -53,7 +53,7 @@ std::vector<std::string> proposed_names(const InitDraft& draft, const InitModule
   return names;
 }
 
-/// Where not all channels give a temperature as they were described, but do in another order.
+/// Offers another word order if all channels give a temperature only with that one.
 void offer_word_order(const InitDraft& draft, const InitModule& form, InitModule& asked,
                       Questions& questions, const InitEyes& eyes) {
   if (!form.preset.empty() || asked.channels.size() == form.channels.size() ||
@@ -73,7 +73,7 @@ void offer_word_order(const InitDraft& draft, const InitModule& form, InitModule
   }
 }
 
-/// @throws Failure with them: the question is asked again
+/// @throws Failure with the presets as its text, so that the question is repeated
 [[noreturn]] void show_presets(const std::string& word, const InitEyes& eyes) {
   std::string text;
   for (const std::string& line : eyes.preset_lines(word)) text += "\n    " + line;

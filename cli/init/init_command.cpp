@@ -52,7 +52,7 @@ bool stdin_is_terminal() {
   return ::isatty(STDIN_FILENO) == 1;
 }
 
-/// The folder that the files go to, absolute.
+/// Absolute folder of the files to be written.
 fs::path folder_of(const std::string& file) {
   return fs::absolute(file).lexically_normal().parent_path();
 }
@@ -100,7 +100,7 @@ InitDraft draft_of(const InitOptions& options, const fs::path& folder) {
   draft.controller.dry_run = options.dry_run;
   draft.axes = parse_axes(options.axes);
   take_model(draft, options, folder);
-  // The machine's own daemon has its files where the package puts them.
+  // A configuration in /etc uses the package's folders.
   if (!folder.string().starts_with("/etc/")) draft.own_folder = folder.string();
   return draft;
 }
@@ -115,7 +115,7 @@ void refuse_what_is_missing(const InitDraft& draft, const InitOptions& options) 
     throw Failure("init: there is no terminal to ask on, and these options are missing:" + missing);
 }
 
-/// Channels of presets that were not chosen one by one, by what they read now.
+/// Selects the channels of presets given without channels, by reading them.
 void try_modules(InitDraft& draft, const InitOptions& options, const fs::path& folder) {
   for (InitModule& module : draft.modules) {
     const bool are_chosen = !module.channels.empty();
@@ -154,7 +154,7 @@ void name_sensors(InitDraft& draft, const std::string& names) {
   for (std::size_t i = 0; i < given.size(); ++i) unnamed[i]->sensor = given[i];
 }
 
-/// What is read from a controller is said with it; a bridge has signals of its own.
+/// A bridge supplies its own signals; other controllers need a place for each.
 void refuse_missing_signals(const InitDraft& draft) {
   const InitController& controller = draft.controller;
   const std::vector<std::string> missing = missing_signals(draft);
@@ -176,7 +176,7 @@ void refuse_missing_sensors(const InitDraft& draft) {
                     input.substr(0, input.rfind("_degC")) + " (--names)");
 }
 
-/// What was edited by hand, or a fitted model, is not lost to a second init.
+/// Keeps a copy of a file that this run overwrites: it may be edited by hand, or a fitted model.
 void keep_old(const fs::path& path) {
   std::error_code failed;
   if (!fs::exists(path, failed)) return;
@@ -214,7 +214,7 @@ void tell_next(const InitDraft& draft, const std::string& file) {
             << "  " << tool << " enable\n";
 }
 
-/// Whether all of the draft is there. What it can do about a refusal itself goes into the draft.
+/// Reads the draft's places and prints the result; stops reading gaps if the controller refuses.
 bool look(InitDraft& draft, const fs::path& folder) {
   ScanReport report = probe(draft, folder);
   if (report.controller && !report.controller->refused.empty()) {
@@ -248,7 +248,7 @@ int run_init(const InitOptions& options) {
     questions.say("< goes back to the question before.");
   }
   const bool are_asked_for = given.modules.empty();
-  if (!are_asked_for) settle_modules(given);  // no answer could mend them
+  if (!are_asked_for) settle_modules(given);  // from options: cannot be asked again
   const InitEyes eyes = eyes_of(folder);
   questions.interview([&] {
     draft = given;
@@ -264,7 +264,7 @@ int run_init(const InitOptions& options) {
   }
   keep_old(options.file);
   cli::write_file(options.file, configuration_text(draft));
-  const DaemonConfig written = load_daemon_config(options.file);  // what check says, now
+  const DaemonConfig written = load_daemon_config(options.file);  // throws what `check` reports
   std::cout << options.file << ": written, OK; " << written.estimator.sensors.size() << " sensors";
   if (questions.count() > 0) std::cout << ", " << questions.count() << " questions";
   std::cout << '\n';

@@ -1,4 +1,4 @@
-/// What `thermocomp init` knows of a machine, and the configuration that comes of it.
+/// Machine description that `thermocomp init` collects, and the configuration made from it.
 #pragma once
 
 #include <cstddef>
@@ -12,8 +12,8 @@
 
 namespace thermocomp::cli {
 
-/// A value in registers as a person writes it: "holding:0:int32:0.01", "input:26:uint16",
-/// "discrete_input:0"; behind the type "/CDAB" gives another word order.
+/// Short form of a register value: "holding:0:int32:0.01", "input:26:uint16", "discrete_input:0";
+/// "/CDAB" after the type selects another word order.
 struct InitPlace {
   std::string table;
   int address{0};
@@ -36,11 +36,11 @@ struct InitModule {
   std::string name;
   std::size_t bus{0};  ///< index
   int unit{1};
-  std::string preset;        ///< empty: `registers` says how its values are read
-  std::string thermocouple;  ///< where the preset asks for the type
+  std::string preset;        ///< empty: `registers` describes the values
+  std::string thermocouple;  ///< type, for presets that require it
   std::optional<int> base_address;
-  InitPlace registers;  ///< its address is that of no channel
-  /// Beside `registers`: raw values that are no temperatures.
+  InitPlace registers;  ///< its address is unused
+  /// Raw values that mean an open circuit; with `registers`.
   std::vector<std::int64_t> open_circuit_codes;
   std::vector<InitChannel> channels;
 };
@@ -59,8 +59,8 @@ struct InitController {
   std::optional<InitPlace> valid_bits{InitPlace{"holding", 10, "uint16", "ABCD", 1.0}};
   std::optional<InitPlace> heartbeat{InitPlace{"holding", 11, "uint16", "ABCD", 1.0}};
   std::vector<InitSignal> signals;
-  bool dry_run{false};    ///< of a Modbus controller: all of it is read and nothing is written
-  bool reads_gaps{true};  ///< registers between its values can be read along
+  bool dry_run{false};    ///< Modbus: everything is read, nothing is written
+  bool reads_gaps{true};  ///< registers between its values can be read too
   [[nodiscard]] bool is_modbus() const { return kind.starts_with("modbus_"); }
 };
 
@@ -69,28 +69,27 @@ struct InitDraft {
   std::vector<InitModule> modules;
   InitController controller;
   std::vector<std::string> axes;
-  std::string model_file{"model.toml"};  ///< beside the configuration
-  /// The model's inputs where it exists already; each must be the name of a sensor and `_degC`.
+  std::string model_file{"model.toml"};  ///< relative to the configuration
+  /// Inputs of an existing model; each must be the name of a sensor with `_degC`.
   std::vector<std::string> model_inputs;
-  /// What it reads from the controller.
+  /// Signals that the model reads from the controller.
   std::vector<std::string> model_signals;
   std::vector<std::string> model_outputs;
   double offset_um_max{5.0};
   double rate_um_per_s_max{0.5};
-  /// State, history and socket beside the configuration, for one that is not the machine's own.
-  std::string own_folder;  ///< absolute; empty: where the package puts them
+  /// Folder of state, history and socket for a daemon other than the machine's own.
+  std::string own_folder;  ///< absolute; empty: the package's folders
 };
 
-/// "Z" -> "z_um", or what the model calls it: "z_um", "Z_um", "c_urad".
+/// "Z" -> "z_um", or the model's name: "z_um", "Z_um", "c_urad".
 [[nodiscard]] std::string output_name(const InitDraft& draft, const std::string& axis);
 /// "bus1 (192.168.10.20:502)"
 [[nodiscard]] std::string bus_text(const InitBus& bus);
 /// "bed" -> "bed_degC".
 [[nodiscard]] std::string input_name(const std::string& sensor);
-/// The commented configuration.
+/// Configuration with comments.
 [[nodiscard]] std::string configuration_text(const InitDraft& draft);
-/// The model of a machine of which nothing is known yet: it has every sensor and every axis and
-/// gives no displacement.
+/// Initial model without any displacement, with all sensors and axes.
 [[nodiscard]] std::string first_model_text(const InitDraft& draft);
 
 }  // namespace thermocomp::cli

@@ -27,7 +27,7 @@ void progress(const std::string& line) {
   std::fprintf(stderr, "%s\n", line.c_str());
 }
 
-/// The draft as files beside where it will be, so that presets are found; gone with this.
+/// Temporary files in the target's folder, where presets are found; removed by the destructor.
 class TrialFiles {
  public:
   TrialFiles(InitDraft draft, const fs::path& folder) {
@@ -57,7 +57,7 @@ class TrialFiles {
   fs::path model_;
 };
 
-/// The channels that a preset has. @throws Failure: no such preset, or one that is not for Modbus
+/// Channels of a preset. @throws Failure if it does not exist or is not for Modbus
 std::vector<int> channels_of_preset(const std::string& name, const fs::path& folder) {
   sections::Presets presets(sections::preset_folders(folder));
   const TomlDocument asked =
@@ -75,7 +75,7 @@ std::vector<int> channels_of_preset(const std::string& name, const fs::path& fol
   return numbers;
 }
 
-/// Empty for a preset that is not for Modbus, or that cannot be read.
+/// Empty for a preset that is not for Modbus or cannot be read.
 std::string preset_line(const fs::path& path) {
   try {
     const TomlDocument preset = TomlDocument::from_file(path);
@@ -108,8 +108,8 @@ std::string line_of(int number, const ScanChannel& channel, bool has_preset) {
   return text;
 }
 
-/// Codes that channels show now: out of every range either way, but with the code the fault has its
-/// right name.
+/// Takes over the open-circuit codes that channels show now. Such a value is out of range anyway;
+/// with the code the fault is named correctly.
 void take_codes(const ScanDevice& device, InitModule& module, std::vector<std::string>& lines) {
   std::set<std::int64_t> codes;
   for (const ScanChannel& channel : device.channels)
@@ -120,7 +120,7 @@ void take_codes(const ScanDevice& device, InitModule& module, std::vector<std::s
   }
 }
 
-/// Problems without file and line, which nobody can look up: the files are gone with them.
+/// Loads the temporary files; problems omit file and line, since the files are deleted.
 DaemonConfig load_trial(const fs::path& file) {
   try {
     return load_daemon_config(file);
@@ -138,7 +138,7 @@ DaemonConfig load_trial(const fs::path& file) {
 }  // namespace
 
 std::vector<std::string> preset_lines(const fs::path& folder, const std::string& word) {
-  std::map<std::string, std::string> lines;  // by name
+  std::map<std::string, std::string> lines;  // key: name
   for (const fs::path& each : sections::preset_folders(folder)) {
     std::error_code error;
     for (const auto& entry : fs::directory_iterator(each, error)) {
@@ -147,7 +147,7 @@ std::vector<std::string> preset_lines(const fs::path& folder, const std::string&
         lines[name] = preset_line(entry.path());
     }
   }
-  // The makers' words for the same sensors.
+  // Manufacturers' terms for platinum sensors.
   const std::vector<std::string> platinum{"pt100", "pt1000", "rtd"};
   std::vector<std::string> wanted{lower(word)};
   if (std::find(platinum.begin(), platinum.end(), wanted.front()) != platinum.end())
@@ -225,7 +225,7 @@ std::vector<std::string> try_module(const InitDraft& draft, InitModule& module,
 
 InitEyes eyes_of(const fs::path& folder) {
   InitEyes eyes;
-  // An interview that goes back does not search anew.
+  // Cached: an interview that goes back does not search again.
   eyes.find_units = [known =
                          std::map<std::string, std::vector<int>>{}](const InitBus& bus) mutable {
     const std::string name = bus_text(bus);
@@ -237,7 +237,7 @@ InitEyes eyes_of(const fs::path& folder) {
     const ScanBus found = scan_bus(config, {}, {0.0, {true, 1, last}, progress});
     if (!found.error.empty()) progress("bus " + bus.name + ": " + found.error);
     if (!found.found.empty()) progress("bus " + bus.name + ": " + found.found);
-    // A device that answers to every number is one device.
+    // A device that answers on every unit number counts once.
     return known[name] =
                found.found_numbers.size() == last ? std::vector<int>{1} : found.found_numbers;
   };

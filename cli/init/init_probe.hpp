@@ -1,4 +1,4 @@
-/// What `thermocomp init` finds out on the buses, with the reads of `thermocomp scan`.
+/// Bus access of `thermocomp init`, with the reads of `thermocomp scan`.
 #pragma once
 
 #include <filesystem>
@@ -11,21 +11,20 @@
 
 namespace thermocomp::cli {
 
-/// A line for each preset for Modbus that a configuration in this folder may use: name, maker and
-/// model; of them those that have this word.
+/// One line (name, maker, model) for each Modbus preset that a configuration in this folder may use
+/// and that contains the word.
 [[nodiscard]] std::vector<std::string> preset_lines(const std::filesystem::path& folder,
                                                     const std::string& word);
 
-/// Reads everything that the draft describes: every channel, and the controller's side.
-/// @throws ConfigurationError, Failure
+/// Reads every channel and controller value of the draft. @throws ConfigurationError, Failure
 [[nodiscard]] ScanReport probe(const InitDraft& draft, const std::filesystem::path& folder);
 
-/// Whether the daemon would take the draft as it is. @throws Failure with every problem
+/// Checks the draft as the daemon would. @throws Failure with every problem
 void check_draft(const InitDraft& draft, const std::filesystem::path& folder);
 
-/// Fills in the channels of the module's preset where it has none, and takes those away that give
-/// no temperature.
-/// @return what was read, a line a channel. @throws Failure
+/// Fills in the channels of the module's preset if it has none, and removes those without a
+/// temperature.
+/// @return one line for each channel. @throws Failure
 std::vector<std::string> try_module(const InitDraft& draft, InitModule& module,
                                     const std::filesystem::path& folder);
 

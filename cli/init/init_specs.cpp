@@ -26,7 +26,7 @@ std::vector<std::string> split(const std::string& text, char separator) {
   return parts;
 }
 
-/// Whole numbers also as 0x8000.
+/// Integers may be hexadecimal, 0x8000.
 template <class Number>
 std::optional<Number> number_of_text(const std::string& text) {
   Number value{};
@@ -217,7 +217,7 @@ InitModule parse_module(const std::string& text) {
                   "BUS/UNIT=..., without a preset UNIT=TABLE:TYPE:DEGC_A_COUNT:ADDRESSES");
   InitModule module;
   std::vector<std::string> where = split(text.substr(0, equals), '/');
-  if (where.size() == 2 && where[0].starts_with("bus"))  // as the configuration names it
+  if (where.size() == 2 && where[0].starts_with("bus"))  // name in the configuration
     where[0].erase(0, 3);
   if (where.size() > 2) throw Failure(text + ": must begin with UNIT= or BUS/UNIT=");
   if (where.size() == 2)

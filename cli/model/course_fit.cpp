@@ -19,14 +19,14 @@ using Point = RecordedCourse::Point;
 constexpr std::array<double, 4> bandwidths{0.125, 0.25, 0.5, 1.0};
 constexpr double bandwidth_of_one_run = 0.5;
 
-/// A point and what the groups contributed there, which turns gains into displacement.
+/// A point with the groups' contributions, which convert gains to displacement.
 struct Taught {
   Point point;
   std::vector<double> contribution_um;
 };
-using OfRuns = std::vector<std::vector<Taught>>;  ///< one list a run
+using OfRuns = std::vector<std::vector<Taught>>;  ///< one list per run
 
-/// One run, stepped from row to row for one output.
+/// Steps the correction of one output through a run.
 class Lesson {
  public:
   Lesson(const RunFile& run, const ThermalModel& model, const CorrectionConfig& correction,
@@ -112,8 +112,8 @@ class Lesson {
     return {point, contribution_um_};
   }
 
-  /// Two phases have no filter: a gain is as sure as the probing that set it; Rc is not known
-  /// before the displacement has turned.
+  /// Without a filter, a gain's deviation follows from the noise of the probing that set it; Rc is
+  /// unknown until the displacement has turned.
   [[nodiscard]] double deviation(const CorrectionReport& report, std::size_t group) const {
     if (correction_.form == CorrectionForm::recursive) return report.gain_sd[group];
     if (group == 1 && report.phase == 1) return correction_.gain_sd;
@@ -148,7 +148,7 @@ std::vector<Point> thinned(const OfRuns& runs, std::size_t left_out) {
   return kept;
 }
 
-/// Mean square of the displacement that gains of the other runs miss [um^2].
+/// Mean square displacement error of gains from the other runs [um^2].
 double left_out_square(const OfRuns& runs, const ThermalModel& model, std::size_t output,
                        RecordedCourse course, double gain_sd) {
   double sum = 0.0;
@@ -168,7 +168,7 @@ double left_out_square(const OfRuns& runs, const ThermalModel& model, std::size_
   return sum / static_cast<double>(std::max<std::size_t>(1, count));
 }
 
-/// The same that gains of 1 miss.
+/// Mean square displacement error of gains of 1 [um^2].
 double square_without(const OfRuns& runs) {
   double sum = 0.0;
   std::size_t count = 0;

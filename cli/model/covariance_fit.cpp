@@ -23,8 +23,8 @@ using Vector = Eigen::VectorXd;
 using Index = Eigen::Index;
 
 constexpr std::size_t cells_max = 50'000;  ///< rows of a run after averaging
-constexpr std::size_t rows_min = 200;      ///< in all
-constexpr Index half_rows_min = 40;        ///< a shorter run's growth cannot be seen
+constexpr std::size_t rows_min = 200;      ///< in all runs
+constexpr Index half_rows_min = 40;        ///< too few rows show no growth of the error
 constexpr int horizons = 16;
 constexpr Index shortest_horizon = 4;  ///< cells
 /// t(0.975, 3 degrees of freedom) / 1.96.
@@ -34,7 +34,7 @@ constexpr std::array<double, 5> scatter_shares{1.0 / 800, 1.0 / 400, 1.0 / 200, 
                                                1.0 / 50};
 constexpr std::array<double, 6> drift_shares{0.05, 0.1, 0.2, 0.4, 0.8, 1.6};
 
-/// Half a run: rows of one pitch without a gap are not asked for; a gap only joins its ends.
+/// Half a run at equal pitch; gaps are closed.
 struct Half {
   Matrix temps_degC;  ///< shape (rows, inputs)
   double pitch_s{1.0};
@@ -61,7 +61,7 @@ double median_pitch_s(const std::vector<double>& times_s, std::size_t begin, std
   return steps.empty() ? 1.0 : median(std::move(steps));
 }
 
-/// The selected rows as means over cells of equal length; a cell with a missing input is left out.
+/// Averages the selected rows over cells of equal length; omits cells with a missing input.
 Half cells_of(const RunFile& run, const std::vector<std::string>& inputs) {
   const auto columns = columns_of(run, inputs);
   const std::vector<double>& times_s = run.time_s();
@@ -82,7 +82,7 @@ Half cells_of(const RunFile& run, const std::vector<std::string>& inputs) {
   };
   double cell = 0.0;
   for (std::size_t row = run.selected_begin; row < run.selected_end; ++row) {
-    // Half a pitch early: a row at a cell's edge must not fall to either side by its rounding.
+    // Cells begin half a pitch early, so that rounding does not move a row between cells.
     const double its = std::floor((times_s[row] - begin_s) / half.pitch_s + 0.5);
     if (its != cell) close_cell();
     cell = its;
@@ -101,7 +101,7 @@ Half cells_of(const RunFile& run, const std::vector<std::string>& inputs) {
   return half;
 }
 
-/// Sum of the squares about the mean; nothing of fewer than two rows.
+/// Scatter matrix about the mean; zero for fewer than two rows.
 Matrix scatter_of(const Matrix& rows) {
   if (rows.rows() < 2) return Matrix::Zero(rows.cols(), rows.cols());
   const Matrix centred = rows.rowwise() - rows.colwise().mean();
@@ -114,13 +114,13 @@ Matrix inverse_of(const Matrix& covariance_K2, double noise_K) {
   return regular.llt().solve(Matrix::Identity(regular.rows(), regular.cols()));
 }
 
-/// How much the errors of predictions in the halves left out change over a time.
+/// Growth over time of the prediction errors in the halves left out.
 struct Growths {
   std::vector<double> horizon_s;
   Matrix change_K2;  ///< shape (horizons, inputs): mean square
 };
 
-/// Prediction errors of every input from the others, in rows that the covariance has not seen.
+/// Errors of predicting each input from the others, in rows not used for the covariance.
 Matrix errors_in(const Matrix& rows, const Matrix& precision) {
   const Matrix scaled = precision.diagonal().cwiseInverse().asDiagonal() * precision;
   return rows * scaled.transpose();
@@ -177,7 +177,7 @@ struct Weights {
   double drift{0.0};
 };
 
-/// Non-negative weights of two columns whose sum is nearest to 1 everywhere.
+/// Non-negative least squares weights of two columns for a sum of 1 in every row.
 Weights weights_of(const Vector& scatter, const Vector& drift) {
   const double ss = scatter.squaredNorm();
   const double dd = drift.squaredNorm();
@@ -196,7 +196,7 @@ struct TwoParts {
   double cost{0.0};
   double scatter_s{0.0};
   double drift_s{0.0};
-  Matrix variance_K2;  ///< shape (2, inputs): of scatter and of drift
+  Matrix variance_K2;  ///< shape (2, inputs): of scatter and drift
 };
 
 TwoParts fit_parts(const Growths& growths, double scatter_s, double drift_s) {
@@ -205,7 +205,7 @@ TwoParts fit_parts(const Growths& growths, double scatter_s, double drift_s) {
     Vector scatter(horizons);
     Vector drift(horizons);
     for (int h = 0; h < horizons; ++h) {
-      // Relative: a micrometre after a minute and ten after a night are to be as right.
+      // Relative, so that short and long horizons have equal weight.
       const double change_K2 = std::max(growths.change_K2(h, input), 1e-12);
       const double horizon_s = growths.horizon_s[static_cast<std::size_t>(h)];
       scatter(h) = -std::expm1(-horizon_s / scatter_s) / change_K2;
@@ -240,7 +240,7 @@ void set_growth(CovarianceFit& fit, const std::vector<Half>& halves, double run_
       return small_sample * std::sqrt(parts.variance_K2(part, i) / variance_K2(i));
     };
     fit.growth.scatter_factor.push_back(factor(0));
-    // An input that never moved shows no error.
+    // The lower bound covers inputs that never changed in the record.
     fit.growth.drift_factor.push_back(std::max(1.0, factor(1)));
     const double scatter = fit.growth.scatter_factor.back();
     const double drift = fit.growth.drift_factor.back();
@@ -292,7 +292,7 @@ namespace {
 
 bool begins_table(const std::string& line) {
   const auto first = line.find_first_not_of(" \t");
-  // A row of a matrix also begins with a bracket; the name of a table begins with a letter.
+  // A row of a matrix also begins with a bracket, but a table's name with a letter.
   if (first == std::string::npos || line[first] != '[') return false;
   const auto name = line.find_first_not_of("[ \t", first);
   return name != std::string::npos &&
@@ -311,7 +311,7 @@ std::string with_covariance(const std::string& text, const ThermalModel& model) 
   }
   while (kept.ends_with("\n\n")) kept.pop_back();
   kept.append("\n").append(write_covariance(model));
-  // Where the text is written in another way than most, its comments go rather than its meaning.
+  // If the edited text does not parse to the same model, it is written anew, without its comments.
   const ModelReading reading = read_model_text(kept, "");
   const std::string written = write_model(model);
   return reading.problems.empty() && write_model(reading.model) == written ? kept : written;

@@ -23,8 +23,8 @@ using Columns = std::vector<const Column*>;
 // The model at every row of the file, NaN where an input is missing.
 struct ModelRows {
   std::vector<Column> displacement_um;  ///< shape (outputs, rows)
-  std::vector<Column> sd_um;            ///< the same; empty without [made_from]
-  Column outside;                       ///< one a row
+  std::vector<Column> sd_um;            ///< likewise; empty without [made_from]
+  Column outside;                       ///< by row
   FurthestRow furthest;
 };
 
@@ -70,7 +70,7 @@ ModelRows model_rows(const ThermalModel& model, const RunFile& run) {
   return rows;
 }
 
-// t0 of an output: the first row with a prediction and, where there is any, a measured value.
+// t0 of an output: the first row with a prediction and, if `measured` is given, a measured value.
 std::size_t first_row(const Column& predicted, const Column* measured) {
   std::size_t row = 0;
   while (row < predicted.size() && !(std::isfinite(predicted[row]) &&
@@ -109,7 +109,7 @@ void measure_residual(PredictedOutput& output) {
 
 namespace {
 
-/// @return nullptr where nothing of it was measured in the selected rows
+/// @return nullptr if the selected rows have no measured value
 const Column* measured_column(const RunFile& run, const std::string& output) {
   const auto index = run.find(output);
   if (!index) return nullptr;

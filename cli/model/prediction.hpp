@@ -1,4 +1,4 @@
-/// A model over a run file: the model alone, no smoothing, no limits.
+/// Applies a model to a run file, without smoothing and limits.
 #pragma once
 
 #include <cstddef>
@@ -12,49 +12,47 @@ namespace thermocomp::cli {
 
 struct PredictedOutput {
   std::string name;                  ///< column of the model's output
-  bool measured_there{false};        ///< the run file has that column
+  bool measured_there{false};        ///< the run file has this column
   std::vector<double> predicted_um;  ///< model(t) - model(t0); um, or urad for a tilt
   std::vector<double> measured_um;   ///< measured(t) - measured(t0); NaN: missing
   double rms_um{0.0};                ///< of measured - predicted, mean not removed; NaN: none
   double peak_um{0.0};               ///< largest |measured - predicted|; NaN: none
-  std::vector<double> sd_um;         ///< of predicted_um, as the model claims; empty: it does not
+  std::vector<double> sd_um;         ///< of predicted_um, claimed by the model; empty: none
 };
 
-/// The selected row that is furthest from what the model was made from.
+/// The selected row furthest outside the model's domain.
 struct FurthestRow {
   double time_s{0.0};
-  double distance{0.0};  ///< over that up to which the model counts as known; 0: no row
-  std::string column;    ///< that most of it is of
-  double value{0.0};     ///< there
-  double low{0.0};       ///< that the model was made from
+  double distance{0.0};  ///< relative to the domain's limit; 0: no row
+  std::string column;    ///< largest contribution to the distance
+  double value{0.0};     ///< of `column` in this row
+  double low{0.0};       ///< lower limit in the model's records
   double high{0.0};
 };
 
-/// Rows of the selection that have a prediction: those in which no input of the model is missing
-/// and, where the run file has any measured output, not all of them are.
+/// The selected rows with every input and, if the run file has measured outputs, at least one
+/// measured value.
 struct Prediction {
   std::vector<double> time_s;
-  std::vector<double>
-      outside;  ///< 1 where the machine is not as the model was made; empty: unknown
+  std::vector<double> outside;  ///< 1: outside the model's domain; empty: unknown
   FurthestRow furthest;
-  std::vector<PredictedOutput> outputs;  ///< order of the model
+  std::vector<PredictedOutput> outputs;  ///< in the model's order
 };
 
-/// The reference of an input is the model's, or the first value of its column in the whole file.
-/// t0 of an output is the whole file's first row with a prediction and a measured value; the
-/// states of lags start at the file's first row with a prediction, whatever is selected.
-/// @throws ConfigurationError when the run file lacks a column of the model or has no value in it
+/// The reference of an input is the model's, else the first value of its column in the file. t0 of
+/// an output is the file's first row with a prediction and a measured value. The states of lags
+/// start at the file's first row with a prediction. None of these depends on the selection.
+/// @throws ConfigurationError if a column of the model is missing or empty
 [[nodiscard]] Prediction predict(const ThermalModel& model, const RunFile& run);
 
-/// Share of the rows that are outside of the model's domain.
+/// Share of the rows outside the model's domain.
 [[nodiscard]] double outside_share(const Prediction& prediction);
 
-/// How far from known ground, and in which quantity: one sentence; of a prediction that stays
-/// inside nothing.
+/// A sentence with the furthest row's distance and column; empty if every row is inside.
 [[nodiscard]] std::string furthest_text(const Prediction& prediction);
 
-/// The columns of the answer: time_s and, for each output, predicted, measured and residual; where
-/// the model says what it was made from, `outside` and the standard deviation of each output.
+/// Columns: time_s, and predicted, measured and residual of each output; if the model has a domain,
+/// `outside` and each output's standard deviation.
 [[nodiscard]] RunFile as_run_file(const Prediction& prediction);
 
 }  // namespace thermocomp::cli

@@ -62,7 +62,7 @@ std::optional<HistoryTime> time_or_none(const std::string& text) {
   return parse_history_time(text);
 }
 
-/// @return the daemon's answer, or the same of a history with the run beside each
+/// @return the daemon's answer, or the same from a history with the run of each event
 json events_of(const GlobalOptions& global, const EventsOptions& options) {
   if (options.history.empty()) {
     if (!options.from.empty() || !options.to.empty())
@@ -93,10 +93,10 @@ int run_sensors(const GlobalOptions& global, bool as_json) {
 struct WatchOptions {
   double period_s{1.0};
   double for_s{0.0};  ///< 0: until interrupted
-  std::string truth;  ///< file of a simulated machine's true displacement; empty: none
+  std::string truth;  ///< file with a simulated machine's true displacement; empty: none
 };
 
-// Ctrl-C is how a watch ends; the table stays on the screen.
+// Ctrl-C ends a watch and leaves the table on the screen.
 void end_watch(int) {
   constexpr char newline = '\n';
   [[maybe_unused]] const auto written = ::write(STDOUT_FILENO, &newline, 1);

@@ -95,7 +95,7 @@ std::string axes_lines(const Status& status) {
 
 std::string inputs_lines(const Status& status) {
   std::string result;
-  int width = key_width;  // the names one below the other, however long they are
+  int width = key_width;  // widened to align the names
   for (const InputStatus& input : status.inputs)
     width = std::max(width, std::min(40, static_cast<int>(input.name.size())));
   for (const InputStatus& input : status.inputs) {
@@ -110,7 +110,7 @@ std::string inputs_lines(const Status& status) {
   return result;
 }
 
-// Everything that is wrong, worst first: each line says what it is and what to do.
+// All troubles, worst first, one line each with its remedy.
 std::string trouble_lines(const Status& status, bool colours) {
   std::string result;
   for (const Trouble& trouble : troubles(status))
@@ -122,7 +122,7 @@ std::string trouble_lines(const Status& status, bool colours) {
   return result.empty() ? line("Problems", "none") : result;
 }
 
-/// Outages of the last minutes that are over.
+/// Outages that ended within the last minutes.
 std::string ended_lines(const Status& status) {
   std::string result;
   for (const Event& event : status.ended)
@@ -130,7 +130,7 @@ std::string ended_lines(const Status& status) {
   return result;
 }
 
-/// Dry run: "; applies by itself z +3.00 um".
+/// For a dry run: "; applies by itself z +3.00 um".
 std::string shown_text(const ControllerStatus& controller) {
   std::string shown;
   if (!controller.shown) return shown;
@@ -180,8 +180,8 @@ std::string probed_text(const ModelStatus& model) {
   return text;
 }
 
-/// Whether probings on this machine agree with the error that the model claims, an axis a line. RMS
-/// over few probings differs from a true sd by a factor of two at most (one probing in twenty).
+/// Compares each axis' probings with the claimed error, one line each. The RMS of few probings is
+/// below twice the true sd in 95 % of cases.
 std::string model_error_lines(const ModelStatus& model) {
   constexpr double worse = 2.0;
   std::string text;
@@ -199,7 +199,7 @@ std::string model_error_lines(const ModelStatus& model) {
   return text;
 }
 
-/// Who took the reference, when, and at what temperatures; each is with its input.
+/// Origin, time and temperature range of the reference.
 std::string reference_line(const ReferenceStatus& reference) {
   double low = not_a_number;
   double high = not_a_number;
@@ -254,9 +254,9 @@ std::string history_line(const HistoryStatus& history) {
   return line("History", text);
 }
 
-/// What the last columns of a sensor's line say.
+/// Last columns of a sensor's line.
 std::string sensor_state(const SensorStatus& sensor, bool colours) {
-  // Only a value that is no number comes without one.
+  // An out-of-range reading is NaN only if the value read was.
   const bool is_nan = sensor.fault == Fault::out_of_range && std::isnan(sensor.raw_degC);
   const CodeText text = is_nan ? nan_text() : fault_text(sensor);
   const bool good = sensor.fault == Fault::none;

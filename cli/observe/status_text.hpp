@@ -1,4 +1,4 @@
-/// The daemon's answers as a person reads them. Pure.
+/// Formats the daemon's answers for a terminal.
 #pragma once
 
 #include <string>
@@ -15,7 +15,7 @@ namespace thermocomp::cli {
 /// The same after the file's name.
 [[nodiscard]] std::string candidate_text(const CandidateStatus& candidate);
 
-/// `thermocomp sensors`: a line a sensor.
+/// `thermocomp sensors`: one line per sensor.
 [[nodiscard]] std::string sensors_text(const SensorsAnswer& answer, bool colours);
 
 }  // namespace thermocomp::cli

@@ -21,7 +21,7 @@ namespace {
 
 constexpr std::array<const char*, 8> wide_bars{"▁", "▂", "▃", "▄", "▅", "▆", "▇", "█"};
 constexpr std::array<const char*, 8> plain_bars{"_", ".", ":", "-", "=", "+", "*", "#"};
-/// A smaller range is noise, and would look like movement.
+/// Smallest range of the bars, so that noise does not look like movement.
 constexpr double range_um_min = 0.5;
 constexpr double still_um_per_min = 0.05;
 constexpr double fast_um_per_min = 1.0;
@@ -33,7 +33,7 @@ void AxisTrends::add(const Status& status) {
   if (!std::isfinite(now_s)) return;
   for (const AxisStatus& axis : status.axes) {
     std::deque<Sample>& samples = axes_[axis.name];
-    // The daemon was started anew.
+    // The daemon has restarted.
     if (!samples.empty() && now_s < samples.back().time_s) samples.clear();
     if (std::isfinite(axis.offset)) samples.push_back({now_s, axis.offset});
     while (!samples.empty() && samples.front().time_s < now_s - window_s) samples.pop_front();
@@ -58,9 +58,9 @@ std::string AxisTrends::bars(const std::deque<Sample>& samples) const {
   const std::size_t count = std::min(cells, samples.size());
   std::string text;
   for (std::size_t cell = 0; cell < count; ++cell) {
-    // The last value of each equal part, so that the newest one is always seen.
+    // The last value of each equal part, so that the newest is always shown.
     const Sample& sample = samples[(cell + 1) * samples.size() / count - 1];
-    // Apart from the middle of two levels, where what is still would flicker.
+    // Offset from the boundary of two levels, where a constant value would flicker.
     const double height = 3.01 + 7.0 * (sample.offset - middle) / range;
     const auto level = static_cast<std::size_t>(std::clamp(std::lround(height), 0L, 7L));
     text += wide_ ? wide_bars.at(level) : plain_bars.at(level);
@@ -178,8 +178,8 @@ std::string first_line(const Status& status, bool colours) {
          fixed(status.cycle.lateness_us_p999, 0) + " us\n";
 }
 
-// What the tool does without and with the offsets, as the simulated machine knows it. Its truth
-// file calls the outputs like the axes: x_um, x_error_um.
+// Tool error without and with the offsets, from the truth file of a simulated machine, which names
+// its outputs after the axes: x_um, x_error_um.
 struct ToolError {
   double uncompensated_um;
   double compensated_um;
@@ -242,7 +242,7 @@ std::string signals_text(const Status& status) {
   return result.empty() ? "" : result + '\n';
 }
 
-// "bed_degC" -> "bed", at most as wide as its column.
+// "bed_degC" -> "bed", cut to the column's width.
 std::string short_name(const InputStatus& input) {
   std::string name = input.name;
   if (name.size() > 5 && name.ends_with("_degC")) name.resize(name.size() - 5);
@@ -308,7 +308,7 @@ std::string watch_line(const Status& status, const TruthRow* truth) {
     }
     result += " |" + without + " |" + with;
   }
-  // In the first seconds the first readings are still on their way.
+  // The first readings arrive within some seconds.
   const bool just_begun = status.mode == Mode::starting && status.uptime_s < begun_s;
   const std::string reasons = just_begun ? "" : reasons_text(status);
   return result + (reasons.empty() ? "" : "  " + reasons) + '\n';

@@ -1,5 +1,5 @@
-/// The live table of `thermocomp watch`, as a screen for a terminal or as lines for a log, and what
-/// is remembered for it: how the offsets went, and the truth of a simulated machine.
+/// Live table of `thermocomp watch`, as a terminal screen or as log lines, with the trends of the
+/// offsets and the truth of a simulated machine.
 #pragma once
 
 #include <cstddef>
@@ -15,18 +15,19 @@
 
 namespace thermocomp::cli {
 
-/// Remembers what one `watch` has seen.
+/// Recent offsets of each axis.
 class AxisTrends {
  public:
   static constexpr std::size_t cells = 16;
   static constexpr double window_s = 600.0;
 
-  /// @param wide  whether the terminal shows more than ASCII
+  /// @param wide  the terminal shows Unicode
   explicit AxisTrends(bool wide) : wide_(wide) {}
 
-  /// The status' uptime is the time.
+  /// The sample's time is the status' uptime.
   void add(const Status& status);
-  /// "▁▂▃▅▇ ↗": the oldest left, as high as the window's range lets it; empty before two values.
+  /// "▁▂▃▅▇ ↗": oldest sample left, scaled to the window's range; empty with fewer than two
+  /// samples.
   [[nodiscard]] std::string text(const std::string& axis) const;
 
  private:
@@ -41,10 +42,10 @@ class AxisTrends {
   std::map<std::string, std::deque<Sample>> axes_;
 };
 
-/// Whether the environment's locale is UTF-8.
+/// The environment's locale is UTF-8.
 [[nodiscard]] bool terminal_is_wide();
 
-/// The truth that a simulated machine writes while it runs: what the tool really does.
+/// True displacement that a simulated machine writes while it runs.
 struct TruthRow {
   std::vector<std::string> columns;
   std::vector<double> first;   ///< values of the file's first row
@@ -55,11 +56,11 @@ struct TruthRow {
   [[nodiscard]] double change(const std::string& column) const;
 };
 
-/// Follows a CSV file that another program appends to.
+/// Reads a CSV file to which another program appends.
 class TruthFile {
  public:
   explicit TruthFile(std::filesystem::path path);
-  /// The last whole row written so far; nullptr while there is none.
+  /// The last complete row; nullptr before the first.
   [[nodiscard]] const TruthRow* newest();
 
  private:
@@ -67,25 +68,25 @@ class TruthFile {
 
   std::filesystem::path path_;
   std::ifstream file_;
-  std::string unfinished_;  ///< the line being written at the moment
+  std::string unfinished_;  ///< the incomplete last line
   TruthRow row_;
 };
 
-/// A whole screen. @param truth  what the tool really does, where it is simulated; else nullptr
-/// @param trends  how the offsets went; nullptr: not shown
+/// A whole screen. @param truth  of a simulated machine; else nullptr
+/// @param trends  nullptr: not shown
 [[nodiscard]] std::string watch_screen(const Status& status, const TruthRow* truth, bool colours,
                                        const AxisTrends* trends = nullptr);
-/// Two lines: what the columns of watch_line() are.
+/// Two lines: heading of watch_line().
 [[nodiscard]] std::string watch_header(const Status& status, const TruthRow* truth);
 [[nodiscard]] std::string watch_line(const Status& status, const TruthRow* truth);
 
-/// Lines for a log, below a heading that stands again where the truth appears or goes.
+/// Log lines; repeats the heading when the truth appears or ends.
 class WatchLog {
  public:
   [[nodiscard]] std::string next(const Status& status, const TruthRow* truth);
 
  private:
-  std::optional<bool> has_truth_;  ///< below the last heading; empty: before the first
+  std::optional<bool> has_truth_;  ///< of the last heading; empty: none yet
 };
 
 }  // namespace thermocomp::cli

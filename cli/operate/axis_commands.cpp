@@ -25,8 +25,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr auto line_period = 2s;
 
-/// The line of progress: one that is overwritten, or one every two seconds where stderr is no
-/// terminal.
+/// Progress on stderr: one overwritten line, or without a terminal a line every two seconds.
 class ProgressLine {
  public:
   explicit ProgressLine(std::string what)
@@ -55,11 +54,11 @@ class ProgressLine {
 };
 
 constexpr auto look_period = 50ms;
-/// The last read-back of a slow controller comes so late.
+/// Delay of a slow controller's last read-back.
 constexpr auto settles_within = 2s;
-/// A daemon that does not say how long it takes.
+/// For daemons that do not report the duration.
 constexpr double takes_s_default = 120.0;
-/// A move may take this many times its computed duration, and this long besides.
+/// Timeout of a move: factor times the computed duration, plus patience_s.
 constexpr double patience_factor = 2.0;
 constexpr double patience_s = 10.0;
 
@@ -87,11 +86,10 @@ void watch(const GlobalOptions& global, const std::string& axis, double takes_s,
   }
 }
 
-/// With the read-backs that a release waits for.
+/// Timeout for the read-backs after a release.
 constexpr auto read_back_patience = 10s;
 
-/// Of the axis, or of the first of its nodes that has one: its mismatch with what it reads back
-/// now; empty where it has none.
+/// Mismatch of the axis, or of its first node with one, with the present read-back; empty: none.
 json mismatch_now(const GlobalOptions& global, const std::string& name) {
   const json status = ask_daemon(global.socket, "status", json::object());
   for (const json& axis : list_of(status, "axes")) {
@@ -104,8 +102,8 @@ json mismatch_now(const GlobalOptions& global, const std::string& name) {
   return json::object();
 }
 
-/// While read-backs are awaited.
-/// @return as mismatch_now(); the release is under way still where its `releasing` is true
+/// Waits while read-backs are outstanding.
+/// @return as mismatch_now(); `releasing` is true if the release is still pending
 json waited_for(const GlobalOptions& global, const std::string& name) {
   const auto began = Clock::now();
   ProgressLine line("axis " + name);
@@ -118,7 +116,7 @@ json waited_for(const GlobalOptions& global, const std::string& name) {
   return mismatch;
 }
 
-/// Where what is read back is not what was sent last: what the release takes on trust.
+/// Warns if the read-back differs from the last offset sent: the release adopts the read-back.
 void warn_of_trust(const json& before) {
   constexpr double same_um = 0.3;
   const double sent_um = number_of(before, "sent_um");

@@ -82,7 +82,7 @@ int run_measured(const GlobalOptions& global, const MeasuredValue& given) {
   return exit_success;
 }
 
-/// What less than this has seen is too little to tell slow warming [s].
+/// Shortest observation that can rule out slow warming [s].
 constexpr double watched_enough_s = 1800.0;
 
 int run_reference(const GlobalOptions& global, bool force) {
@@ -92,7 +92,7 @@ int run_reference(const GlobalOptions& global, bool force) {
   std::cout << "reference: the present temperatures\n";
   if (const std::string although = text_of(answer, "although"); !although.empty())
     std::cout << "taken although " << although << '\n';
-  // An earlier daemon does not say.
+  // Earlier daemons do not report it.
   if (const double watched_s = number_of(answer, "watched_s"); watched_s < watched_enough_s)
     std::cout << "the temperatures have been watched for " << duration_text(watched_s)
               << " only: whether the machine still warms slowly is not known\n";

@@ -20,7 +20,7 @@ std::string text_of_model(const fs::path& path) {
   return read_text_file(path, model_bytes_max);
 }
 
-/// @return the candidate's file. @throws Failure: none runs
+/// @return the candidate's file. @throws Failure if none runs
 fs::path candidate_in(const json& status) {
   if (!status.contains("candidate"))
     throw Failure(
@@ -41,7 +41,7 @@ json status_at(const fs::path& socket) {
   return ask_daemon(socket, "status", json::object());
 }
 
-/// Reloads with another text in the model's file.
+/// Writes `next` to the model's file and reloads; on failure restores `now`.
 void reload_with(const fs::path& socket, const fs::path& model, const std::string& next,
                  const std::string& now) {
   cli::write_file(model, next);
@@ -71,7 +71,7 @@ Promotion promote(const fs::path& socket, const std::string& checksum) {
   const std::string next = text_of_model(candidate);
   require_checksum(candidate, next, checksum);
   const std::string now = text_of_model(model);
-  // In this order the model that was in use first is in one of the files at any moment.
+  // In this order one of the files always holds the model that was in use.
   cli::write_file(before, now);
   reload_with(socket, model, next, now);
   return {model, before};

@@ -1,4 +1,4 @@
-/// A second model beside the one in use, its promotion, and the way back.
+/// Candidate model: starting, promotion and rollback.
 #pragma once
 
 #include <filesystem>
@@ -6,21 +6,21 @@
 
 namespace thermocomp::cli {
 
-/// @param file  absolute; empty: none runs any more
-/// @throws Failure: it does not run, or is the model in use itself
+/// @param file  absolute; empty: ends the candidate
+/// @throws Failure if it does not run, or is the model in use
 void run_beside(const std::filesystem::path& socket, const std::filesystem::path& file);
 
 struct Promotion {
   std::string model;   ///< file of the model in use
-  std::string before;  ///< that of the one before, as text for promote --back
+  std::string before;  ///< previous model, used by promote --back
 };
-/// Makes the candidate the model in use and keeps the one before. A refused reload puts the file of
-/// the model back.
-/// @param checksum  that the candidate must have; empty: any
+/// Makes the candidate the model in use and keeps the previous one. If the reload is refused, the
+/// model's file is restored.
+/// @param checksum  required of the candidate; empty: any
 /// @throws Failure
 Promotion promote(const std::filesystem::path& socket, const std::string& checksum = "");
-/// Exchanges the two again. @throws Failure: nothing was promoted
-/// @param checksum  that the model in use must have; empty: any
+/// Exchanges the two again. @throws Failure if nothing was promoted
+/// @param checksum  required of the model in use; empty: any
 Promotion take_back(const std::filesystem::path& socket, const std::string& checksum = "");
 
 }  // namespace thermocomp::cli

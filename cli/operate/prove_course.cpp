@@ -11,12 +11,12 @@
 namespace thermocomp::cli {
 namespace {
 
-/// Of the move: so much may be missing of what is read, at its end and at its beginning. The
-/// compensation goes on beside it, registers are coarse, and a look every 50 ms misses the tip.
+/// Tolerance as a share of the move: the compensation continues meanwhile, registers are coarse,
+/// and polling every 50 ms can miss the peak.
 constexpr double tolerance_share = 0.2;
-/// What a read-back may differ by at rest.
+/// Tolerance of a read-back at rest.
 constexpr double tolerance_um_min = 0.3;
-/// What registers are rounded to.
+/// Resolution of registers.
 constexpr double rounding_um = 0.1;
 
 std::string um(double value) {

@@ -1,4 +1,4 @@
-/// What a proving move did, by what was sent and read back while it lasted.
+/// Outcome of a proving move from the offsets sent and read back meanwhile.
 #pragma once
 
 #include <string>
@@ -7,8 +7,8 @@
 
 namespace thermocomp::cli {
 
-/// Fed with the axis as the daemon's `offsets` shows it: once before the move, then until it is
-/// over and a little longer, since a read-back comes late.
+/// Takes the axis from the daemon's `offsets`: once before the move, then until shortly after its
+/// end, since read-backs are late.
 class ProveCourse {
  public:
   /// @param before  the axis before the move
@@ -16,21 +16,21 @@ class ProveCourse {
 
   void take(const nlohmann::json& axis);
 
-  /// The daemon has the move in hand no more.
+  /// The daemon has ended the move.
   [[nodiscard]] bool over() const noexcept { return begun_ && !proving_; }
-  /// The read-back shows the place where it began; true where nothing is read back.
+  /// The read-back has returned to its initial value; true without read-back.
   [[nodiscard]] bool is_back() const noexcept;
-  /// Nothing more is to be waited for: the read-back is where it began, to a register's rounding.
+  /// The move has ended and the read-back has returned to within a register's resolution.
   [[nodiscard]] bool is_settled() const noexcept;
-  /// Went there as asked, and came back.
+  /// Moved as asked and came back.
   [[nodiscard]] bool passed() const noexcept { return went() && over() && is_back(); }
-  /// "sent +3.20 um, read back +3.15 um", both since the beginning
+  /// "sent +3.20 um, read back +3.15 um", both relative to the start
   [[nodiscard]] std::string progress() const;
-  /// Sentences for a person: moved, came back, or what was read instead.
+  /// Sentences with the outcome and the values read.
   [[nodiscard]] std::string verdict(const std::string& axis) const;
 
  private:
-  /// From where it began; the read-back is NaN where the controller tells none.
+  /// Relative to the start; read_um is NaN without read-back.
   struct Place {
     double sent_um{0.0};
     double read_um{0.0};

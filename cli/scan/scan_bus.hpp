@@ -1,4 +1,4 @@
-/// A bus of any kind, looked at live: the values, and why there is none.
+/// Live scan of a bus of any kind: values, or the reasons why they are missing.
 #pragma once
 
 #include <functional>
@@ -13,26 +13,26 @@
 
 namespace thermocomp::cli {
 
-/// Of what was read: six digits.
+/// Six significant digits.
 [[nodiscard]] std::string short_number(double value);
 
-/// What a scan needs to know of the sensors, in the order of the configuration.
+/// Names and limits of the sensors, in the order of the configuration.
 struct ScanSensors {
   std::vector<std::string> names;
   std::vector<PlausibleRange> ranges;
   std::vector<double> stale_after_s;
 };
 
-/// Whether to wait for a value once more: none has come in the last second of the listening, and
-/// the daemon would not call this one stale yet.
+/// Waiting for another value is worthwhile: the last second brought none, and the last is not stale
+/// yet.
 [[nodiscard]] bool may_come_again(nanoseconds taken_at, double stale_after_s, nanoseconds end,
                                   nanoseconds now);
-/// Calls a value stale that the daemon would call so.
+/// Marks a value as stale by the daemon's rule.
 void judge_age(double stale_after_s, ScanChannel& result);
 
 [[nodiscard]] ScanSensors scan_sensors(std::span<const SensorConfig> sensors);
 
-/// Units or nodes to look for besides those of the configuration; numbers are of Modbus.
+/// Search for units or nodes outside the configuration; the numbers apply to Modbus.
 struct UnitSearch {
   bool wanted{false};
   int first{1};
@@ -40,15 +40,14 @@ struct UnitSearch {
 };
 
 struct ScanTask {
-  double listen_s{3.0};  ///< to a bus on which devices send by themselves
+  double listen_s{3.0};  ///< on a bus whose devices send by themselves
   UnitSearch search{};
-  std::function<void(const std::string&)>
-      progress;  ///< called with a line about what is being done
+  std::function<void(const std::string&)> progress;  ///< called with a line of progress
 };
 
-/// Of one kind: its file scan_PROTOCOL.cpp. Every channel of the configuration gets the value that
-/// the daemon would have, or why it has none. Only what the daemon itself would send is sent, and
-/// nothing is ever set that the configuration does not set.
+/// One overload per kind of bus, in scan_PROTOCOL.cpp. Gives every channel of the configuration the
+/// daemon's value or the reason for its absence. Sends only what the daemon would send, and changes
+/// no settings that the configuration does not.
 [[nodiscard]] ScanBus scan_bus(const ModbusBusConfig& config, const ScanSensors& sensors,
                                const ScanTask& task);
 [[nodiscard]] ScanBus scan_bus(const CanBusConfig& config, const ScanSensors& sensors,
@@ -58,13 +57,13 @@ struct ScanTask {
 [[nodiscard]] ScanBus scan_bus(const J1939BusConfig& config, const ScanSensors& sensors,
                                const ScanTask& task);
 
-/// Who else has a serial port open.
+/// Another process that holds a serial port open.
 struct SerialHolder {
-  std::string name;       ///< "thermocompd (process 812)"; empty: nobody, or it cannot be seen
-  bool is_daemon{false};  ///< thermocompd
+  std::string name;       ///< "thermocompd (process 812)"; empty: none, or not visible
+  bool is_daemon{false};  ///< the process is thermocompd
 };
 
-/// Looks through the processes that the user may look into.
+/// Searches the processes that the user may inspect.
 [[nodiscard]] SerialHolder holder_of(const std::string& device);
 
 }  // namespace thermocomp::cli

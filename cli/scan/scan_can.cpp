@@ -18,10 +18,10 @@
 namespace thermocomp::cli {
 namespace {
 
-/// What came while the bus was listened to.
+/// Frames received while listening.
 struct Heard {
   FrameCounts frames;
-  std::vector<std::optional<CanFrame>> of_signal;  ///< newest that carries the signal
+  std::vector<std::optional<CanFrame>> of_signal;  ///< newest frame with the signal
 };
 
 std::vector<const CanSignal*> signals_of(const CanBusConfig& config) {
@@ -32,7 +32,7 @@ std::vector<const CanSignal*> signals_of(const CanBusConfig& config) {
   return signals;
 }
 
-/// @param stale_after_s  of each signal; empty: what came once is enough
+/// @param stale_after_s  by signal; empty: one value is enough
 Heard listen(CanSocket& socket, const std::vector<const CanSignal*>& signals, double listen_s,
              const std::vector<double>& stale_after_s) {
   Heard heard;
@@ -88,7 +88,7 @@ void judge(const CanSignal& signal, const CanFrame& frame, const PlausibleRange&
   CanSignal other = signal;
   other.byte_order = signal.byte_order == ByteOrder::little_endian ? ByteOrder::big_endian
                                                                    : ByteOrder::little_endian;
-  // The same bytes in the other order begin at the other end of them.
+  // In the other byte order the field starts at its other end.
   other.start_bit = other.byte_order == ByteOrder::big_endian
                         ? signal.start_bit + 7
                         : signal.start_bit / 8 * 8 + (signal.start_bit % 8) - 7;
@@ -108,7 +108,7 @@ void judge(const CanSignal& signal, const CanFrame& frame, const PlausibleRange&
   }
 }
 
-/// The same number in the other format, or a J1939 group that comes from another address.
+/// Hints at the same number in the other format, or a J1939 group from another address.
 void add_id_hint(const CanSignal& signal, const Heard& heard, ScanChannel& result) {
   constexpr std::uint32_t group = 0x03FFFF00;
   for (const auto& [id, count] : heard.frames) {
@@ -196,8 +196,7 @@ std::string place_name(const CanSignal& signal) {
   return text;
 }
 
-/// Sends nothing. Every channel gets the newest frame that carries its signal; where none came, the
-/// identifiers that did come are named.
+/// Sends nothing. Channels without a frame get the identifiers received.
 ScanBus scan_bus(const CanBusConfig& config, const ScanSensors& sensors, const ScanTask& task) {
   ScanBus bus;
   bus.name = config.name;
@@ -205,7 +204,7 @@ ScanBus scan_bus(const CanBusConfig& config, const ScanSensors& sensors, const S
   bus.where = config.interface;
   const std::vector<const CanSignal*> signals = signals_of(config);
   CanSocket socket(config.interface, {});
-  socket.also_want({{0, false}, 0});  // everything: what is there beside what is looked for
+  socket.also_want({{0, false}, 0});  // all frames, to list those not configured
   socket.also_want({{0, true}, 0});
   Heard heard;
   heard.of_signal.resize(signals.size());
@@ -265,7 +264,7 @@ ScanController scan_can_controller(const DaemonConfig& config,
     add(signal.value, name, std::string(unit_of(name).symbol));
   }
   CanSocket socket(controller.interface, {});
-  socket.also_want({{0, false}, 0});  // also frames that are too short to carry anything
+  socket.also_want({{0, false}, 0});  // all frames, including those too short for a signal
   socket.also_want({{0, true}, 0});
   Heard heard;
   heard.of_signal.resize(signals.size());

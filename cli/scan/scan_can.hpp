@@ -1,4 +1,4 @@
-/// A controller on CAN, listened to for a while.
+/// Scan of a controller on CAN.
 #pragma once
 
 #include <functional>
@@ -12,7 +12,7 @@
 
 namespace thermocomp::cli {
 
-/// How many frames of each identifier came.
+/// Number of frames received, by identifier.
 using FrameCounts = std::map<CanId, std::size_t>;
 /// "identifiers on the bus: 0x281 (5) ..."
 [[nodiscard]] std::string heard_text(const FrameCounts& frames);
@@ -21,8 +21,8 @@ using FrameCounts = std::map<CanId, std::size_t>;
 /// "0x281 bit 7 length 16 big_endian x 0.01"
 [[nodiscard]] std::string place_name(const CanSignal& signal);
 
-/// The controller's frames: what of `applied` and signals they carry. Nothing is sent, so that what
-/// the daemon sends is not among the values.
+/// Decodes `applied` and the signals from the controller's frames. Sends nothing, so values that
+/// the daemon writes are missing.
 [[nodiscard]] ScanController scan_can_controller(
     const DaemonConfig& config, const CanControllerConfig& controller, double listen_s,
     const std::function<void(const std::string&)>& progress);

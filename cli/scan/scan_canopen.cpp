@@ -1,4 +1,4 @@
-// The nodes are set up, started and asked as the configuration says.
+// Scan of a CANopen bus: sets up, starts and polls its nodes as configured.
 #include <optional>
 #include <poll.h>
 #include <set>
@@ -11,7 +11,7 @@
 namespace thermocomp::cli {
 namespace {
 
-/// Why bytes that came are no value. What the bytes do not say the node said otherwise.
+/// Reason why the bytes are not a value: the device's code or status, else the node's own report.
 std::string why_not(const CanopenChannel& channel, Fault fault, const RawReading& raw) {
   if (fault == Fault::bad_frame) return too_few(raw);
   CanSignal value = channel.signal;
@@ -35,7 +35,7 @@ std::string why_not(const CanopenChannel& channel, Fault fault, const RawReading
 
 constexpr int nodes_max = 127;
 
-/// An SDO request to read object 1000, which every node has.
+/// SDO upload request for object 1000, which every node has.
 CanFrame device_type_request(int node) {
   constexpr std::uint32_t request_base = 0x600;
   CanFrame frame;
@@ -48,7 +48,7 @@ CanFrame device_type_request(int node) {
 
 constexpr std::uint32_t heartbeat_base = 0x700;
 
-/// Notes who answers or shows itself by a heartbeat, until `end`.
+/// Collects nodes that answer or send heartbeats until `end`.
 void collect_nodes(CanSocket& socket, nanoseconds end, std::set<int>& nodes) {
   constexpr std::uint32_t answer_base = 0x580;
   do {
@@ -87,7 +87,7 @@ void find_canopen_nodes(const CanopenBusConfig& config, CanSocket& socket, ScanB
   if (!unknown.empty()) bus.found += "; not in the configuration: " + unknown;
 }
 
-/// Nodes that are there by their heartbeats, but not in the configuration.
+/// Nodes with heartbeats that the configuration lacks.
 std::string strangers_text(const CanopenBusConfig& config, const FrameCounts& frames) {
   std::string text;
   for (const auto& [id, count] : frames) {

@@ -18,7 +18,7 @@ namespace {
 
 struct ScanOptions {
   std::string file;
-  std::string bus;  ///< only this one; empty: all
+  std::string bus;  ///< empty: all buses
   bool as_json{false};
   double listen_s{3.0};
   bool read_only{false};

@@ -27,13 +27,13 @@ namespace {
 
 constexpr int tries_max = 2;
 
-/// A place in the controller's registers, and what is shown of it.
+/// A controller register with its displayed value.
 struct Place {
   ModbusValue value;
   ScanValue shown;
   std::vector<std::uint16_t> words;
   WriteStage stage{WriteStage::offset};
-  std::size_t axis{axes_max};  ///< whose single offset, sent or applied, it is
+  std::size_t axis{axes_max};  ///< axis whose single offset, sent or applied, this is
 };
 
 Place place_of(const ModbusValue& value, const std::string& what, const std::string& unit,
@@ -48,7 +48,7 @@ Place place_of(const ModbusValue& value, const std::string& what, const std::str
   return place;
 }
 
-/// What the registers of a set mean: "begin", "offset at 400 mm", ...
+/// Registers of a set with their meanings: "begin", "offset at 400 mm", ...
 std::vector<Place> places_of_set(const ModbusTravel& travel, const AxisConfig& axis,
                                  const std::vector<ModbusValue>& values, const std::string& before,
                                  bool is_written) {
@@ -62,7 +62,7 @@ std::vector<Place> places_of_set(const ModbusTravel& travel, const AxisConfig& a
   return places;
 }
 
-/// What the daemon reads, in its order: the requests are then the same.
+/// Values that the daemon reads, in its order, so that the requests are the same.
 std::vector<Place> read_places(const DaemonConfig& config, const ModbusControllerConfig& modbus) {
   std::vector<Place> places;
   const std::vector<AxisSpan> spans = axis_spans(config.estimator.axes);
@@ -96,7 +96,7 @@ std::vector<Place> written_places(const DaemonConfig& config,
       for (Place& place : places_of_set(*travel, axis, travel->values, "", true))
         places.push_back(std::move(place));
       places.push_back(place_of(travel->end, "end" + of_axis, "", true));
-      places.back().shown.is_needed = true;  // the number of the next set follows from it
+      places.back().shown.is_needed = true;  // the next set's number follows from it
       continue;
     }
     const std::string unit = modbus.axes[i].piezo ? "V" : std::string(unit_of(axis.output).symbol);
@@ -120,8 +120,7 @@ const Place* of_axis(const std::vector<Place>& places, std::size_t axis) {
   return found == places.end() ? nullptr : &*found;
 }
 
-/// Why writing what stands in the registers once more might move an axis; empty: it does not,
-/// because all of it is in effect.
+/// Reason why writing the registers' present values might move an axis; empty: all are in effect.
 std::string why_it_may_move(const ModbusControllerConfig& modbus, const std::vector<Place>& read,
                             const std::vector<Place>& written) {
   const Place* valid_bits = nullptr;
@@ -148,7 +147,7 @@ std::string why_it_may_move(const ModbusControllerConfig& modbus, const std::vec
   return "";
 }
 
-/// Asks the daemon that runs with this configuration for what it has seen; false: none runs.
+/// Asks the daemon running with this configuration for its state. @return false: none runs
 bool ask_running_daemon(const DaemonConfig& config, ScanController& result) {
   try {
     constexpr std::chrono::milliseconds patience{500};
@@ -168,8 +167,9 @@ class ControllerScan {
   explicit ControllerScan(const ModbusControllerConfig& config)
       : config_(config), connection_(config.line) {}
 
-  /// @param read  as the daemon asks for them, together; @param written  each alone
-  /// @param writes_back  what stands there is written once more
+  /// @param read  read together, as the daemon does
+  /// @param written  read one by one
+  /// @param writes_back  writes the present values back
   void run(std::vector<Place>& read, std::vector<Place>& written, bool writes_back,
            ScanController& result) {
     if (!connection_.connect()) {
@@ -203,7 +203,7 @@ class ControllerScan {
   Exchange ask(ModbusTable table, std::uint16_t address, std::span<std::uint16_t> words) {
     Exchange exchange;
     for (int tried = 0; tried < tries_max; ++tried) {
-      // A gateway for one client may still have the one of the sensors' bus.
+      // A single-client gateway may still hold the connection of the sensors' bus.
       if (!connection_.connected() && tried > 0)
         connection_.pause_until(connection_.now() + from_seconds(config_.line.reconnect_s));
       if (!connection_.connected() && !connection_.connect()) return exchange;
@@ -213,7 +213,7 @@ class ControllerScan {
     return exchange;
   }
 
-  /// @return false: the unit does not answer at all, which result.error says
+  /// @return false: the unit does not answer; result.error gives the reason
   bool ask_together(std::vector<Place>& places, ScanController& result) {
     std::vector<ModbusValue> values;
     values.reserve(places.size());
@@ -278,7 +278,7 @@ class ControllerScan {
       place.shown.why = why_not(exchange) + elsewhere(place, exchange);
   }
 
-  /// Which other table answers where this one is refused.
+  /// Hint at another table that answers where this one is refused.
   std::string elsewhere(const Place& place, const Exchange& refused) {
     const ModbusTable table = place.value.table;
     const bool may_move =

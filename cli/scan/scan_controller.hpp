@@ -1,4 +1,4 @@
-/// The controller's side, asked once for every register and signal of the configuration.
+/// Reads every register and signal of the controller once.
 #pragma once
 
 #include <functional>
@@ -9,17 +9,17 @@
 
 namespace thermocomp::cli {
 
-/// Reads every place that the configuration names, also those that the daemon writes. A controller
-/// on CAN is listened to.
+/// Reads every configured value, including those that the daemon writes. Listens to a controller on
+/// CAN.
 ///
-/// Whether a Modbus controller takes writes shows when what stands in the registers is written once
-/// more, as the daemon would. That moves nothing where every axis applies what stands in its
-/// register; else, and beside a running daemon, nothing is written, and the result says so.
-/// @param listen_s  for so long, on CAN
+/// To test whether a Modbus controller accepts writes, the registers' present values are written
+/// back as the daemon would. This moves nothing if every axis already applies the value in its
+/// register; otherwise, or while a daemon runs, nothing is written and the result says so.
+/// @param listen_s  listening time on CAN
 /// @param writes_back  false: nothing is written
-/// @param progress  called with a line about what is being done
-/// @return none where nothing can be read: no controller, or one that calls the daemon, which
-///         `progress` is called
+/// @param progress  called with a line of progress
+/// @return nullopt if nothing can be read: no controller, or one that calls the daemon (the reason
+///         goes to `progress`)
 [[nodiscard]] std::optional<ScanController> scan_controller(
     const DaemonConfig& config, double listen_s, bool writes_back,
     const std::function<void(const std::string&)>& progress);

@@ -1,4 +1,4 @@
-// NAMEs are asked for, and our own is claimed if the configuration has one.
+// Scan of a J1939 bus: requests NAMEs, and claims an address if configured.
 #include <algorithm>
 
 #include "cli/scan/scan_protocol.hpp"
@@ -20,7 +20,7 @@ std::string why_not(const J1939Parameter& parameter, Fault fault, const RawReadi
   const auto bytes = static_cast<std::size_t>((place.start_bit + place.length_bits + 7) / 8);
   if (static_cast<std::size_t>(place.start_byte) + bytes > frame_bytes &&
       raw.value.size() <= frame_bytes) {
-    place.start_byte = 0;  // of a longer group only its bytes are there
+    place.start_byte = 0;  // a longer group's reading holds only its own bytes
   }
   const std::uint64_t number = extract_raw(raw.value, place);
   if (has_code(place.sentinels, static_cast<std::int64_t>(number))) return its_code;

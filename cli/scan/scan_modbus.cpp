@@ -1,5 +1,5 @@
-// Every channel is read once, by the daemon's own poller. Where a value is not plausible or an
-// address is refused, the registers beside it are read too. Nothing is ever written.
+// Scan of a Modbus bus: reads every channel once with the daemon's poller, and the registers beside
+// a refused address or an implausible value. Never writes.
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -20,7 +20,7 @@ namespace thermocomp::cli {
 namespace {
 
 constexpr int tries_max = 2;
-constexpr double busy_s_max = 5.0;  ///< as stale_after_s is without the key
+constexpr double busy_s_max = 5.0;  ///< default of stale_after_s
 
 std::string place_of(const ModbusChannel& channel) {
   std::string text = table_name(channel.table);
@@ -33,7 +33,7 @@ std::string place_of(const ModbusChannel& channel) {
   return text;
 }
 
-/// Every channel of a device that nothing could be read of.
+/// Result for a device from which nothing could be read.
 ScanDevice without_answer(const ModbusDeviceConfig& device, const ScanSensors& sensors,
                           const std::string& why) {
   ScanDevice result{device.name, "unit " + std::to_string(device.unit), false, why, {}};
@@ -46,7 +46,7 @@ ScanDevice without_answer(const ModbusDeviceConfig& device, const ScanSensors& s
   return result;
 }
 
-/// Words of one place with the exchange that brought them.
+/// Words read with one exchange.
 struct Answer {
   Exchange exchange;
   std::vector<std::uint16_t> words;
@@ -116,8 +116,8 @@ class ModbusScan {
   const ScanSensors& sensors_;
   const std::function<void(const std::string&)>& progress_;
   ModbusConnection connection_;
-  std::optional<ModbusPoller> poller_;  ///< none: nothing is configured on the bus yet
-  // Of the device under way, in the order of its channels.
+  std::optional<ModbusPoller> poller_;  ///< none: no devices configured
+  // Of the device being scanned, by channel.
   std::vector<Answer> values_;
   std::vector<std::optional<Answer>> statuses_;
 };
@@ -131,13 +131,13 @@ std::string ModbusScan::describe(const ModbusDeviceConfig& device, const Exchang
   return exchange.detail;
 }
 
-/// Until every device was asked for everything, and again where the daemon tries again: a device
-/// that is busy has as long as a reading may be old.
+/// Polls until every device was asked for every value. A busy device is asked again, for as long as
+/// a reading may be old.
 void ModbusScan::ask_as_the_daemon() {
   progress_("bus " + config_.name + ": asking its devices as the daemon does");
   const std::size_t count = config_.devices.size();
   const auto has_asked = [this](std::size_t device) { return poller_->has_asked(device); };
-  // A gateway may keep each of them for some seconds.
+  // A gateway may hold each request for some seconds.
   const nanoseconds give_up_at =
       connection_.now() + static_cast<long>(count + 1) * 2 * gateway_wait_max;
   std::vector<std::size_t> all(count);
@@ -178,7 +178,7 @@ ScanDevice ModbusScan::scan(std::size_t index) {
   }
   for (std::size_t i = 0; i < device.channels.size(); ++i) {
     result.channels.push_back(evaluate(device, i));
-    if (!result.answers) result.channels.back().why.clear();  // the note says it
+    if (!result.answers) result.channels.back().why.clear();  // stated in the note
   }
   return result;
 }
@@ -256,7 +256,7 @@ void ModbusScan::judge_value(const ModbusDeviceConfig& device, const ModbusChann
   }
 }
 
-/// What the configured value would be elsewhere, if it is plausible there.
+/// The value at another place, if it is plausible there.
 std::optional<double> ModbusScan::look_at(const ModbusDeviceConfig& device,
                                           const ModbusChannel& channel, int address,
                                           ModbusTable table) {
@@ -302,7 +302,7 @@ void ModbusScan::hint_refused(const ModbusDeviceConfig& device, const ModbusChan
     result.hints.emplace_back("look this exception up in the device's manual");
 }
 
-/// Whether the first request of the first device is answered on a line like this.
+/// The first device answers its first request on this line.
 bool ModbusScan::would_answer(const ModbusLine& line) const {
   const ModbusDeviceConfig& device = config_.devices.front();
   const ModbusChannel& channel = device.channels.front();
@@ -313,7 +313,7 @@ bool ModbusScan::would_answer(const ModbusLine& line) const {
              .unit_answered();
 }
 
-/// On a serial line, which is open already.
+/// The same on the serial line, which is already open.
 bool ModbusScan::answers_within(double timeout_ms) {
   ModbusLine patient = config_.line;
   patient.timeout_ms = timeout_ms;
@@ -327,7 +327,7 @@ bool ModbusScan::answers_within(double timeout_ms) {
   return answers;
 }
 
-/// The first of these changes with which a unit answers; empty: none answers with any.
+/// The first change of the line with which a unit answers; empty: none.
 std::string ModbusScan::working_line() {
   constexpr double patient_ms = 3000.0;
   const bool may_wait = config_.line.timeout_ms < patient_ms;
@@ -350,7 +350,7 @@ std::string ModbusScan::working_line() {
   return waits ? patience : "";
 }
 
-/// One unit that is silent has a fault of its own; all of them rather a common one.
+/// Explains silence: a single silent unit has its own fault, silence of all has a common cause.
 void ModbusScan::judge_silence(ScanBus& bus) {
   const auto silent = static_cast<std::size_t>(std::count_if(
       bus.devices.begin(), bus.devices.end(), [](const auto& device) { return !device.answers; }));
@@ -375,8 +375,6 @@ void ModbusScan::judge_silence(ScanBus& bus) {
   }
 }
 
-// ---- searching
-
 void ModbusScan::find(const UnitSearch& search, ScanBus& bus) {
   std::set<int> configured;
   for (const ModbusDeviceConfig& device : config_.devices) configured.insert(device.unit);
@@ -387,7 +385,7 @@ void ModbusScan::find(const UnitSearch& search, ScanBus& bus) {
             short_number(count * config_.line.timeout_ms / 1e3) + " s; behind a gateway longer");
   std::string unknown;
   std::string numbers;
-  bool may_hold = true;  // a gateway that waits for a silent unit answers for no other
+  bool may_hold = true;  // the gateway may block other requests while it waits for a silent unit
   bool was_silent = false;
   for (int unit = search.first; unit <= search.last; ++unit) {
     std::array<std::uint16_t, 1> word{};

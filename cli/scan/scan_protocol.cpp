@@ -18,7 +18,7 @@ struct Worked {
   nanoseconds ended_at{};
 };
 
-/// Feeds the protocol with the bus for `listen_s`, and sends what it wants to send.
+/// Runs the protocol on the bus for `listen_s`, sending its frames.
 Worked work(CanProtocol& protocol, CanSocket& socket, double listen_s, const ScanSensors& sensors) {
   Worked worked;
   const nanoseconds end = monotonic_now() + from_seconds(listen_s);
@@ -101,7 +101,7 @@ ScanBus scan_protocol(ProtocolBus what, CanProtocol& protocol, const ScanSensors
   bus.kind = what.outline.kind;
   bus.where = what.outline.interface;
   CanSocket socket(bus.where, {});
-  socket.also_want({{0, false}, 0});  // everything: what is there beside what is looked for
+  socket.also_want({{0, false}, 0});  // all frames, to list those not configured
   socket.also_want({{0, true}, 0});
   Worked worked;
   if (socket.open()) {

@@ -1,4 +1,4 @@
-/// A protocol above CAN in a scan: the daemon's own, worked for a while from here.
+/// Scan with the daemon's own protocols above CAN.
 #pragma once
 
 #include <cstddef>
@@ -14,10 +14,10 @@
 
 namespace thermocomp::cli {
 
-/// Why there is no value; empty where the device's note says it.
+/// Reason for a missing value; empty if the device's note states it.
 using Why = std::function<std::string(Fault, const RawReading&)>;
 
-/// What a reading of the protocol is of.
+/// Channel of a reading.
 struct Place {
   std::size_t device;
   std::size_t sensor;
@@ -32,18 +32,17 @@ struct ProtocolBus {
   std::vector<Place> places;
 };
 
-/// A further search on the open bus; it is given the number of frames of each identifier heard.
+/// Further search on the open bus, with the number of frames received by identifier.
 using Afterwards = std::function<void(CanSocket&, const FrameCounts&, ScanBus&)>;
 
-/// Works the protocol for `task.listen_s` as the daemon would, sends what it wants to send, and
-/// shows what each place became.
+/// Runs the protocol for `task.listen_s` as the daemon would, and shows the value of each place.
 [[nodiscard]] ScanBus scan_protocol(ProtocolBus what, CanProtocol& protocol,
                                     const ScanSensors& sensors, const ScanTask& task,
                                     const Afterwards& afterwards = nullptr);
 
-/// "0x" and at least so many digits, after `before`.
+/// `before`, then "0x" and at least `digits` digits.
 [[nodiscard]] std::string hexadecimal(const char* before, std::uint32_t value, int digits);
-/// Of a reading that the device itself calls none.
+/// Reason for a reading that the device marks as invalid.
 inline constexpr const char* its_code = "the device's code for it";
 [[nodiscard]] std::string too_few(const RawReading& raw);
 

@@ -28,7 +28,7 @@ std::string padded(std::string text, std::size_t width) {
   return text;
 }
 
-/// What stands after the raw bytes: the temperature, or the fault in its place.
+/// The temperature, or the fault in its place.
 std::string outcome(const ScanChannel& channel) {
   return channel.good() ? fixed(channel.temp_degC, 2) + " degC"
                         : std::string(to_string(channel.fault));
@@ -276,7 +276,7 @@ void hint_orders(const ModbusChannel& channel, std::span<const std::uint16_t> wo
   for (const WordOrder order :
        {WordOrder::abcd, WordOrder::cdab, WordOrder::badc, WordOrder::dcba}) {
     if (order == channel.word_order) continue;
-    // In one register only the two bytes can change places: half the orders are the other half.
+    // A single register has only two byte orders.
     if (one_register && (order == WordOrder::cdab || order == WordOrder::dcba)) continue;
     const Decoded decoded = decode_as(channel, order, channel.scale, words);
     if (!fits(channel, decoded, range)) continue;
@@ -285,10 +285,10 @@ void hint_orders(const ModbusChannel& channel, std::span<const std::uint16_t> wo
   }
 }
 
-/// Some modules put two probes into one register, a byte each.
+/// Hints at two probes packed into one register, a byte each.
 void hint_halves(const ModbusChannel& channel, std::span<const std::uint16_t> words,
                  const PlausibleRange& range, std::vector<std::string>& hints) {
-  constexpr double apart_K_max = 20.0;  // two probes of one module; most other numbers are not so
+  constexpr double apart_K_max = 20.0;  // two probes of one module; few other numbers agree so well
   if (channel.encoding != Encoding::int16 && channel.encoding != Encoding::uint16) return;
   NumberFormat half = format_of(channel);
   half.mask = 0xFF00;

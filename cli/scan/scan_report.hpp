@@ -1,5 +1,5 @@
-/// What `thermocomp scan` found, as text for a person and as JSON, and what registers that decode
-/// to nothing plausible may be instead. Pure.
+/// Result of `thermocomp scan` as text and JSON, with hints for registers that decode to
+/// implausible temperatures.
 #pragma once
 
 #include <cstdint>
@@ -18,13 +18,12 @@ namespace thermocomp::cli {
 struct ScanChannel {
   std::string sensor;
   std::string place;  ///< "input 0 int16 x 0.1"
-  std::string raw;    ///< bytes in the order of the wire, "00 D7"; empty: none came
+  std::string raw;    ///< bytes in wire order, "00 D7"; empty: none received
   double temp_degC{not_a_number};
   Fault fault{Fault::never_read};
-  std::string why;                 ///< empty when good
-  std::vector<std::string> hints;  ///< what it may be instead, and what to do
-  /// A raw value that most modules send for a broken wire, and that the configuration does not
-  /// know.
+  std::string why;                 ///< empty: good
+  std::vector<std::string> hints;  ///< likely corrections
+  /// Raw value that most modules send for a broken wire and that the configuration lacks.
   std::optional<std::int64_t> likely_open_code;
   std::optional<double> round_trip_ms;
   std::optional<double> age_s;
@@ -35,7 +34,7 @@ struct ScanDevice {
   std::string name;
   std::string address;  ///< "unit 3"; empty on a CAN bus
   bool answers{false};
-  std::string note;  ///< what is wrong with the device as a whole
+  std::string note;  ///< fault of the whole device
   std::vector<ScanChannel> channels;
 };
 
@@ -43,9 +42,9 @@ struct ScanBus {
   std::string name;
   std::string kind;   ///< as in the configuration
   std::string where;  ///< "192.168.10.20:502", "/dev/ttyUSB0", "can0"
-  std::string error;  ///< empty: it could be used
+  std::string error;  ///< empty: usable
   std::string note;
-  std::string found;  ///< what a search for units or nodes found; empty: none was asked for
+  std::string found;  ///< result of a search for units or nodes; empty: no search
   std::vector<int> found_numbers;
   std::vector<ScanDevice> devices;
 };
@@ -54,12 +53,12 @@ struct ScanBus {
 struct ScanValue {
   std::string what;  ///< "applied offset of axis z", "spindle_rpm"
   std::string place;
-  bool is_written{false};      ///< by the daemon; what stands there was read all the same
-  bool is_needed{true};        ///< the daemon does not go without reading it
-  std::string raw;             ///< as of a channel
+  bool is_written{false};      ///< written by the daemon, and read here
+  bool is_needed{true};        ///< the daemon must read it
+  std::string raw;             ///< as ScanChannel::raw
   double value{not_a_number};  ///< in `unit`
   std::string unit;
-  std::string why;  ///< empty: it is there
+  std::string why;  ///< empty: present
   std::optional<double> round_trip_ms;
   [[nodiscard]] bool is_there() const noexcept { return why.empty(); }
   [[nodiscard]] bool is_missing() const noexcept { return is_needed && !is_there(); }
@@ -68,11 +67,11 @@ struct ScanValue {
 struct ScanController {
   std::string name;
   std::string kind;
-  std::string where;    ///< as of a bus
+  std::string where;    ///< as ScanBus::where
   std::string address;  ///< "unit 1"; empty on a CAN bus
-  std::string error;    ///< empty: it could be asked
-  std::string refused;  ///< not empty: the daemon could not read all of it together, or not write
-  std::string writes;   ///< whether they were tried, and if not, why
+  std::string error;    ///< empty: could be polled
+  std::string refused;  ///< reason why the daemon could not read or write it; empty: none
+  std::string writes;   ///< result of the writes, or why they were not tried
   std::vector<ScanValue> values;
   [[nodiscard]] bool is_complete() const;
 };
@@ -80,45 +79,45 @@ struct ScanController {
 struct ScanReport {
   std::string file;
   std::vector<ScanBus> buses;
-  std::optional<ScanController> controller{};  ///< none: it cannot be scanned, or was not asked
+  std::optional<ScanController> controller{};  ///< none: not scanned
 };
 
 [[nodiscard]] std::size_t count_channels(const ScanReport& report);
 [[nodiscard]] std::size_t count_good(const ScanReport& report);
-/// Every channel gives a temperature, and nothing of the controller is missing.
+/// Every channel gives a temperature, and all values of the controller are present.
 [[nodiscard]] bool is_complete(const ScanReport& report);
 
 /// @param colours  for a terminal
 [[nodiscard]] std::string scan_text(const ScanReport& report, bool colours);
 [[nodiscard]] nlohmann::ordered_json scan_json(const ScanReport& report);
 
-/// Bytes as two hexadecimal digits each, a space between.
+/// Two hexadecimal digits per byte, separated by spaces.
 [[nodiscard]] std::string hex_bytes(const std::vector<std::uint8_t>& bytes);
-/// The same of registers, as they come over the wire.
+/// Likewise for registers, in wire order.
 [[nodiscard]] std::string hex_words(std::span<const std::uint16_t> words);
 
-/// Temperatures that a sensor may have, from its [screening].
+/// Limits of a sensor from its [screening].
 struct PlausibleRange {
   double min_degC{-30.0};
   double max_degC{200.0};
 };
 
-/// Whether a decoded temperature may be true: in the range, and not a float so near 0 that only
-/// the bytes of another number in a wrong order make it.
+/// The temperature is within range, and not a float so close to 0 that it must be another number in
+/// the wrong byte order.
 [[nodiscard]] bool is_plausible(const ModbusChannel& channel, double temp_degC,
                                 const PlausibleRange& range);
 
-/// The raw value, where it is one that most modules send for a broken wire: an end of the encoding.
+/// The raw value if most modules send it for a broken wire: an end of the encoding's range.
 [[nodiscard]] std::optional<std::int64_t> likely_open_code(const ModbusChannel& channel,
                                                            std::span<const std::uint16_t> words);
 
-/// For registers of which the temperature is not plausible: the word orders, scales and codes with
-/// which they would be, each a sentence. @param words  of the channel's value
+/// Word orders, scales and codes that would make an implausible temperature plausible, one sentence
+/// each. @param words  of the channel's value
 [[nodiscard]] std::vector<std::string> hints_for_words(const ModbusChannel& channel,
                                                        std::span<const std::uint16_t> words,
                                                        const PlausibleRange& range);
 
-/// For an address that the device refuses (exception 2 or 3), from the address alone.
+/// Hints for a refused address (exception 2 or 3), from the address alone.
 [[nodiscard]] std::vector<std::string> hints_for_address(const ModbusChannel& channel);
 
 }  // namespace thermocomp::cli

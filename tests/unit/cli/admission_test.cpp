@@ -13,7 +13,7 @@ using thermocomp::RunFile;
 using thermocomp::ThermalModel;
 using thermocomp::cli::why_not_admitted;
 
-/// z = gain t; it states an error of `stated_um`, or none.
+/// z = gain t, with a stated error of `stated_um` or none.
 ThermalModel model(double gain, double stated_um = 0.0) {
   ThermalModel made;
   made.inputs = {"t_degC"};
@@ -43,7 +43,7 @@ DaemonConfig with(const ThermalModel& in_use, const ThermalModel& offered) {
   return config;
 }
 
-/// The machine moves by 2 um/K; probed where `probed` is set.
+/// A machine with z = 2 um/K; with z_um if `probed`.
 RunFile days(bool probed) {
   std::string text = probed ? "time_s,t_degC,z_um\n" : "time_s,t_degC\n";
   for (int i = 0; i < 50; ++i) {
@@ -59,7 +59,7 @@ std::string why(const DaemonConfig& config, const RunFile& run) {
   return why_not_admitted(config, run, {}, found);
 }
 
-TEST_CASE("a model that leaves more at the probings is refused, one that leaves less is not",
+TEST_CASE("a model with a larger remainder at the probings is refused, a smaller one is not",
           "[cli][admit]") {
   std::string found;
   CHECK(why_not_admitted(with(model(3.0), model(2.0)), days(true), {}, found).empty());
@@ -70,7 +70,7 @@ TEST_CASE("a model that leaves more at the probings is refused, one that leaves 
 
 TEST_CASE("the smaller of the stated errors is allowed, whatever the offered model states",
           "[cli][admit]") {
-  // 2.5 um/K leaves 1.3 um of what 2 um/K leaves nothing of.
+  // 2.5 um/K leaves 1.3 um, 2 um/K nothing.
   CHECK(why(with(model(2.0, 1.4), model(2.5, 1.4)), days(true)).empty());
   CHECK_THAT(why(with(model(2.0, 1.2), model(2.5, 100.0)), days(true)),
              Contains("1.20 um are allowed"));

@@ -47,7 +47,7 @@ TEST_CASE("the covariance is that of the record, whatever its level and its gaps
   CHECK(fit.hours == Approx(2000.0 / 60.0));
   CHECK(fit.matrix_K2[0][1] == Approx(2.0 * fit.matrix_K2[0][0]).epsilon(0.02));
   CHECK(fit.matrix_K2[0][0] == Approx(4.5).epsilon(0.1));
-  // What follows another is known well an hour after its loss; what wanders alone is not.
+  // An hour after its loss, only an input that follows another is known well.
   CHECK(fit.sd_1h_K[0] < 0.2);
   CHECK(fit.sd_1h_K[2] > 0.2);
   CHECK(fit.growth.drift_factor.size() == 3);
@@ -70,7 +70,7 @@ TEST_CASE("only the selected rows count, and too few are refused", "[cli][covari
                     Catch::Matchers::Contains("d_degC"));
 }
 
-TEST_CASE("an input that never moved is not taken for certain", "[cli][covariance]") {
+TEST_CASE("an input that never changed is not treated as certain", "[cli][covariance]") {
   RunFile run = run_of(2000);
   std::fill(run.values[3].begin(), run.values[3].end(), 21.0);
   const CovarianceFit fit = fit_covariance({&run, 1}, inputs);

@@ -43,7 +43,7 @@ TEST_CASE("without commit the old file stays and nothing else is left", "[cli][o
   CHECK(folder.files() == 1);
 }
 
-TEST_CASE("after commit the new content stands there", "[cli][output]") {
+TEST_CASE("after commit the file has the new content", "[cli][output]") {
   const Folder folder;
   const fs::path path = folder / "out.csv";
   OutputFile file(path.string());
@@ -71,7 +71,7 @@ TEST_CASE("a device is written, not replaced", "[cli][output]") {
   CHECK(fs::is_character_file("/dev/null"));
 }
 
-TEST_CASE("a pipe that nobody reads is refused at once, one that is read is written",
+TEST_CASE("a pipe without a reader is refused at once, one with a reader is written",
           "[cli][output]") {
   const Folder folder;
   const std::string pipe = (folder / "pipe").string();
@@ -88,7 +88,7 @@ TEST_CASE("a pipe that nobody reads is refused at once, one that is read is writ
   ::close(reader);
 }
 
-TEST_CASE("a device that is no place for a file is refused", "[cli][output]") {
+TEST_CASE("a device that cannot hold a file is refused", "[cli][output]") {
   CHECK_THROWS_WITH(OutputFile("/dev/ptmx"), Catch::Matchers::Contains("is a device"));
 }
 

@@ -79,7 +79,7 @@ TEST_CASE("the unit stays last in the names of the predicted columns", "[cli][pr
         std::vector<std::string>{"time_s", "z_predicted_um", "z_measured_um", "z_residual_um"});
 }
 
-TEST_CASE("the furthest row and the quantity that takes it there are said", "[cli][predict]") {
+TEST_CASE("the furthest row is reported with its main quantity", "[cli][predict]") {
   ThermalModel model = two_temperatures();
   thermocomp::MadeFrom made_from;
   made_from.runs = {"a.csv"};

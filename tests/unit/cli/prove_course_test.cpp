@@ -74,14 +74,14 @@ TEST_CASE("a move that was ended on the way, or never begun, fails", "[cli][prov
   CHECK_FALSE(silent.passed());
 }
 
-TEST_CASE("one that is still under way is reported as such", "[cli][prove]") {
+TEST_CASE("a move that is still under way is reported as such", "[cli][prove]") {
   ProveCourse course(5.0, axis(0.0, 0.0, false));
   course.take(axis(2.0, 1.9, true));
   CHECK_FALSE(course.passed());
   CHECK_THAT(course.verdict("z"), Contains("the move is not over: sent +2.00 um"));
 }
 
-TEST_CASE("without a read-back what was sent is reported, and that nobody saw it", "[cli][prove]") {
+TEST_CASE("without a read-back the offset sent is reported as unconfirmed", "[cli][prove]") {
   ProveCourse course(5.0, axis(0.0, nullptr, false));
   course.take(axis(5.0, nullptr, true));
   CHECK_THAT(course.progress(), Contains("nothing is read back"));

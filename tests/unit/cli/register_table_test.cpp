@@ -1,4 +1,4 @@
-// The contract with the controller's side as a table.
+// Tests of the table of registers and frame bits.
 #include "cli/check/register_table.hpp"
 
 #include <filesystem>
@@ -70,7 +70,7 @@ TEST_CASE("the table of CAN goes by frames and bits", "[cli][registers]") {
   CHECK_THAT(register_table(config), Contains("DRY RUN: the daemon reads, and writes none"));
 }
 
-TEST_CASE("what the contract lacks is said", "[cli][registers]") {
+TEST_CASE("missing optional signals are listed", "[cli][registers]") {
   DaemonConfig config = example("can.toml");
   auto& controller = std::get<thermocomp::CanControllerConfig>(config.controller);
   controller.valid_bits.reset();
@@ -120,12 +120,13 @@ TEST_CASE("a set in frames is shown frame by frame, with its number in each", "[
   CHECK_THAT(text, !Contains("Missing"));
 }
 
-TEST_CASE("a piezo's registers are volts, and no controller has none", "[cli][registers]") {
+TEST_CASE("a piezo's registers are in volts; without a controller there are none",
+          "[cli][registers]") {
   CHECK_THAT(register_table(example("piezo.toml")), Contains("voltage of axis"));
   CHECK_THAT(register_table(example("modbus_rtu.toml")), Contains("there is no controller"));
 }
 
-TEST_CASE("a data block is shown as a PLC's programmer writes it", "[cli][registers]") {
+TEST_CASE("a data block is shown in a PLC programmer's notation", "[cli][registers]") {
   const std::string text = register_table(example("s7.toml"));
   for (const char* part :
        {"s7 192.168.10.30:102, rack 0, slot 1, DB100, every 0.1 s", "optimized block access off",

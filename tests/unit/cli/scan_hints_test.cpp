@@ -25,7 +25,7 @@ ModbusChannel tenths() {
 
 }  // namespace
 
-TEST_CASE("a float whose words changed places is recognised, and nothing else is suggested") {
+TEST_CASE("a float with swapped words is recognised, and nothing else is suggested") {
   const std::array<std::uint16_t, 2> words{0x0000, 0x41AC};  // 21.5, low word first
   CHECK_FALSE(is_plausible(float_channel(), 2.36e-41, {}));
   CHECK(hints_for_words(float_channel(), words, {}) ==
@@ -47,7 +47,7 @@ TEST_CASE("a missing scale is recognised") {
   CHECK(hints[0] == "scale = 0.01 would make it 21.50 degC");
 }
 
-TEST_CASE("the ends of an encoding are taken for what they mostly are") {
+TEST_CASE("the ends of an encoding are recognised as likely open-circuit codes") {
   const std::array<std::uint16_t, 1> words{0x7FFF};
   const std::vector<std::string> hints = hints_for_words(tenths(), words, {});
   REQUIRE(hints.size() == 1);

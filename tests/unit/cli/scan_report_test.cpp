@@ -35,7 +35,7 @@ ScanReport report_of(std::vector<ScanValue> values) {
 
 }  // namespace
 
-TEST_CASE("a controller that has everything makes a scan complete", "[cli][scan]") {
+TEST_CASE("a scan with every value of the controller is complete", "[cli][scan]") {
   const ScanReport report = report_of({there("spindle_rpm", 10.0), there("heartbeat", 0.0)});
   CHECK(is_complete(report));
   CHECK_THAT(scan_text(report, false), Contains("spindle_rpm  input 10 uint16  00 0A  -> 10.00") &&
@@ -45,7 +45,7 @@ TEST_CASE("a controller that has everything makes a scan complete", "[cli][scan]
   CHECK(is_complete(ScanReport{}));
 }
 
-TEST_CASE("what a controller lacks is named, with what it answered", "[cli][scan]") {
+TEST_CASE("missing values of a controller are listed with its answers", "[cli][scan]") {
   const ScanReport report =
       report_of({there("spindle_rpm", 10.0), missing("x_mm"), missing("heartbeat")});
   CHECK_FALSE(is_complete(report));
@@ -60,7 +60,7 @@ TEST_CASE("what a controller lacks is named, with what it answered", "[cli][scan
   CHECK_THAT(values[1]["why"].get<std::string>(), Contains("exception 2"));
 }
 
-TEST_CASE("values that are there, but not as the daemon asks for them, are no complete controller",
+TEST_CASE("values that the daemon's own requests cannot read leave the scan incomplete",
           "[cli][scan]") {
   ScanReport report = report_of({there("spindle_rpm", 10.0)});
   report.controller->refused = "the daemon reads input 10..18 in one request";

@@ -57,7 +57,7 @@ std::uint32_t only(Reason reason) {
   return static_cast<std::uint32_t>(reason);
 }
 
-TEST_CASE("the status says at one glance that and how much is compensated", "[cli][status]") {
+TEST_CASE("the status shows at a glance whether and how much is compensated", "[cli][status]") {
   const std::string text = status_text(good_status(), false);
   CHECK_THAT(text, Contains("Compensating    : yes, for 1 h 2 min"));
   CHECK_THAT(text, Contains("Axis z          : offset    +3.10 um, target    +3.20 um, applied"));
@@ -67,8 +67,7 @@ TEST_CASE("the status says at one glance that and how much is compensated", "[cl
   CHECK_THAT(text, !Contains("\033"));
 }
 
-TEST_CASE("the status says when, by whom and at what temperatures the reference was taken",
-          "[cli][status]") {
+TEST_CASE("the status shows time, origin and temperatures of the reference", "[cli][status]") {
   Status status = good_status();
   CHECK_THAT(status_text(status, false), Contains("Reference       : none yet"));
   ReferenceStatus& reference = status.reference;
@@ -101,7 +100,7 @@ TEST_CASE("a model that was never compared is named as such", "[cli][status]") {
   CHECK_THAT(status_text(status, false), Contains("probings here differ by z 1.2 um rms"));
 }
 
-TEST_CASE("a machine outside of what its model was made from is told so", "[cli][status]") {
+TEST_CASE("a machine outside its model's domain is reported", "[cli][status]") {
   Status status = good_status();
   CHECK_THAT(status_text(status, false), !Contains("Domain"));
   status.model.outside = true;
@@ -123,7 +122,7 @@ TEST_CASE("compensating needs the mode, the controller and every axis", "[cli][s
   }
 }
 
-TEST_CASE("a dry run is never said to compensate", "[cli][status]") {
+TEST_CASE("a dry run is never reported as compensating", "[cli][status]") {
   Status status = good_status();
   status.dry_run = true;
   for (const Mode mode : {Mode::compensating, Mode::holding, Mode::disabled}) {
@@ -141,7 +140,7 @@ TEST_CASE("a dry run is never said to compensate", "[cli][status]") {
   CHECK_THAT(status_text(status, false), Contains("online; applies by itself z +3.00 um"));
 }
 
-TEST_CASE("trouble is named in plain words", "[cli][status]") {
+TEST_CASE("troubles are named in plain words", "[cli][status]") {
   Status status = good_status();
   status.mode = Mode::holding;
   status.reasons = only(Reason::block_lost);
@@ -161,7 +160,7 @@ TEST_CASE("trouble is named in plain words", "[cli][status]") {
   CHECK_THAT(text, Contains("bus cabinet is not connected (refused) -> check the module's power"));
 }
 
-TEST_CASE("a silent module is one problem, and names what is lost with it", "[cli][status]") {
+TEST_CASE("a silent module is one trouble that lists the inputs lost with it", "[cli][status]") {
   Status status = good_status();
   status.mode = Mode::holding;
   status.reasons = only(Reason::block_lost);
@@ -188,8 +187,8 @@ TEST_CASE("a silent module is one problem, and names what is lost with it", "[cl
   list = troubles(status, &answer);
   REQUIRE(list.size() == 2);
   CHECK(list[1].what == "sensor head: sensor wire broken");
-  status.sensors_bad = {"head"};                 // those of the module are good still
-  CHECK(troubles(status, &answer).size() == 2);  // a lost input that nothing explains, and head
+  status.sensors_bad = {"head"};                 // the module's sensors are still good
+  CHECK(troubles(status, &answer).size() == 2);  // an unexplained lost input, and head
   CHECK_THAT(troubles(status, &answer)[0].what, !Contains("silent"));
   CHECK_THAT(list[1].remedy, !Contains("thermocomp "));
 }
@@ -206,7 +205,7 @@ TEST_CASE("an axis at its bound is named with what remains of its displacement",
   CHECK(list[0].subject == Subject{SubjectKind::axis, "z"});
 }
 
-TEST_CASE("an estimated block is reported with how sure it is", "[cli][status]") {
+TEST_CASE("an estimated block is reported with its standard deviation", "[cli][status]") {
   Status status = good_status();
   status.reasons = only(Reason::block_estimated);
   status.inputs.push_back({.name = "head_degC",
@@ -288,7 +287,7 @@ TEST_CASE("an unconfirmed reading is shown with its jump and the command that ac
              Contains("(jumped by +18.0 K at 2023-") && Contains("thermocomp accept SENSOR"));
 }
 
-TEST_CASE("a value that only settles is no fault to mend", "[cli][status]") {
+TEST_CASE("a settling value is not reported as a fault", "[cli][status]") {
   const SensorStatus sensor{.name = "head", .raw_degC = 20.0, .fault = Fault::unconfirmed};
   CHECK_THAT(sensors_text({{sensor}, {}, {}}, false),
              Contains("new: counts once it has lasted settle_s") && !Contains("thermometer"));
@@ -337,7 +336,7 @@ TEST_CASE("a watch line shows temperatures, offsets and the simulated truth", "[
              Contains("22.50") && Contains("+3.10") && Contains("-6.50") && Contains("-0.50"));
 }
 
-TEST_CASE("the heading of a watch stands again where the truth appears", "[cli][watch]") {
+TEST_CASE("the heading of a watch is repeated when the truth appears", "[cli][watch]") {
   const thermocomp::cli::TruthRow truth{{"time_s", "z_um"}, {0, 1}, {10, -5.5}};
   thermocomp::cli::WatchLog log;
   const std::string plain = watch_header(good_status(), nullptr);
