@@ -13,7 +13,7 @@ At the end (duration reached, SIGINT or SIGTERM) the last line is
 Every key of the machine file is in the commented example machine.toml.
 Exit status: 0 success, 2 bad use or bad input.)";
 
-/// CLI::Range lets "nan" pass.
+/// CLI::Range accepts "nan".
 CLI::Validator number_between(double low, double high) {
   return CLI::Validator(
       [low, high](std::string& text) {

@@ -1,4 +1,4 @@
-/// The command line of `thermocomp-sim`; `--help`, manual page and completion are made from it.
+/// Command line of `thermocomp-sim`; `--help`, manual page and completion are generated from it.
 #pragma once
 
 #include <cstdint>
@@ -27,7 +27,7 @@ struct SimulatorArguments {
   SessionOptions session;
 };
 
-/// @param arguments  outlives the parsing
+/// @param arguments  must outlive the parsing
 void declare_simulator_command_line(CLI::App& app, SimulatorArguments& arguments);
 
 }  // namespace thermocomp

@@ -1,4 +1,4 @@
-/// thermocomp-sim: a simulated machine, its sensors and its controller on real buses.
+/// thermocomp-sim: a simulated machine with sensors and controller on real buses.
 
 #include <charconv>
 #include <cstdint>
@@ -43,7 +43,7 @@ void read_rows(const std::string& text, SessionOptions& session) {
   }
 }
 
-/// The bus that NAME of NAME=VALUE means; `value` gets the rest.
+/// The bus named in NAME=VALUE; sets `value` to VALUE.
 SimulatedBus& named_bus(MachineConfig& machine, const std::string& text, const std::string& option,
                         SimulatedBusKind kind, std::string& value) {
   const auto equals = text.find('=');

@@ -22,7 +22,7 @@ void CanFrames::define(const CanSignal& signal) {
       (plain || message.selected) &&
       std::any_of(message.pages.begin(), message.pages.end(),
                   [&](const CanFrame& page) { return carries(page.data, signal); });
-  // The first that is selected takes over the page that so far had nothing to select.
+  // The first multiplexed value reuses the page created for plain values.
   if (message.pages.empty() || (!has_page && message.selected)) {
     CanFrame& page = message.pages.emplace_back();
     page.id = id_of(signal);

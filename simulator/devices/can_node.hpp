@@ -1,4 +1,4 @@
-/// Frames that the simulator sends and receives on one CAN interface.
+/// CAN frames of the simulator on one interface.
 #pragma once
 
 #include <cstdint>
@@ -12,28 +12,27 @@
 
 namespace thermocomp {
 
-/// The frames of one device, built from signals: one an identifier, or one a page of those whose
-/// content a multiplexor selects.
+/// Frames of one device, built from signals: one per identifier, or one per page of a multiplexor.
 class CanFrames {
  public:
   void define(const CanSignal& signal);
-  /// A counter in the frames of the signal's identifier. @pre the signal has been defined
+  /// Adds a counter to the frames of the signal's identifier. @pre the signal has been defined
   void define_counter(const CanSignal& signal, const CanField& counter);
-  /// Saturated where it does not fit; NaN as a float's NaN or an integer's highest code.
+  /// Saturates; encodes NaN as a float's NaN or an integer's highest code.
   void set_value(const CanSignal& signal, double value);
   void set_code(const CanSignal& signal, std::int64_t code);
-  /// Beside the value, if the signal has a status; bits outside its mask stay.
+  /// Sets the signal's status, if it has one; bits outside its mask are kept.
   void set_status(const CanSignal& signal, std::int64_t number);
-  /// Every counter goes up by one.
+  /// Increments every counter.
   void count();
-  /// In the order of identifiers and, of one identifier, of definition.
+  /// Ordered by identifier, then by definition.
   [[nodiscard]] std::vector<CanFrame> frames() const;
 
  private:
   struct Message {
     std::vector<CanFrame> pages;
     std::vector<CanField> counters;
-    bool selected{false};  ///< the pages are those of multiplexors
+    bool selected{false};  ///< the pages are selected by multiplexors
   };
   template <class Write>
   void write(const CanSignal& signal, Write write_to);
@@ -42,16 +41,16 @@ class CanFrames {
   std::uint64_t counted_{0};
 };
 
-/// A socket that is opened again by itself.
+/// CAN socket that reopens itself.
 class CanNode {
  public:
   CanNode(std::string interface, std::vector<CanId> wanted);
 
-  /// Empty: it works; else why not.
+  /// Empty: working.
   [[nodiscard]] std::string error() const { return socket_.is_open() ? "" : socket_.error(); }
   void keep_open(nanoseconds now);
   void send(const CanFrames& frames);
-  /// What has arrived since the last call, oldest first.
+  /// Frames received since the last call, oldest first.
   [[nodiscard]] std::vector<CanFrame> receive();
 
  private:

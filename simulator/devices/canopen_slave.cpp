@@ -20,7 +20,7 @@ constexpr std::uint32_t general_error = 0x08000000;
 constexpr std::uint16_t sensor_error = 0x5030;
 constexpr std::uint8_t broken = 0x01;
 constexpr std::uint8_t shorted = 0x02;
-constexpr nanoseconds emergency_again = 1s;  // as a CANtrans does it
+constexpr nanoseconds emergency_again = 1s;  // repetition of a JUMO CANtrans
 constexpr std::string_view device_name = "thermocomp-sim CANopen node";
 
 std::vector<std::uint8_t> number(std::uint64_t value, std::size_t bytes) {
@@ -29,7 +29,7 @@ std::vector<std::uint8_t> number(std::uint64_t value, std::size_t bytes) {
   return result;
 }
 
-/// Of a channel that no preset places.
+/// Place of a channel without a preset.
 CanopenChannel default_place(std::size_t channel) {
   CanopenChannel place;
   place.way = CanopenWay::pdo_object;
@@ -197,7 +197,7 @@ void CanopenSlave::answer_read(ObjectAddress object) {
 void CanopenSlave::answer_write(ObjectAddress object, std::span<const std::uint8_t> data) {
   const auto found = objects_.find({object.index, object.sub});
   if (found == objects_.end()) return abort(object, object_does_not_exist);
-  if ((data[0] & 0x02u) == 0) return abort(object, 0x06010000);  // expedited only
+  if ((data[0] & 0x02u) == 0) return abort(object, 0x06010000);  // only expedited transfers
   const std::size_t size = (data[0] & 0x01u) != 0 ? 4u - ((data[0] >> 2) & 3u) : 4u;
   if (size != found->second.size()) return abort(object, 0x06070010);
   found->second.assign(data.begin() + 4, data.begin() + 4 + static_cast<std::ptrdiff_t>(size));
@@ -218,7 +218,7 @@ std::uint64_t CanopenSlave::number_at(ObjectAddress object) const {
   return little_endian(objects_.at({object.index, object.sub}), 0, 8);
 }
 
-/// A broken thermocouple of which nothing beside the value tells shows the highest value.
+/// Shows the highest value for an open circuit that no status reports.
 void CanopenSlave::show_value(std::size_t channel, double temp_degC,
                               std::span<std::uint8_t> payload) const {
   constexpr double beyond_any_integer = 1e30;
@@ -238,8 +238,7 @@ CanopenSlave::Shown CanopenSlave::shown_of(std::size_t channel) const {
   return {channel_fault(event->kind), event->code};
 }
 
-/// What the status beside the value says of a fault; one that has no number for a broken
-/// thermocouple calls it an error.
+/// Status code of a fault; the error code for an open or short circuit without a code of its own.
 std::optional<std::int64_t> CanopenSlave::status_of(std::size_t channel) const {
   const FaultCodes& codes = config_.channels[channel].status.codes;
   const Shown shown = shown_of(channel);
@@ -273,8 +272,8 @@ void CanopenSlave::measure(std::span<const double> temps_degC) {
   }
 }
 
-/// Emergency messages in the form of a JUMO CANtrans: when a fault comes or goes, and again while
-/// it lasts.
+/// Sends emergency messages like a JUMO CANtrans: when a fault begins or ends, and periodically
+/// while it lasts.
 void CanopenSlave::tell_faults() {
   if (config_.emergency != EmergencyForm::jumo) return;
   const bool again = now_ >= emergency_at_;

@@ -1,4 +1,4 @@
-/// A simulated CANopen node: NMT, heartbeat, TPDO, SDO server, emergency messages. Pure.
+/// Simulated CANopen node without I/O: NMT, heartbeat, TPDO, SDO server, emergency messages.
 #pragma once
 
 #include <deque>
@@ -14,7 +14,7 @@ namespace thermocomp {
 
 class CanopenSlave final : public FieldNode {
  public:
-  /// Switches it on: it is pre-operational after its boot-up message.
+  /// Powers the node up: boot-up message, then pre-operational.
   CanopenSlave(const SimulatedCanopenNode& config, nanoseconds now);
 
   void take(const CanFrame& frame, nanoseconds now) override;
@@ -36,7 +36,7 @@ class CanopenSlave final : public FieldNode {
   void answer_segment(bool toggle);
   void abort(ObjectAddress object, std::uint32_t code);
   void answer(std::uint8_t command, ObjectAddress object, std::uint64_t data);
-  /// A message of the node's own; `function` is the identifier without its number.
+  /// Sends with a COB-ID of this node; `function` is the COB-ID without the node's number.
   void put(std::uint32_t function, std::span<const std::uint8_t> data);
   void send(std::uint32_t id, std::span<const std::uint8_t> data);
   void show_value(std::size_t channel, double temp_degC, std::span<std::uint8_t> payload) const;
@@ -47,7 +47,7 @@ class CanopenSlave final : public FieldNode {
   void send_values();
   [[nodiscard]] bool is_now(const NodeEvent& event) const;
   [[nodiscard]] bool happens(NodeEventKind kind) const;
-  /// The event that a channel shows now; nullptr: it measures.
+  /// Event active on a channel; nullptr: none.
   [[nodiscard]] const NodeEvent* fault_of(std::size_t channel) const;
   [[nodiscard]] std::uint64_t number_at(ObjectAddress object) const;
 
@@ -56,10 +56,10 @@ class CanopenSlave final : public FieldNode {
   nanoseconds now_;
   std::uint8_t state_{0};
   std::map<Key, std::vector<std::uint8_t>> objects_;
-  std::vector<std::uint8_t> segments_;                        ///< left of a segmented read
-  std::vector<CanopenChannel> places_;                        ///< of the channels
+  std::vector<std::uint8_t> segments_;                        ///< remainder of a segmented read
+  std::vector<CanopenChannel> places_;                        ///< by channel
   std::map<std::uint32_t, std::vector<std::uint8_t>> tpdos_;  ///< by COB-ID
-  std::vector<std::uint8_t> emergencies_;  ///< shown of each channel: 0, or byte 5 of the message
+  std::vector<std::uint8_t> emergencies_;  ///< by channel: byte 5 of the message sent, or 0
   nanoseconds pdo_at_{};
   nanoseconds heartbeat_at_{};
   nanoseconds emergency_at_{};

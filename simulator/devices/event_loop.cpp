@@ -76,7 +76,7 @@ void EventLoop::wait_and_dispatch() {
     if (files[i].revents == 0) continue;
     const auto found = watches_.find(files[i].fd);
     if (found == watches_.end() || found->second.token != tokens[i]) continue;
-    const Ready ready = found->second.ready;  // a copy: it may unwatch itself
+    const Ready ready = found->second.ready;  // copied, since it may unwatch itself
     ready(files[i].revents);
   }
 }

@@ -1,4 +1,4 @@
-/// One thread for everything the simulator does: files to watch and times to wake.
+/// Event loop of the simulator's only thread: file descriptors and timers.
 #pragma once
 
 #include <chrono>
@@ -17,19 +17,19 @@ class EventLoop {
 
   [[nodiscard]] static nanoseconds now();  ///< CLOCK_MONOTONIC
 
-  /// Calls `ready` when one of `events` happens to `file`; replaces an earlier watch of it.
+  /// Calls `ready` when one of `events` occurs on `file`; replaces an earlier watch.
   void watch(int file, short events, Ready ready);
-  /// Changes what is waited for; `file` is being watched.
+  /// Changes the events of a watched file.
   void change(int file, short events);
   void unwatch(int file);
-  /// Calls `wake` once at `when`, or as soon after it as may be. Equal times keep their order.
+  /// Calls `wake` once at `when` or as soon as possible after it. Equal times keep their order.
   void at(nanoseconds when, Wake wake);
   void run();  ///< until stop()
   void stop() noexcept { running_ = false; }
 
  private:
   struct Watch {
-    std::uint64_t token;  ///< tells a descriptor that was closed and opened again from itself
+    std::uint64_t token;  ///< distinguishes successive uses of a descriptor number
     short events;
     Ready ready;
   };

@@ -30,7 +30,7 @@ std::vector<std::size_t> find_columns(const std::vector<Channel>& channels, cons
 
 }  // namespace
 
-/// A node, its socket, and where its values stand in a row.
+/// A node with its socket and the columns of its values.
 struct FieldNodes::Node {
   Node(SimulatedNode simulated, std::string node_name, std::string on,
        std::vector<std::size_t> shown)
@@ -61,7 +61,7 @@ struct FieldNodes::Node {
   CanSocket socket;
   bool measured{false};
   nanoseconds tried_at{};
-  std::unique_ptr<FieldNode> node;  ///< nullptr: not switched on yet
+  std::unique_ptr<FieldNode> node;  ///< nullptr: not powered up
 };
 
 FieldNodes::FieldNodes(const MachineConfig& config, const std::vector<std::string>& columns,
@@ -96,7 +96,7 @@ void FieldNodes::update(nanoseconds now, std::span<const double> row) {
       node->tried_at = now;
       node->socket.open();
     }
-    // Before its first look at the temperatures a node has none to answer with.
+    // A node has no values before its first update.
     if (!std::exchange(node->measured, true)) node->update(now, row);
     while (node->socket.is_open()) {
       const auto frames = node->socket.receive();

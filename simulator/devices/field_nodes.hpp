@@ -1,4 +1,4 @@
-/// The simulated CANopen and J1939 nodes on their interfaces.
+/// Simulated CANopen and J1939 nodes on their interfaces.
 #pragma once
 
 #include <memory>
@@ -13,7 +13,7 @@
 
 namespace thermocomp {
 
-/// A simulated node above CAN frames: fed with frames, times and temperatures, asked for frames.
+/// Simulated node on CAN without I/O: takes frames, times and temperatures, gives frames.
 class FieldNode {
  public:
   FieldNode() = default;
@@ -22,33 +22,33 @@ class FieldNode {
   virtual ~FieldNode() = default;
 
   virtual void take(const CanFrame& frame, nanoseconds now) = 0;
-  /// @param temps_degC  one a channel
+  /// @param temps_degC  by channel
   virtual void update(nanoseconds now, std::span<const double> temps_degC) = 0;
   [[nodiscard]] virtual std::optional<CanFrame> next_frame() = 0;
 };
 
-/// Switches the node on.
+/// Powers the node up.
 [[nodiscard]] std::unique_ptr<FieldNode> switch_on(const SimulatedCanopenNode& node,
                                                    nanoseconds now);
 [[nodiscard]] std::unique_ptr<FieldNode> switch_on(const SimulatedJ1939Node& node, nanoseconds now);
 
 class FieldNodes {
  public:
-  /// @throws std::runtime_error for a column that is missing
+  /// @throws std::runtime_error for a missing column
   FieldNodes(const MachineConfig& config, const std::vector<std::string>& columns,
              const std::string& source);
   ~FieldNodes();
 
-  /// Their lives, and with them the times of their events, begin.
+  /// Powers the nodes up; their event times count from here.
   void switch_on(nanoseconds now);
-  /// Where each node is, for the line that says that the simulator is ready.
+  /// Location of a node, for the ready line.
   struct Place {
     std::string name;
     std::string interface;
-    std::string unavailable;  ///< why its interface is not there; else empty
+    std::string unavailable;  ///< reason why its interface is missing; else empty
   };
   [[nodiscard]] std::vector<Place> places() const;
-  /// @param row  one value a column; nothing happens before switch_on()
+  /// @param row  one value per column; ignored before switch_on()
   void update(nanoseconds now, std::span<const double> row);
 
  private:

@@ -10,7 +10,7 @@
 namespace thermocomp {
 namespace {
 
-// Of the highest byte, or of the whole where that is less.
+// Limits of the highest byte, or of a single byte.
 constexpr std::uint64_t greatest = 0xFA;
 constexpr std::uint64_t beyond = 0xFB;
 constexpr std::uint64_t error_code = 0xFE;
@@ -27,7 +27,7 @@ J1939Sender::J1939Sender(const SimulatedJ1939Node& config, nanoseconds now)
     std::vector<std::uint8_t>& group = groups_[channel.place.pgn];
     const auto bytes = static_cast<std::size_t>(channel.place.length_bits / 8);
     const std::size_t end = static_cast<std::size_t>(channel.place.start_byte) + bytes;
-    group.resize(std::max({group.size(), end, frame_bytes}), 0xFF);  // not available
+    group.resize(std::max({group.size(), end, frame_bytes}), 0xFF);  // "not available"
   }
   claim();
 }
@@ -43,8 +43,8 @@ bool J1939Sender::is_now(const NodeEvent& event, nanoseconds now) const {
   return time_s >= event.at_s && time_s < event.at_s + event.duration_s;
 }
 
-/// What stands in place of the channel's value: the event's code, or the first of its fault, or the
-/// standard's; none: it measures.
+/// Code sent instead of the value: the event's, else the first listed for its fault, else the
+/// standard's; nullopt: no fault.
 std::optional<std::uint64_t> J1939Sender::code_of(std::size_t channel, nanoseconds now) const {
   const auto event =
       std::find_if(config_.events.begin(), config_.events.end(), [&](const NodeEvent& each) {

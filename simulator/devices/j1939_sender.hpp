@@ -1,4 +1,4 @@
-/// A simulated J1939 node: address claim, groups in single frames and broadcast in packets. Pure.
+/// Simulated J1939 node without I/O: address claim, single frames, broadcast packets.
 #pragma once
 
 #include <deque>
@@ -13,7 +13,7 @@ namespace thermocomp {
 
 class J1939Sender final : public FieldNode {
  public:
-  /// Switches it on: it claims its address.
+  /// Powers the node up: claims its address.
   J1939Sender(const SimulatedJ1939Node& config, nanoseconds now);
 
   void take(const CanFrame& frame, nanoseconds now) override;

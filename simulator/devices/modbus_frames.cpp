@@ -10,7 +10,7 @@ constexpr std::size_t pdu_max = 253;
 constexpr std::size_t rtu_frame_min = 4;
 constexpr std::size_t rtu_frame_max = 256;
 
-/// Length of a request on a serial line by its function; empty: not known, or not yet.
+/// Length of a serial request from its function; nullopt: unknown function, or too few bytes.
 std::optional<std::size_t> rtu_length(std::span<const std::uint8_t> bytes) {
   if (bytes.size() < 2) return std::nullopt;
   const std::uint8_t function = bytes[1];

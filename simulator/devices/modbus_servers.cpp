@@ -141,9 +141,10 @@ void ModbusTcpServer::read_requests(const std::shared_ptr<Client>& client) {
 
 void ModbusTcpServer::send(const std::shared_ptr<Client>& client,
                            std::span<const std::uint8_t> bytes) {
-  if (client->file < 0) return;  // gone before a late answer
+  if (client->file < 0) return;  // closed before a late answer
   client->unsent.insert(client->unsent.end(), bytes.begin(), bytes.end());
-  if (client->unsent.size() > unsent_bytes_max) return close_client(client);  // it never reads
+  if (client->unsent.size() > unsent_bytes_max)
+    return close_client(client);  // the client does not read
   flush(client);
 }
 
@@ -176,7 +177,7 @@ void ModbusTcpServer::close_connections() {
 }
 
 void ModbusTcpServer::switch_off() {
-  // The listener first: who sees its connection closed must not get another one in the meantime.
+  // Closes the listener first, so that a client cannot reconnect in the meantime.
   if (listener_ >= 0) {
     loop_.unwatch(listener_);
     ::close(listener_);
@@ -190,13 +191,13 @@ void ModbusTcpServer::switch_on() {
   try {
     listen_at(port_);
   } catch (const std::runtime_error&) {
-    // Taken meanwhile: the caller comes again.
+    // The port is taken; the caller retries.
   }
 }
 
 namespace {
 
-// Far more than 3.5 characters, for a client may be interrupted between two bytes.
+// Far longer than 3.5 characters, since a client may be interrupted between two bytes.
 constexpr nanoseconds silence = std::chrono::milliseconds(20);
 constexpr double bits_a_character = 11.0;
 
@@ -235,7 +236,7 @@ void ModbusRtuLine::open_terminal() {
   }
   termios settings{};
   ::tcgetattr(slave_, &settings);
-  ::cfmakeraw(&settings);  // bytes as they are, and no echo before a client sets it up
+  ::cfmakeraw(&settings);  // no translation and no echo before a client configures it
   ::tcsetattr(slave_, TCSANOW, &settings);
 }
 
@@ -279,7 +280,7 @@ void ModbusRtuLine::handle(bool after_silence) {
     const ModbusFrame frame = find_rtu_frame(received_, after_silence);
     if (frame.state == FrameState::incomplete) return;
     if (frame.state == FrameState::broken) {
-      received_.clear();  // as a unit does: it waits for the next silence
+      received_.clear();  // ignored until the next silence, as by a unit
       return;
     }
     answer(frame);
@@ -306,7 +307,7 @@ void ModbusRtuLine::answer(const ModbusFrame& frame) {
 }
 
 void ModbusRtuLine::write(std::span<const std::uint8_t> bytes) {
-  // A client that never reads fills the terminal's queue; then bytes are lost, as on a wire.
+  // If a client does not read, the terminal's queue fills and further bytes are lost.
   [[maybe_unused]] const ssize_t count = ::write(master_, bytes.data(), bytes.size());
 }
 

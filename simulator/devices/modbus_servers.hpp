@@ -1,4 +1,4 @@
-/// Modbus units on a TCP port and on a serial line.
+/// Servers of Modbus units on a TCP port and on a serial line.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@
 
 namespace thermocomp {
 
-/// What a unit answers; none: it stays silent.
+/// A unit's answer; nullopt: silence.
 using ModbusAnswerer =
     std::function<std::optional<WireAnswer>(std::uint8_t unit, std::span<const std::uint8_t> pdu)>;
 
@@ -24,7 +24,7 @@ class ModbusTcpServer {
  public:
   static constexpr std::size_t clients_max = 128;
 
-  /// Listens at once. @param port 0: any free one. @throws std::runtime_error
+  /// Starts listening. @param port 0: any free port. @throws std::runtime_error
   ModbusTcpServer(EventLoop& loop, const std::string& host, int port, ModbusAnswerer answerer);
   ~ModbusTcpServer();
   ModbusTcpServer(const ModbusTcpServer&) = delete;
@@ -32,9 +32,9 @@ class ModbusTcpServer {
 
   [[nodiscard]] int port() const noexcept { return port_; }
   void close_connections();
-  /// Also refuses new connections, as a device without power.
+  /// Closes all connections and refuses new ones, as a device without power.
   void switch_off();
-  /// Listens again at the same port; tried again at the next call where the port is taken.
+  /// Listens again on the same port; if it is taken, call again.
   void switch_on();
 
  private:
@@ -56,24 +56,25 @@ class ModbusTcpServer {
   std::map<int, std::shared_ptr<Client>> clients_;
 };
 
-/// A serial line with Modbus RTU units on a pseudo terminal, on the simulator's loop.
+/// Serial line with Modbus RTU units on a pseudo terminal.
 struct RtuLineTiming {
   int baud{9600};
-  bool line_delay{false};  ///< request, 3.5 characters of silence and answer take their time
+  bool line_delay{
+      false};  ///< simulates the duration of request, 3.5 characters of silence and answer
 };
 
 class ModbusRtuLine {
  public:
-  /// Opens a pty and puts a symbolic link to its other end at `link`, replacing a link that is
-  /// there already. @throws std::runtime_error
+  /// Opens a pty and creates a symbolic link to its other end at `link`, replacing an existing
+  /// link. @throws std::runtime_error
   ModbusRtuLine(EventLoop& loop, std::filesystem::path link, RtuLineTiming timing,
                 ModbusAnswerer answerer);
-  ~ModbusRtuLine();  ///< removes the link where it is still ours
+  ~ModbusRtuLine();  ///< removes the link unless it was replaced
   ModbusRtuLine(const ModbusRtuLine&) = delete;
   ModbusRtuLine& operator=(const ModbusRtuLine&) = delete;
 
   [[nodiscard]] const std::string& terminal() const noexcept { return terminal_; }
-  void discard();  ///< forgets what has been received of a request, and answers under way
+  void discard();  ///< drops a partial request and pending answers
 
  private:
   void open_terminal();
@@ -88,10 +89,10 @@ class ModbusRtuLine {
   RtuLineTiming timing_;
   ModbusAnswerer answerer_;
   int master_{-1};
-  int slave_{-1};  ///< kept open so that the line survives a client that closes it
+  int slave_{-1};  ///< kept open, so the line survives a client's close
   std::string terminal_;
   std::vector<std::uint8_t> received_;
-  /// Counts receptions; what was scheduled before the line was discarded compares it and gives up.
+  /// Timers compare these counts and do nothing if one has changed since.
   std::uint64_t receptions_{0};
   std::uint64_t discards_{0};
   std::shared_ptr<bool> alive_{std::make_shared<bool>(true)};

@@ -29,12 +29,12 @@ ModbusUnit::Answer refuse(std::span<const std::uint8_t> request, std::uint8_t co
   return {modbus_exception(request[0], code), false};
 }
 
-/// The first five bytes of a request to write, which are the answer to it.
+/// The answer to a write request is its first five bytes.
 ModbusUnit::Answer confirm(std::span<const std::uint8_t> request) {
   return {{request.begin(), request.begin() + 5}, true};
 }
 
-/// A quiet NaN of a float encoding in the registers' order: only its highest word is not 0.
+/// Quiet NaN of a float encoding in register order; only its highest word is nonzero.
 std::vector<std::uint16_t> nan_words(Encoding encoding, WordOrder order) {
   std::vector<std::uint16_t> words(registers_of(encoding), 0);
   const bool low_byte_first = order == WordOrder::badc || order == WordOrder::dcba;

@@ -1,4 +1,4 @@
-/// The registers of one Modbus unit and what it answers. Pure: bytes in, bytes out.
+/// Registers of one Modbus unit and its answers, without I/O.
 /// Source: MODBUS Application Protocol Specification V1.1b3.
 #pragma once
 
@@ -16,8 +16,8 @@ namespace thermocomp {
 
 class ModbusUnit {
  public:
-  /// Makes words exist. Words that nobody defined but that lie between defined ones of a table
-  /// read as 0, as they do in most devices; all others are refused with exception 2.
+  /// Creates words. Undefined words between defined ones of a table read as 0, as in most devices;
+  /// all others are refused with exception 2.
   void define(ModbusTable table, std::uint16_t address, std::size_t words, bool writable);
   void define(const ModbusValue& value, bool writable);
 
@@ -25,12 +25,12 @@ class ModbusUnit {
   void set(ModbusTable table, std::uint16_t address, std::span<const std::uint16_t> words);
   [[nodiscard]] std::uint16_t word(ModbusTable table, std::uint16_t address) const;
 
-  /// Writes a value as it stands in registers, saturated where it does not fit; NaN as a float's
-  /// NaN or an integer's highest code (a thermocouple module's upscale burn-out).
+  /// Encodes a value; saturates; NaN becomes a float's NaN or an integer's highest code (upscale
+  /// burn-out of a thermocouple module).
   void set_value(const ModbusValue& place, double offset, double value);
-  /// Writes a raw code as it is, whatever the scale.
+  /// Writes a raw code, without scale.
   void set_code(const ModbusValue& place, std::int64_t code);
-  [[nodiscard]] double value(const ModbusValue& place) const;  ///< NaN where it is no number
+  [[nodiscard]] double value(const ModbusValue& place) const;  ///< NaN if not a number
 
   struct Answer {
     std::vector<std::uint8_t> pdu;

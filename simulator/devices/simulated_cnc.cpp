@@ -116,7 +116,7 @@ void SimulatedCnc::stand_at(std::size_t axis, double now_s, double position_mm) 
   tool_um_[axis] += change;
 }
 
-/// A line goes on beyond the ends of its travel, a table does not.
+/// A line is extrapolated beyond its travel, a table is not.
 double SimulatedCnc::between_nodes_um(std::size_t axis, double position_mm) const {
   const TravelShape& travel = config_.axes[axis].travel->shape();
   const std::vector<double>& nodes_mm = travel.nodes_mm;

@@ -1,5 +1,4 @@
-/// What the simulated machine controller does with the offsets it is told. Pure: the time is
-/// passed in (real time, for that is the time the one who writes lives in).
+/// Simulated machine controller, without I/O. Times are arguments, in real time.
 #pragma once
 
 #include <cstdint>
@@ -12,16 +11,16 @@
 
 namespace thermocomp {
 
-/// A play of `dead_band_V` between the voltage and what the stack feels of it: v follows u within
-/// u - dead_band_V <= v <= u, and the displacement is the curve at v. So after every turn nothing
-/// moves for the dead band, rising and falling voltage give two branches a dead band apart, and
-/// whoever comes from 0 V is always on the rising one.
+/// Hysteresis by a play of `dead_band_V`: the effective voltage v follows u within u - dead_band_V
+/// <= v <= u, and the displacement is the curve at v. After a turn nothing moves for the dead band;
+/// rising and falling voltage give two branches a dead band apart. Coming from 0 V is always on the
+/// rising branch.
 class SimulatedPiezo {
  public:
-  /// @pre the curve is as SimulatedPiezoConfig says
+  /// @pre the curve meets SimulatedPiezoConfig's rules
   explicit SimulatedPiezo(const SimulatedPiezoConfig& config);
 
-  /// @return displacement [um]. NaN leaves it where it is.
+  /// @return displacement [um]. NaN changes nothing.
   double step(double volt) noexcept;
   [[nodiscard]] double displacement_um() const noexcept;
 
@@ -30,53 +29,55 @@ class SimulatedPiezo {
   double felt_V_{0.0};
 };
 
-/// What stands in the controller's registers or came in frames.
+/// Values received by the controller.
 struct CncOrder {
-  /// Order of the axes, of one that it interpolates along its travel all nodes; NaN: never told.
+  /// In the order of the axes; all nodes of an interpolated axis. NaN: none received.
   std::vector<double> offset_um;
   std::uint64_t valid_bits{~std::uint64_t{0}};
   double heartbeat{0.0};
-  /// One an axis: the number of its set, where that is shown with what is applied; else empty.
+  /// Set number by axis, if shown with the applied values; else empty.
   std::vector<std::uint64_t> set_numbers{};
 };
 
-/// An axis takes a new offset while its valid bit is set, the offset is within the controller's own
-/// bound and the heartbeat has changed within its time; else the applied offset stays where it is.
-/// The applied offset follows with time constant and rate; of a travel that of each node, all of
-/// them or none taken, and the tool follows what lies between them where its slide stands.
+/// An axis takes a new offset while its valid bit is set, the offset is within the controller's
+/// bound and the heartbeat has changed within its timeout; else the applied offset holds. The
+/// applied offset follows with a time constant and a slew limit. The nodes of a travel are taken
+/// all or none, and the tool follows the interpolation at the slide's position.
 class SimulatedCnc {
  public:
   explicit SimulatedCnc(const SimulatedController& config);
 
-  /// Something was written. @pre order.offset_um has one value an axis or node (checked)
+  /// Handles a write. @pre order.offset_um has one value per axis or node (checked)
   void take(double now_s, const CncOrder& order);
-  /// Time passes. @pre now_s does not fall
-  /// @return whether the axes were homed just now: what stood in the registers is void
+  /// Advances the time. @pre now_s does not decrease
+  /// @return the axes were homed just now, which voids the registers' values
   bool step(double now_s, const ControllerEffect& effect);
-  /// Power lost or axes homed: applied and wanted offsets are zero until the next order.
+  /// Power loss or homing: applied and wanted offsets are zero until the next order.
   void forget();
 
-  /// It looks at the slide of an axis that it interpolates, as often as this is called; the tool
-  /// follows, also without a heartbeat. @pre now_s does not fall; the axis has a travel
+  /// Interpolates at the slide's position, also without a heartbeat; the tool follows. @pre now_s
+  /// does not decrease; the axis has a travel
   void stand_at(std::size_t axis, double now_s, double position_mm);
 
-  /// What moves the tool.
+  /// Offset at the tool.
   [[nodiscard]] double applied_um(std::size_t axis) const {
     if (config_.axes[axis].travel) return tool_um_.at(axis);
     return piezos_.at(axis) ? piezos_[axis]->displacement_um() : applied_um_[first_[axis]];
   }
-  /// What it says: the offset, of a piezo the voltage.
+  /// Reported value: the offset, or a piezo's voltage.
   [[nodiscard]] double shown(std::size_t axis) const { return nodes(axis).front(); }
-  /// Of a travel the offset of each node.
+  /// Applied offset of each node.
   [[nodiscard]] std::span<const double> nodes(std::size_t axis) const {
     return std::span(applied_um_).subspan(first_.at(axis), config_.axes[axis].offsets());
   }
-  /// The number of the set that is in effect; 0 before the first.
+  /// Number of the set in effect; 0 before the first.
   [[nodiscard]] std::uint64_t set_number(std::size_t axis) const { return set_numbers_.at(axis); }
-  /// Where the offsets of an axis begin among those of an order.
+  /// Index of the axis' first offset in an order.
   [[nodiscard]] std::size_t first(std::size_t axis) const { return first_.at(axis); }
-  [[nodiscard]] bool alive() const noexcept { return alive_; }    ///< the heartbeat beats
-  [[nodiscard]] bool beaten() const noexcept { return beaten_; }  ///< has it ever
+  [[nodiscard]] bool alive() const noexcept { return alive_; }  ///< the heartbeat changes
+  [[nodiscard]] bool beaten() const noexcept {
+    return beaten_;
+  }  ///< the heartbeat has ever changed
 
  private:
   void take_axis(std::size_t axis, const CncOrder& order);
@@ -84,11 +85,11 @@ class SimulatedCnc {
   [[nodiscard]] double between_nodes_um(std::size_t axis, double position_mm) const;
 
   SimulatedController config_;
-  std::vector<std::size_t> first_;  ///< one an axis, among the offsets
+  std::vector<std::size_t> first_;  ///< by axis: index of its first offset
   std::vector<double> wanted_um_;
-  std::vector<double> applied_um_;   ///< of a piezo volts, as `wanted_um_`
-  std::vector<double> tool_um_;      ///< one an axis: what is interpolated
-  std::vector<double> looked_at_s_;  ///< one an axis
+  std::vector<double> applied_um_;   ///< volts for a piezo, as in `wanted_um_`
+  std::vector<double> tool_um_;      ///< by axis: interpolated offset
+  std::vector<double> looked_at_s_;  ///< by axis
   std::vector<std::uint64_t> set_numbers_;
   std::vector<std::optional<SimulatedPiezo>> piezos_;
   bool rejects_{false};

@@ -20,7 +20,7 @@ void read_form(const TomlTable& table, CanUse use, CanSignal& signal) {
   signal.offset = table.number(offset, Range::between(-1e6, 1e6), signal.offset);
 }
 
-/// Whether no frame can have both: a multiplexor that both hang on selects one or the other.
+/// No frame can carry both: a common multiplexor has different values for them.
 bool apart(const CanSignal& a, const CanSignal& b) {
   return std::any_of(a.selectors.begin(), a.selectors.end(), [&](const CanSelector& one) {
     return std::any_of(b.selectors.begin(), b.selectors.end(), [&](const CanSelector& other) {

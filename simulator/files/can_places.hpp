@@ -1,4 +1,4 @@
-/// Where values stand in the frames of a simulated machine's CAN nodes.
+/// Reads the places of values in the CAN frames of a simulated machine, and finds overlaps.
 #pragma once
 
 #include <map>
@@ -11,25 +11,25 @@
 
 namespace thermocomp {
 
-/// What a value's offset is called, and its sign. Only temperatures may be multiplexed.
+/// Selects the key of a value's offset, and its sign. Only temperatures may be multiplexed.
 enum class CanUse { temperature, signal, bits };
 
 [[nodiscard]] CanSignal read_can(const TomlTable& table, CanUse use);
-/// A counter in the frames of the signal, if the table has one.
+/// The counter in the signal's frames, if the table has one.
 [[nodiscard]] std::optional<CanField> read_counter(const TomlTable& table, const CanSignal& signal);
 
-/// Which bits of the frames of a bus are taken: two values of one frame must not share any.
+/// Bits in use in the frames of a bus; values of one frame must not overlap.
 class FramesTaken {
  public:
-  /// @return whether all bits of the value and its multiplexors were free; takes them
+  /// Takes the bits of the value and its multiplexors. @return all were free
   bool take(const CanSignal& signal);
-  /// The same for a counter in its frame; several values may name one counter.
+  /// Likewise for a counter in its frame, which several values may share.
   bool take(const CanSignal& signal, const CanField& counter);
 
  private:
   struct Frame {
     std::vector<CanSignal> values;
-    std::vector<CanField> fields;  ///< multiplexors and counters, which are in every frame
+    std::vector<CanField> fields;  ///< multiplexors and counters, present on every page
   };
   static bool take(Frame& frame, const CanField& field);
 

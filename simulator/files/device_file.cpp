@@ -28,10 +28,10 @@ const Names<WordOrder> order_names{{"ABCD", WordOrder::abcd},
                                    {"BADC", WordOrder::badc},
                                    {"CDAB", WordOrder::cdab}};
 
-/// Which words of a unit's tables, or bits of a frame, are taken: two values must not share any.
+/// Words of a unit's tables, or bits of a frame, in use; values must not overlap.
 class Occupied {
  public:
-  /// @return whether all of them were free; takes them
+  /// Takes the words. @return all were free
   bool take(int unit, ModbusTable table, std::size_t address, std::size_t count,
             std::uint16_t mask = 0xFFFF) {
     return words_.take(unit, table, address, count, mask);
@@ -71,7 +71,7 @@ const Names<SimulatedBusKind> bus_kind_names{{"modbus_tcp", SimulatedBusKind::mo
                                              {"modbus_rtu", SimulatedBusKind::modbus_rtu},
                                              {"can", SimulatedBusKind::can}};
 
-/// A value's place in registers; what the table leaves out comes from `defaults`.
+/// A value's register place; missing keys come from `defaults`.
 ModbusValue read_place(const TomlTable& table, const ModbusValue& defaults) {
   ModbusValue value;
   value.table = table.choice("table", table_names, defaults.table);
@@ -85,35 +85,35 @@ ModbusValue read_place(const TomlTable& table, const ModbusValue& defaults) {
   return value;
 }
 
-/// Codes of any encoding; whether a channel's own can express them is looked at there.
+/// Codes of any encoding; each channel checks them against its own.
 FaultCodes read_codes(const TomlTable& table) {
   return read_fault_codes(table, -4294967296LL, 4294967295LL);
 }
 
-/// What is gathered while the file is read.
+/// State while reading the file.
 struct Draft {
   MachineConfig& machine;
   NameList buses;
   NameList devices;
   NameList channels;
-  std::vector<std::pair<std::size_t, std::size_t>> channel_places;  ///< device, channel in it
+  std::vector<std::pair<std::size_t, std::size_t>> channel_places;  ///< device and its channel
   std::vector<std::string> columns;                                 ///< of the plant
   std::map<std::size_t, Occupied> occupied;                         ///< by bus
 };
 
-/// The register keys that a device gives its channels as defaults.
+/// Register keys that a device gives its channels as defaults.
 struct DeviceDefaults {
   ModbusValue place;
   double offset_degC{0.0};
   FaultCodes codes;
   int base_address{0};  ///< added to the addresses of all registers
-  TomlTable table;      ///< over its preset, if it has one
+  TomlTable table;      ///< own keys over the preset's, if any
   const sections::Preset* preset{nullptr};
 };
 
 void check_column(const Draft& state, const TomlTable& table, std::string_view key,
                   const std::string& column) {
-  if (!state.machine.plant) return;  // a replayed file has its own columns
+  if (!state.machine.plant) return;  // a replayed file defines the columns
   const auto& columns = state.columns;
   if (std::find(columns.begin(), columns.end(), column) != columns.end()) return;
   std::string rule = "must be a column of the plant";
@@ -137,7 +137,7 @@ void take(Draft& state, std::size_t bus, const CanSignal& signal, const TomlTabl
   }
 }
 
-/// The device over its preset, if it names one that can be read.
+/// The device's keys over those of its preset, if it has a readable one.
 DeviceDefaults find_preset(sections::Presets& presets, const TomlTable& own, bool can) {
   DeviceDefaults defaults{{}, 0.0, {}, 0, own, presets.of_device(own)};
   if (defaults.preset == nullptr) return defaults;
@@ -182,14 +182,14 @@ DeviceDefaults read_device(Draft& state, const TomlTable& own, sections::Presets
   return defaults;
 }
 
-/// Adds the device's first register; what would pass the last one is a problem.
+/// Adds the device's base address; reports a result beyond the last register.
 std::uint16_t moved(const TomlTable& table, std::uint16_t address, int base_address) {
   if (address + base_address <= 65535) return static_cast<std::uint16_t>(address + base_address);
   table.problem("address", "would pass register 65535 with the device's base_address");
   return address;
 }
 
-/// A code given as the bits of a signed number, such as 0x8000 for -32768, is that number.
+/// Converts a code given as the bits of a signed number, such as 0x8000 for -32768.
 std::int64_t signed_code(std::int64_t code, Encoding encoding) {
   if (encoding == Encoding::int16 && code > INT16_MAX && code <= UINT16_MAX) return code - 0x10000;
   if (encoding == Encoding::int32 && code > INT32_MAX && code <= UINT32_MAX)
@@ -263,7 +263,7 @@ void read_channel(Draft& state, const TomlTable& own, const std::vector<DeviceDe
   device.channels.push_back(channel);
 }
 
-/// Controllers: a value's place in registers or in frames.
+/// Reads the place of a controller's value, in registers or frames.
 template <class Registers, class Frame>
 void read_value(Draft& state, const TomlTable& table, ModbusTable usual, std::size_t bus,
                 Registers& registers, Frame& frame, CanUse use = CanUse::signal) {
@@ -296,7 +296,7 @@ SimulatedPiezoConfig read_piezo(const TomlTable& table) {
   return piezo;
 }
 
-/// The simulated controller has the bound of its file and no slew limit of its own.
+/// Only the bound: the simulated controller's slew limit is separate.
 LimiterConfig bound_of(double offset_um_max) {
   LimiterConfig limiter;
   limiter.offset_um_max = offset_um_max;
@@ -304,8 +304,8 @@ LimiterConfig bound_of(double offset_um_max) {
   return limiter;
 }
 
-/// What the daemon sends and the controller shows in frames of its own; a bit that a set takes
-/// twice is a problem of the section already.
+/// Reads the frames of a travel: sent by the daemon and shown by the controller. The section
+/// reports bits used twice within a set.
 CanTravel read_travel_frames(Draft& state, const TomlTable& axis, double offset_um_max,
                              std::size_t bus) {
   sections::TakenBits sent;
@@ -320,7 +320,7 @@ CanTravel read_travel_frames(Draft& state, const TomlTable& axis, double offset_
   return travel;
 }
 
-/// [axis.line] or [axis.table], by the keys that the daemon's file has.
+/// Reads [axis.line] or [axis.table] with the keys of the daemon's file.
 SimulatedTravel read_travel(Draft& state, const TomlTable& axis, double offset_um_max,
                             std::size_t bus) {
   const TomlTable table = sections::travel_table(axis);
@@ -461,7 +461,7 @@ void read_target(const Draft& state, const TomlTable& table, EventConfig& event)
   }
 }
 
-/// Which sorts of target an event may have.
+/// An event of this kind may have this kind of target.
 bool fits(MachineEventKind kind, TargetKind target, bool can) {
   switch (kind) {
     case MachineEventKind::open_circuit:
@@ -500,12 +500,12 @@ bool on_can(const Draft& state, const EventConfig& event) {
   return bus < machine.buses.size() && machine.buses[bus].kind == SimulatedBusKind::can;
 }
 
-/// A channel can only be made to show what its device has a code for; any can have an open circuit.
+/// A channel can only show faults for which its device has a code, except an open circuit.
 void read_channel_code(const Draft& state, const TomlTable& table, EventConfig& event) {
   const auto fault = channel_fault(event.kind);
   if (!fault || event.target != TargetKind::channel || state.machine.devices.empty()) return;
   const auto& channels = state.machine.devices[event.device].channels;
-  if (event.channel >= channels.size()) return;  // refused already
+  if (event.channel >= channels.size()) return;  // already reported
   const SimulatedChannel& channel = channels[event.channel];
   const auto has = [&](const FaultCodes& codes) { return codes.contains(*fault); };
   if (!has(channel.codes) && !(channel.status && has(channel.status->codes)) &&
@@ -585,7 +585,7 @@ void read_devices(const TomlTable& root, sections::Presets& presets, MachineConf
     defaults.push_back(read_device(state, table, presets));
   }
   if (machine.buses.empty()) {
-    machine.devices.clear();  // each was refused already: it names no bus
+    machine.devices.clear();  // already reported: they name no bus
   }
   for (const TomlTable& table : root.tables("channel")) read_channel(state, table, defaults);
   if (root.has("controller")) {

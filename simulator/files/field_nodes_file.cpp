@@ -13,7 +13,7 @@ constexpr double large = 1e9;
 
 std::string read_column(const TomlTable& table, const MachineConfig& machine) {
   std::string column = table.text("column");
-  if (!machine.plant || column.empty()) return column;  // a replayed file has its own columns
+  if (!machine.plant || column.empty()) return column;  // a replayed file defines the columns
   const std::vector<std::string> columns = plant_columns(*machine.plant);
   if (std::find(columns.begin(), columns.end(), column) != columns.end()) return column;
   const std::string near = nearest_name(column, columns);
@@ -75,7 +75,7 @@ void check_event(const TomlTable& table, const SimulatedJ1939Node& node, const N
   const J1939NodeChannel& channel = node.channels[event.channel];
   if (lists(channel.codes, event)) return;
   const int bits = channel.place.length_bits;
-  // Those of the standard: 0xFB and more in the highest byte.
+  // Codes of the standard: 0xFB and more in the highest byte.
   const bool is_standard = event.code && *event.code >= (std::int64_t{0xFB} << (bits - 8)) &&
                            *event.code < (std::int64_t{1} << bits);
   const bool has_first = !event.code && (event.kind == NodeEventKind::open_circuit ||
@@ -102,7 +102,7 @@ FaultCodes read_codes(const TomlTable& channel, const TomlTable& device) {
   return codes;
 }
 
-/// Where the preset has the channel, and what it can show there.
+/// Takes the channel's place and codes from the preset.
 void place_channel(const TomlTable& own, const TomlTable& device, const sections::Preset& preset,
                    const sections::CanopenDevice& known, CanopenNodeChannel& channel) {
   const sections::EdsFiles no_files{std::nullopt};
@@ -116,7 +116,7 @@ void place_channel(const TomlTable& own, const TomlTable& device, const sections
 
 void read_node(const TomlTable& table, NameList& names, sections::Presets& presets,
                const MachineConfig& machine, SimulatedCanopenNode& node) {
-  constexpr std::size_t channels_max = 4;  // of 16 bits in TPDO 1
+  constexpr std::size_t channels_max = 4;  // 16 bits each in TPDO 1
   node.name = names.read(table);
   node.interface = table.text("interface");
   node.node = table.integer("node", 1, 127);
@@ -143,7 +143,7 @@ void read_node(const TomlTable& table, NameList& names, sections::Presets& prese
   read_events(table, node);
 }
 
-/// In its group, or a temperature of two bytes as the standard has it.
+/// Reads a channel's place in its group; default: the standard's two-byte temperature.
 J1939NodeChannel read_j1939_place(const TomlTable& own, const TomlTable& device,
                                   const sections::Preset* preset) {
   J1939NodeChannel channel;

@@ -43,7 +43,8 @@ SimulatedStatus read_simulated_status(const TomlTable& table) {
 
 CanStatusCodes read_can_status_codes(const TomlTable& table) {
   CanStatusCodes status;
-  status.codes = read_fault_codes(table, INT64_MIN, INT64_MAX);  // the place's reader has limits
+  status.codes =
+      read_fault_codes(table, INT64_MIN, INT64_MAX);  // limited by the place's encoding elsewhere
   const auto good = table.integers("good_codes", INT64_MIN, INT64_MAX, std::vector<std::int64_t>{});
   if (!good.empty()) status.good = good.front();
   return status;
@@ -74,7 +75,7 @@ MachineConfig read_machine(const TomlDocument& document, sections::Presets prese
     machine.plant = read_plant(root, std::filesystem::path(document.name()).parent_path());
   read_devices(root, presets, machine);
   read_field_nodes(root, presets, machine);
-  presets.ignore_rest();  // not every key of a device is a simulated one's
+  presets.ignore_rest();  // simulated devices do not use every key
   std::vector<Problem> problems = document.all_problems();
   const std::vector<Problem> preset_problems = presets.problems();
   problems.insert(problems.end(), preset_problems.begin(), preset_problems.end());

@@ -1,4 +1,4 @@
-/// The machine file of the simulator: TOML, strict; config/examples/machine.toml is its reference.
+/// Reads the simulator's machine file (strict TOML); reference: config/examples/machine.toml.
 #pragma once
 
 #include <filesystem>
@@ -8,9 +8,9 @@
 
 namespace thermocomp {
 
-/// @throws ConfigurationError with every problem, by file, line, key, value and rule
+/// @throws ConfigurationError with every problem: file, line, key, value, rule
 [[nodiscard]] MachineConfig load_machine(const std::filesystem::path& path);
-/// @param name stands for the file in problems
+/// @param name  file name for problems
 [[nodiscard]] MachineConfig parse_machine(std::string text, std::string name);
 
 }  // namespace thermocomp

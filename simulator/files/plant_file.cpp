@@ -165,7 +165,7 @@ ThermocoupleConfig read_thermocouple(const TomlTable& table, NameList& thermocou
   return thermocouple;
 }
 
-/// Binds the body's sources to signals and its rows to the outputs.
+/// Assigns the body's sources to signals, and its rows to outputs.
 void read_body_of(const TomlTable& table, const std::filesystem::path& folder,
                   const NameList& signals, PlantConfig& plant) {
   const std::string file = table.text("body");
@@ -186,7 +186,7 @@ void read_body_of(const TomlTable& table, const std::filesystem::path& folder,
     plant.body_axes.push_back(signals.index_of(table, "body", guideway.axis, "signal"));
 }
 
-/// Lumps, what joins them and what warms them.
+/// Reads lumps, links and heat sources.
 void read_lumps(const TomlTable& root, const NameList& signals, const NameList& outputs,
                 NameList& nodes, PlantConfig& plant) {
   for (const TomlTable& table : root.tables_required("node")) {

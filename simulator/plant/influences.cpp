@@ -69,7 +69,7 @@ double OperatingSignal::random_value(double time_s) {
 
 namespace {
 
-constexpr std::uint64_t stream = 0x526F6F6Du;  // any number that no other part uses
+constexpr std::uint64_t stream = 0x526F6F6Du;  // arbitrary, unique to this file
 
 }  // namespace
 

@@ -1,4 +1,4 @@
-/// What acts on a simulated body: operating signals and the air of the room.
+/// Inputs of a simulated body: operating signals and room air.
 #pragma once
 
 #include <cstdint>
@@ -8,14 +8,14 @@
 
 namespace thermocomp {
 
-/// What the machine does over time: one signal, a pure function of plant time and seed.
+/// One operating signal, a pure function of plant time and seed.
 class OperatingSignal {
  public:
-  /// @param stream  tells the random choices of several signals apart
+  /// @param stream  selects independent random numbers
   OperatingSignal(const SignalConfig& config, std::uint64_t seed, std::uint64_t stream);
 
   /// @param time_s   plant time, >= 0
-  /// @param watched  the watched signal at that time (while_above only)
+  /// @param watched  value of the watched signal (while_above only)
   [[nodiscard]] double value(double time_s, double watched = 0.0);
 
  private:
@@ -26,15 +26,15 @@ class OperatingSignal {
   SignalConfig config_;
   std::uint64_t seed_;
   std::uint64_t stream_;
-  std::vector<double> changes_s_;  ///< random: when piece i ends; grows as time goes on
+  std::vector<double> changes_s_;  ///< random: end of piece i; extended as needed
 };
 
-/// The temperature of the workshop's air over a day.
+/// Temperature of the room's air over a day.
 class RoomAir {
  public:
   RoomAir(const RoomConfig& config, std::uint64_t seed);
 
-  /// Goes one step of plant time on: only the slow wander has a memory.
+  /// Advances by one step of plant time; only the slow wander has a state.
   void step(double step_s);
   [[nodiscard]] double temp_degC(double time_s) const;
 

@@ -1,4 +1,4 @@
-/// The whole simulated machine as its file gives it: body, buses, devices, controller, events.
+/// Configuration of the simulated machine: body, buses, devices, controller, events.
 #pragma once
 
 #include <cstddef>
@@ -20,16 +20,16 @@ enum class SimulatedBusKind { modbus_tcp, modbus_rtu, can };
 struct SimulatedBus {
   std::string name;
   SimulatedBusKind kind{SimulatedBusKind::modbus_tcp};
-  std::string host{"127.0.0.1"};  ///< address to listen at
-  int port{0};                    ///< 0: any free one, named when ready
-  std::string device;             ///< RTU: a symbolic link to the pty is put here
+  std::string host{"127.0.0.1"};  ///< listening address
+  int port{0};                    ///< 0: any free port, printed in the ready line
+  std::string device;             ///< RTU: path of the symbolic link to the pty
   int baud{9600};
-  bool line_delay{false};     ///< RTU: bytes take the time that the baud rate implies
-  double turnaround_ms{0.0};  ///< a unit thinks so long before it answers
+  bool line_delay{false};     ///< RTU: simulates the duration of bytes at the baud rate
+  double turnaround_ms{0.0};  ///< delay of a unit's answer
   std::string interface;      ///< CAN
 };
 
-/// A register or bit beside a value; it has `good` in the bits of its mask while all is well.
+/// Status register or bit of a value; the bits of its mask equal `good` without a fault.
 struct SimulatedStatus {
   ModbusTable table{ModbusTable::discrete_input};
   std::uint16_t address{0};
@@ -40,22 +40,22 @@ struct SimulatedStatus {
 
 /// One measured value in a device's registers or frames.
 struct SimulatedChannel {
-  std::string name;    ///< what events call it
+  std::string name;    ///< name in events
   std::string column;  ///< of the plant or of the replayed run file
   ModbusValue place;   ///< value = raw * scale + offset_degC
   double offset_degC{0.0};
-  CanSignal can;                      ///< on a CAN bus instead of `place`
-  std::optional<CanField> counter{};  ///< in its frame, counts conversions
-  FaultCodes codes;                   ///< in place of the value
+  CanSignal can;                      ///< on CAN instead of `place`
+  std::optional<CanField> counter{};  ///< counts conversions in its frame
+  FaultCodes codes;                   ///< instead of the value
   std::optional<SimulatedStatus> status;
-  CanStatusCodes can_status{};  ///< numbers of the status that `can` has
+  CanStatusCodes can_status{};  ///< codes of the status in `can`
 };
 
 struct SimulatedDevice {
   std::string name;
   std::size_t bus{0};
   int unit{1};
-  double period_s{0.02};                 ///< converts (CAN: sends) every so often, real time
+  double period_s{0.02};                 ///< period of conversions (CAN: of frames), real time
   std::optional<ModbusRenewal> renewal;  ///< counts conversions
   std::vector<SimulatedChannel> channels;
 };
@@ -64,28 +64,26 @@ struct SimulatedControllerSignal {
   std::string name;  ///< column
   ModbusValue place;
   CanSignal can;
-  std::optional<double> value;  ///< shown where no column of that name exists
-  /// An output: shows what is left of it at the tool, displacement and offset together, as a probe
-  /// would find it.
+  std::optional<double> value;  ///< shown if there is no column of that name
+  /// Output measured by a probe: displacement plus offset at the tool.
   std::optional<std::string> probe_of{};
-  double noise_um{0.0};  ///< standard deviation of the probe
+  double noise_um{0.0};  ///< probe's standard deviation
 };
 
-/// The axis is a stacked piezo: its register is a voltage.
+/// Stacked piezo as the axis' drive; its register is a voltage.
 struct SimulatedPiezoConfig {
-  double dead_band_V{0.0};       ///< after each turn nothing moves for so long
-  std::vector<double> curve_V;   ///< felt by the stack; begins with 0, both strictly increase
-  std::vector<double> curve_um;  ///< displacement then
+  double dead_band_V{0.0};       ///< no motion for this range after each turn
+  std::vector<double> curve_V;   ///< effective voltage; begins with 0; both lists strictly increase
+  std::vector<double> curve_um;  ///< displacement at curve_V
 };
 
-/// The controller interpolates along the travel: by the position that it has itself, as often as
-/// it looks at it.
+/// The controller interpolates along the travel at its own position, in its own cycle.
 struct SimulatedTravel {
   ModbusTravel registers;
   std::string position;                    ///< column of the plant
   double interpolation_um_per_s_max{0.0};  ///< real time; 0: at once
   std::optional<CanTravel> frames{};       ///< on CAN instead of `registers`
-  double frame_age_s_max{1.0};             ///< CAN: an older frame is part of no set
+  double frame_age_s_max{1.0};             ///< CAN: older frames do not complete a set
 
   [[nodiscard]] const TravelShape& shape() const noexcept {
     return frames ? static_cast<const TravelShape&>(*frames) : registers;
@@ -94,18 +92,18 @@ struct SimulatedTravel {
 
 struct SimulatedAxis {
   std::string name;
-  std::string output;             ///< displacement that this axis' offset acts on
-  double sign{1.0};               ///< -1: the controller counts offsets the other way
-  double offset_um_max{0.0};      ///< what the controller is willing to apply; 0: anything
-  double rate_um_per_s_max{0.0};  ///< how fast, real time; 0: at once
+  std::string output;             ///< displacement that the axis' offset changes
+  double sign{1.0};               ///< -1: the controller's positive direction is opposite
+  double offset_um_max{0.0};      ///< controller's bound; 0: none
+  double rate_um_per_s_max{0.0};  ///< controller's slew limit, real time; 0: none
   ModbusValue offset;
   std::optional<ModbusValue> applied;
   CanSignal can_offset;
   std::optional<CanSignal> can_applied;
   std::optional<SimulatedPiezoConfig> piezo{};
-  std::optional<SimulatedTravel> travel{};  ///< in place of `offset` and `applied`
+  std::optional<SimulatedTravel> travel{};  ///< instead of `offset` and `applied`
 
-  /// How many offsets it takes.
+  /// Number of offsets.
   [[nodiscard]] std::size_t offsets() const noexcept {
     return travel ? travel->shape().nodes_mm.size() : 1;
   }
@@ -114,7 +112,7 @@ struct SimulatedAxis {
 struct SimulatedController {
   SimulatedBus bus;
   int unit{1};
-  double period_s{0.05};            ///< CAN: sends every so often, real time
+  double period_s{0.05};            ///< CAN: period of frames, real time
   double tau_s{0.0};                ///< first-order approach to the offset, real time; 0: at once
   double heartbeat_timeout_s{2.0};  ///< real time; 0: not watched
   std::optional<ModbusValue> valid_bits;
@@ -126,22 +124,22 @@ struct SimulatedController {
 };
 
 enum class MachineEventKind {
-  open_circuit,  ///< a channel's thermocouple is broken
+  open_circuit,  ///< broken thermocouple of a channel
   short_circuit,
   over_range,
   under_range,
-  channel_error,  ///< the device says that it cannot measure the channel
-  freeze,         ///< a channel, or all of a device, shows its last value for ever
-  spike,          ///< a channel shows change_K too much
-  drift,          ///< a channel departs at rate_K_per_h
+  channel_error,  ///< the device reports a measuring error of the channel
+  freeze,         ///< a channel or device holds its last value
+  spike,          ///< a channel's value is change_K too high
+  drift,          ///< a channel drifts by rate_K_per_h
   drop,           ///< no answer, no frame
   delay,          ///< the answer comes delay_ms late
   garbage,        ///< the answer is random bytes
   exception,      ///< the answer is Modbus exception `code`
-  reboot,         ///< connections closed; nothing for the duration; a controller forgets its offset
-  reject,         ///< the controller answers, but leaves the offset as it is
-  misapply,       ///< the controller applies change_um more than was sent
-  rehome          ///< the controller's applied offset falls to zero until it is written anew
+  reboot,         ///< connections close, silence for the duration; a controller loses its offset
+  reject,         ///< the controller answers without changing the offset
+  misapply,       ///< the controller applies the offset plus change_um
+  rehome          ///< the controller's offset is zero until written again
 };
 
 enum class TargetKind { channel, device, bus, controller };
@@ -149,7 +147,7 @@ enum class TargetKind { channel, device, bus, controller };
 struct EventConfig {
   MachineEventKind kind{MachineEventKind::drop};
   TargetKind target{TargetKind::device};
-  std::size_t device{0};  ///< of a channel or device
+  std::size_t device{0};  ///< target, or the channel's device
   std::size_t channel{0};
   std::size_t bus{0};
   double at_s{0.0};        ///< plant time
@@ -159,19 +157,19 @@ struct EventConfig {
   double rate_K_per_h{0.0};
   double delay_ms{0.0};  ///< real time
   int code{6};
-  std::optional<std::int64_t> channel_code;  ///< of a channel's fault; none: the first listed
+  std::optional<std::int64_t> channel_code;  ///< code of a channel's fault; none: the first listed
 };
 
 struct MachineConfig {
   std::uint64_t seed{1};
   double duration_s{0.0};            ///< plant time; 0: until stopped
-  double pitch_s{10.0};              ///< of simulated run files and truth files, plant time
-  std::optional<PlantConfig> plant;  ///< none: such a machine can only replay a run file
+  double pitch_s{10.0};              ///< sample pitch of simulated run and truth files, plant time
+  std::optional<PlantConfig> plant;  ///< none: the machine can only replay a run file
   std::vector<SimulatedBus> buses;
   std::vector<SimulatedDevice> devices;
   std::optional<SimulatedController> controller;
   std::vector<EventConfig> events;
-  std::vector<SimulatedNode> field_nodes;  ///< by kind, those of one kind as in the file
+  std::vector<SimulatedNode> field_nodes;  ///< by kind, then in the file's order
 };
 
 }  // namespace thermocomp

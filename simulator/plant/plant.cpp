@@ -60,8 +60,8 @@ void add_scaled(double factor, const std::vector<double>& values, std::vector<do
 
 }  // namespace
 
-/// The plant lives on a grid of steps; what is seen between two grid points is computed from the
-/// last grid point each time, so that looking changes nothing.
+/// The state advances on a grid of steps. Values between grid points are computed from the last
+/// grid point, so that reading them changes nothing.
 struct Plant::Parts {
   PlantConfig config;
   std::uint64_t seed;
@@ -69,16 +69,16 @@ struct Plant::Parts {
   std::vector<OperatingSignal> generators;
   ThermalNetwork dry;
   ThermalNetwork flooded;
-  std::vector<double> start_degC;  ///< a lump, or the body's states
+  std::vector<double> start_degC;  ///< by lump, or the body's states
   std::uint64_t grid_index{0};
   std::vector<double> grid_degC;         ///< lumps at the grid point
   std::vector<double> grid_lagged_degC;  ///< thermocouples before noise at the grid point
   std::vector<double> inflow_W;          ///< heat, room and coolant over the present step
-  std::vector<double> sources_W;         ///< of which sources
+  std::vector<double> sources_W;         ///< share of the sources
   bool coolant_flows{false};
   double room_degC{0.0};
   double coolant_degC{0.0};
-  double time_s{0.0};  ///< what follows is seen at this time
+  double time_s{0.0};  ///< time of the values below
   std::vector<double> signals;
   std::vector<double> now_degC;
   std::vector<double> now_lagged_degC;
@@ -172,7 +172,7 @@ struct Plant::Parts {
     return nodes[thermocouple.node];
   }
 
-  /// From the grid point `dt_s` on, into `nodes` and `lagged`.
+  /// Computes `nodes` and `lagged` at `dt_s` after the grid point.
   void look_ahead(double dt_s, std::vector<double>& nodes, std::vector<double>& lagged) const {
     nodes = grid_degC;
     if (dt_s == 0.0) {
@@ -183,7 +183,7 @@ struct Plant::Parts {
     for (std::size_t i = 0; i < lagged.size(); ++i) {
       const double lag_s = config.thermocouples[i].lag_s;
       const double end = place_degC(i, nodes);
-      // The lag follows the mean of both ends: right to second order for a step << lag.
+      // Lag behind the mean of both ends: second-order accurate for a step << lag.
       const double mean = 0.5 * (place_degC(i, grid_degC) + end);
       lagged[i] = lag_s > 0.0 ? grid_lagged_degC[i] -
                                     std::expm1(-dt_s / lag_s) * (mean - grid_lagged_degC[i])
@@ -195,7 +195,7 @@ struct Plant::Parts {
     return dot(row, now_degC) - dot(row, start_degC);
   }
 
-  /// @return what the guideway adds at this position; beyond its ends what it adds there [um]
+  /// @return contribution of the guideway at this position, constant beyond its ends [um]
   [[nodiscard]] double along(const BodyGuideway& guideway, double position_mm) const {
     const std::vector<double>& at = guideway.positions_mm;
     const auto above = std::upper_bound(at.begin(), at.end(), position_mm);

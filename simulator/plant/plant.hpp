@@ -1,5 +1,4 @@
-/// The body of the simulated machine: it warms, bends and is measured. Pure: seeded, no clock; the
-/// time is passed in.
+/// Thermal and mechanical body of the simulated machine. Seeded; the time is an argument.
 #pragma once
 
 #include <cstddef>
@@ -15,13 +14,13 @@ namespace thermocomp {
 
 class Plant {
  public:
-  /// All lumps start at the room's temperature. @pre indices in `config` are valid (checked)
+  /// All lumps start at room temperature. @pre indices in `config` are valid (checked)
   Plant(const PlantConfig& config, std::uint64_t seed);
   ~Plant();
   Plant(Plant&&) noexcept;
   Plant& operator=(Plant&&) noexcept;
 
-  /// What is seen at a time does not depend on the times asked for before.
+  /// Values at a time do not depend on earlier calls.
   /// @pre time_s >= the last one (checked)
   void advance_to(double time_s);
 
@@ -30,9 +29,9 @@ class Plant {
   [[nodiscard]] double node_degC(std::size_t node) const;
   [[nodiscard]] double room_degC() const noexcept;
   [[nodiscard]] double signal(std::size_t signal) const;
-  /// Heat of all sources into a lump, now [W].
+  /// Heat of all sources into a lump [W].
   [[nodiscard]] double heat_W(std::size_t node) const;
-  /// What the thermocouple shows: lagged, with noise, offset and resolution.
+  /// Reading of the thermocouple, with lag, noise, offset and resolution.
   [[nodiscard]] double thermocouple_degC(std::size_t thermocouple) const;
   /// True displacement of the tool since the start, positive in the axis' positive direction.
   [[nodiscard]] double displacement_um(std::size_t output) const;
@@ -46,9 +45,9 @@ class Plant {
   std::unique_ptr<Parts> parts_;
 };
 
-/// What a model with one temperature a block would have to say: the sum of the coefficients of the
-/// lumps that belong to it. Shape (outputs, blocks) [um/K], row by row.
-/// @param blocks  block names in the wanted order; a lump of another block is left out
+/// Exact coefficients of a model with one temperature per block: the sums over the block's lumps.
+/// Shape (outputs, blocks) [um/K], row by row.
+/// @param blocks  block names in the wanted order; lumps of other blocks are ignored
 [[nodiscard]] std::vector<std::vector<double>> block_matrix(const PlantConfig& config,
                                                             const std::vector<std::string>& blocks);
 

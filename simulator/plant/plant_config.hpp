@@ -1,5 +1,4 @@
-/// What the simulated machine's body is built from: plain structures, filled by the machine file
-/// or by a test.
+/// Configuration of the simulated machine's body, filled by the machine file or a test.
 #pragma once
 
 #include <cstddef>
@@ -12,14 +11,14 @@
 
 namespace thermocomp {
 
-/// A lump of the structure that has one temperature.
+/// Lump of the structure with one temperature.
 struct NodeConfig {
   std::string name;
-  std::string block;             ///< the model's block this lump is taken for; empty: none
+  std::string block;             ///< the model's block of this lump; empty: none
   double capacity_J_per_K{1.0};  ///< > 0
   double room_W_per_K{0.0};      ///< to the air of the room
-  double coolant_W_per_K{0.0};   ///< to the coolant, while it flows
-  /// What 1 K of rise since the start moves the tool, output -> um (or urad) a kelvin.
+  double coolant_W_per_K{0.0};   ///< to flowing coolant
+  /// Displacement per kelvin of rise since the start, by output [um/K or urad/K].
   std::map<std::string, double> displacement_um_per_K;
 };
 
@@ -39,16 +38,16 @@ struct HeatSourceConfig {
 };
 
 enum class SignalKind {
-  steps,       ///< values[i] from times_s[i] on, repeated every repeat_s where that is > 0
-  line,        ///< values[i] at times_s[i], straight between them, repeated as steps are
-  random,      ///< one of values, each kept for dwell_s_min..dwell_s_max, drawn from the seed
+  steps,       ///< values[i] from times_s[i] on, repeated every repeat_s if > 0
+  line,        ///< linear between values[i] at times_s[i], repeated as steps
+  random,      ///< random values, each held for dwell_s_min..dwell_s_max
   sine,        ///< centre + amplitude sin(2 pi t / period_s)
   while_above  ///< 1 while the watched signal is above a level, else 0
 };
 
-/// What the machine does: spindle speed, feed, coolant, positions, cutting.
+/// Operating signal: spindle speed, feed, coolant, position, cutting.
 struct SignalConfig {
-  std::string name;  ///< a column's name with its unit: spindle_rpm, coolant_on, x_mm
+  std::string name;  ///< column name with unit: spindle_rpm, coolant_on, x_mm
   SignalKind kind{SignalKind::steps};
   std::vector<double> times_s;
   std::vector<double> values;
@@ -62,7 +61,7 @@ struct SignalConfig {
   double above{0.0};
 };
 
-/// A door opened: the room's air changes and comes back.
+/// Temporary change of the room's air, such as an open door.
 struct DraughtConfig {
   double at_s{0.0};
   double duration_s{0.0};
@@ -72,7 +71,7 @@ struct DraughtConfig {
 /// room = mean + swing cos(2 pi (clock - warmest) / 24 h) + slow wander + draughts
 struct RoomConfig {
   double mean_degC{21.0};
-  double daily_swing_K{0.0};    ///< half of the difference between warmest and coldest
+  double daily_swing_K{0.0};    ///< half the difference between warmest and coldest
   double warmest_h{15.0};       ///< clock hour of the warmest moment
   double start_h{7.0};          ///< clock hour at plant time 0
   double wander_K{0.0};         ///< standard deviation of the slow wander
@@ -82,22 +81,22 @@ struct RoomConfig {
 
 struct CoolantConfig {
   std::optional<std::size_t> signal;  ///< flows while this is not 0; none: never flows
-  double temp_degC{20.0};             ///< with the room at its mean
-  double room_share{0.0};             ///< how much of the room's departure from its mean it follows
-  /// Its temperature [degC] is this signal, whatever the room does.
+  double temp_degC{20.0};             ///< at the room's mean temperature
+  double room_share{0.0};  ///< share of the room's deviation from its mean that it follows
+  /// Signal that gives its temperature [degC] instead.
   std::optional<std::size_t> temp_signal{};
 };
 
 struct ThermocoupleConfig {
   enum class Place { node, room, coolant };
-  std::string name;  ///< its column is NAME_degC
+  std::string name;  ///< column NAME_degC
   Place place{Place::node};
-  std::size_t node{0};       ///< where place is node; a sensor of the body where there is one
+  std::size_t node{0};       ///< if place is node; with a body, the index of its sensor
   double noise_K{0.0};       ///< standard deviation of one conversion
   double lag_s{0.0};         ///< first-order lag behind the node
   double offset_K{0.0};      ///< constant error
   double resolution_K{0.0};  ///< 0: none
-  double conversion_s{1.0};  ///< new noise every so often, plant time
+  double conversion_s{1.0};  ///< period of new noise, plant time
 };
 
 struct OutputConfig {
@@ -119,11 +118,11 @@ struct PlantConfig {
   std::vector<SignalConfig> signals;
   RoomConfig room;
   CoolantConfig coolant;
-  /// In place of nodes, links and sources: a reduced finite-element model.
+  /// Reduced finite-element model instead of nodes, links and sources.
   std::optional<ReducedBody> body;
-  std::vector<std::size_t> body_signals;  ///< the signal of each of the body's sources
-  std::vector<std::size_t> body_outputs;  ///< the body's row of each output
-  std::vector<std::size_t> body_axes;     ///< the signal of each of the body's guideways
+  std::vector<std::size_t> body_signals;  ///< signal of each source of the body
+  std::vector<std::size_t> body_outputs;  ///< body's row for each output
+  std::vector<std::size_t> body_axes;     ///< signal of each guideway of the body
   std::vector<NodeConfig> nodes;
   std::vector<LinkConfig> links;
   std::vector<HeatSourceConfig> sources;

@@ -1,9 +1,9 @@
-/// The machine's body as a finite-element model reduced to a small state space.
+/// Machine body as a finite-element model reduced to a small state space.
 ///
 /// dx/dt = -(K + K_coolant while it flows) x + sum of inflows; temperature of a sensor = row . x;
 /// displacement = row . (x - x_start). The states are amplitudes of temperature fields that are
-/// orthonormal in the heat capacity, so their capacity is 1. docs/structure.md says how
-/// `thermocomp structure --plant` makes the file.
+/// orthonormal in the heat capacity, so their capacity is 1. `thermocomp structure --plant` writes
+/// the file (docs/structure.md).
 #pragma once
 
 #include <cstddef>
@@ -20,7 +20,7 @@ struct BodySource {
   double heat_W{0.0};
   double at{1.0};
   double exponent{1.0};
-  std::vector<double> inflow;  ///< a W of it into each state
+  std::vector<double> inflow;  ///< inflow into each state per watt
 };
 
 struct BodyRow {
@@ -28,30 +28,30 @@ struct BodyRow {
   std::vector<double> row;
 };
 
-/// What an output moves further with an axis elsewhere: rows at positions, straight between them.
+/// Contribution to an output that depends on an axis: rows at positions, interpolated linearly.
 struct BodyGuideway {
   std::string name;
   std::string axis;    ///< a position, "w_mm"
-  std::string output;  ///< one of the body's
+  std::string output;  ///< an output of the body
   std::vector<double> positions_mm;
-  std::vector<std::vector<double>> rows;  ///< one a position
+  std::vector<std::vector<double>> rows;  ///< by position
 };
 
 enum class BodyPartKind { room_film, coolant_film, joint, capacity };
 
-/// What one film, joint or part of the structure has in the matrices: `thermocomp diagnose
-/// --thermal` asks whether its strength is right. The simulator does not need it.
+/// Contribution of one film, joint or part of the structure to the matrices. Used by `thermocomp
+/// diagnose --thermal` to test its strength, not by the simulator.
 struct BodyPart {
   std::string name;
   BodyPartKind kind{BodyPartKind::joint};
-  std::vector<double> matrix;  ///< in conductance, coolant_conductance or the capacity
-  std::vector<double> inflow;  ///< of a film, in room_inflow or coolant_inflow; else empty
+  std::vector<double> matrix;  ///< share of conductance, coolant_conductance or capacity
+  std::vector<double> inflow;  ///< of a film: share of room_inflow or coolant_inflow; else empty
 };
 
 struct ReducedBody {
   std::vector<double> conductance;          ///< row by row, states x states, symmetric
-  std::vector<double> coolant_conductance;  ///< besides, while the coolant flows
-  std::vector<double> room_inflow;          ///< a degC of the room's air
+  std::vector<double> coolant_conductance;  ///< added while the coolant flows
+  std::vector<double> room_inflow;          ///< per degC of the room's air
   std::vector<double> coolant_inflow;
   std::vector<double> one_degC;  ///< the states with everything at 1 degC
   std::vector<BodySource> sources;
@@ -66,7 +66,7 @@ struct ReducedBody {
 /// @throws ConfigurationError
 [[nodiscard]] ReducedBody load_body(const std::filesystem::path& path);
 [[nodiscard]] ReducedBody parse_body(std::string text, std::string name);
-/// The file's text; reading it gives the same body.
+/// Text of the file; parsing it gives the same body.
 [[nodiscard]] std::string write_body(const ReducedBody& body, const std::string& comment);
 
 }  // namespace thermocomp

@@ -1,4 +1,4 @@
-/// What the script of events does to channels, units and controller at a plant time. Pure.
+/// Effects of scripted events on channels, units and controller at a plant time.
 #pragma once
 
 #include <optional>
@@ -10,12 +10,12 @@ namespace thermocomp {
 
 struct ChannelEffect {
   std::optional<ChannelFault> fault;
-  std::optional<std::int64_t> code;  ///< none: the first that the device has for the fault
+  std::optional<std::int64_t> code;  ///< none: the device's first for the fault
   bool frozen{false};
   double added_K{0.0};
 };
 
-/// What befalls a bus, a device or the controller.
+/// Effect on a bus, a device or the controller.
 struct UnitEffect {
   bool silent{false};  ///< drop
   bool down{false};    ///< reboot
@@ -28,7 +28,7 @@ struct UnitEffect {
 struct ControllerEffect {
   bool rejects{false};
   double misapplied_um{0.0};
-  std::size_t rehomings{0};  ///< so many times until now
+  std::size_t rehomings{0};  ///< number until now
 };
 
 struct Effects {
@@ -39,10 +39,10 @@ struct Effects {
   ControllerEffect controller;
 };
 
-/// The fault of a channel that an event of this kind is; none for all other kinds.
+/// Channel fault of this kind of event; nullopt for other kinds.
 [[nodiscard]] std::optional<ChannelFault> channel_fault(MachineEventKind kind);
 
-/// An event is in force from at_s until before at_s + duration_s.
+/// An event is active in [at_s, at_s + duration_s).
 [[nodiscard]] Effects effects_at(const MachineConfig& machine, double plant_time_s);
 
 }  // namespace thermocomp

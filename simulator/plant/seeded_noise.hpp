@@ -1,5 +1,5 @@
-/// Noise as a function of (seed, stream, index): the same however often and in whatever order it
-/// is asked for, so that a run does not depend on who looks at the plant when.
+/// Noise as a pure function of (seed, stream, index), so that a run does not depend on when and how
+/// often the plant is read.
 #pragma once
 
 #include <cmath>
@@ -8,7 +8,7 @@
 
 namespace thermocomp {
 
-/// The finaliser of splitmix64 over the three numbers. Source: Steele, Lea, Flood, "Fast splittable
+/// Finaliser of splitmix64 over the three numbers. Source: Steele, Lea, Flood, "Fast splittable
 /// pseudorandom number generators", OOPSLA 2014.
 [[nodiscard]] inline std::uint64_t seeded_bits(std::uint64_t seed, std::uint64_t stream,
                                                std::uint64_t index) noexcept {

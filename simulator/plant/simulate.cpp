@@ -10,7 +10,7 @@ namespace thermocomp {
 namespace {
 
 constexpr std::uint64_t indicator_stream = 0x30000;
-constexpr double rounding = 1e-9;  // of the number of samples, so that 3 x 0.1 reaches 0.3
+constexpr double rounding = 1e-9;  // of the number of samples: 3 x 0.1 must reach 0.3
 
 }  // namespace
 

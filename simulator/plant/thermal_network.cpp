@@ -11,7 +11,7 @@ namespace thermocomp {
 struct ThermalNetwork::Modes {
   Eigen::VectorXd root_capacity;  ///< sqrt(C)
   Eigen::VectorXd rate_per_s;     ///< eigenvalues of C^-1/2 K C^-1/2
-  Eigen::MatrixXd shapes;         ///< its eigenvectors, one a column
+  Eigen::MatrixXd shapes;         ///< its eigenvectors, by column
 };
 
 ThermalNetwork::ThermalNetwork(std::span<const double> capacity_J_per_K,

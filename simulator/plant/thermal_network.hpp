@@ -1,4 +1,4 @@
-/// Heat flow between lumps, integrated exactly.
+/// Exact integration of heat flow between lumps.
 #pragma once
 
 #include <cstddef>
@@ -8,9 +8,8 @@
 
 namespace thermocomp {
 
-/// C dT/dt = -K T + q with diagonal C [J/K] and symmetric K [W/K] (n x n).
-/// With q constant over dt the solution is exact in the modes of C^-1/2 K C^-1/2, so no time step
-/// is too long for it and none is needed to be short.
+/// C dT/dt = -K T + q with diagonal C [J/K] and symmetric K [W/K] (n x n). For constant q the
+/// solution in the modes of C^-1/2 K C^-1/2 is exact for any time step.
 class ThermalNetwork {
  public:
   /// @param conductance_W_per_K  row by row, n x n, symmetric, positive semidefinite (checked:

@@ -51,7 +51,7 @@ std::string ready_line(const std::vector<BusPlace>& places) {
   return line.dump();
 }
 
-/// SIGINT and SIGTERM as something to read, so that the summary is always printed.
+/// SIGINT and SIGTERM as a file descriptor, so that the summary is always printed.
 class StopSignals {
  public:
   explicit StopSignals(EventLoop& loop) : loop_(loop) {
@@ -76,7 +76,7 @@ class StopSignals {
   int file_{-1};
 };
 
-/// One line that overwrites itself; silent where stderr is no terminal.
+/// A line on stderr that overwrites itself; silent without a terminal.
 class StatusLine {
  public:
   ~StatusLine() {
@@ -100,7 +100,7 @@ class StatusLine {
   nanoseconds next_{};
 };
 
-/// What plant and replay have in common.
+/// Common part of plant and replay sessions.
 class Session {
  public:
   Session(const MachineConfig& machine, const SessionOptions& options,
@@ -130,7 +130,7 @@ class Session {
   }
 
  protected:
-  virtual void first_row() = 0;  ///< row_ at the beginning
+  virtual void first_row() = 0;  ///< sets row_ for the start
   virtual void start() = 0;
   virtual void on_tick(nanoseconds now) = 0;
   virtual void finish() {}
@@ -166,7 +166,7 @@ class Session {
                 << std::endl;
     }
     if (!options_.ports_file.empty()) {
-      // Complete or not there at all, for whoever waits for it.
+      // Renamed when complete, so that a waiting program never reads a partial file.
       const std::filesystem::path draft = options_.ports_file.string() + ".new";
       std::ofstream(draft) << line << '\n';
       std::error_code error;

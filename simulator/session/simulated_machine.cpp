@@ -39,7 +39,7 @@ std::size_t index_in(const std::vector<std::string>& columns, const std::string&
   return static_cast<std::size_t>(found - columns.begin());
 }
 
-/// Several things happen to a unit at once: its own, its bus'.
+/// Combines the effects on a unit and on its bus.
 UnitEffect both(UnitEffect a, const UnitEffect& b) {
   a.silent = a.silent || b.silent;
   a.down = a.down || b.down;
@@ -63,7 +63,7 @@ struct Device {
   SimulatedDevice config;
   ModbusUnit unit;
   CanFrames frames;
-  std::vector<std::size_t> columns;  ///< of the channels
+  std::vector<std::size_t> columns;  ///< by channel
   nanoseconds next_conversion{};
   std::uint16_t conversions{0};
   bool was_down{false};
@@ -75,10 +75,11 @@ struct Controller {
   CanFrames frames;
   CncOrder order;
   SimulatedCnc cnc;
-  std::vector<std::optional<std::size_t>> columns;    ///< of the signals; none: its fixed value
-  std::vector<std::optional<std::size_t>> positions;  ///< columns of the axes with a travel
-  std::vector<std::optional<CanSetReader>> sets;      ///< on CAN, of the axes with a travel
-  std::vector<double> start;  ///< of the signals that are probes: their output at the first look
+  std::vector<std::optional<std::size_t>> columns;  ///< by signal; none: fixed value
+  std::vector<std::optional<std::size_t>>
+      positions;  ///< by axis: column of its position, if it has a travel
+  std::vector<std::optional<CanSetReader>> sets;  ///< by axis: on CAN, if it has a travel
+  std::vector<double> start;  ///< by signal: a probe's output at its first reading
   nanoseconds next_frame{};
 
   explicit Controller(const SimulatedController& from) : config(from), cnc(from) {
@@ -100,7 +101,7 @@ std::vector<CanSignal> signals_of(const CanSet& set) {
 struct SimulatedMachine::Parts {
   EventLoop& loop;
   MachineConfig config;
-  std::vector<Bus> buses;  ///< of the file; then the controller's own
+  std::vector<Bus> buses;  ///< those of the file, then the controller's
   std::vector<Device> devices;
   std::optional<Controller> controller;
   std::vector<BusPlace> places;
@@ -223,7 +224,7 @@ struct SimulatedMachine::Parts {
 
   // -------------------------------------------------------------- answering
 
-  /// The unit's registers, or nullptr where no such unit is on the bus.
+  /// The unit's registers; nullptr: no such unit on the bus.
   ModbusUnit* find_unit(std::size_t bus, int unit, UnitEffect& effect) {
     if (is_controllers(bus)) {
       effect = effects.controller_unit;
@@ -276,7 +277,7 @@ struct SimulatedMachine::Parts {
 
   // -------------------------------------------------------------- controller
 
-  /// At once, so that who reads back after writing sees what came of it.
+  /// Applied at once, so that a client reads back the result of its write.
   void take_written() {
     const SimulatedController& from = controller->config;
     for (std::size_t i = 0; i < from.axes.size(); ++i) {
@@ -296,7 +297,7 @@ struct SimulatedMachine::Parts {
     step_controller(now_s);
   }
 
-  /// As a whole or not at all: `end` and `begin` hold the number of one and the same set.
+  /// Takes a set only complete: `end` and `begin` hold the same set number.
   void take_set(std::size_t axis, const ModbusTravel& travel) {
     if (controller->unit.value(travel.end) != controller->unit.value(travel.begin)) return;
     std::vector<double> values;
@@ -335,7 +336,7 @@ struct SimulatedMachine::Parts {
     controller->cnc.take(now_s, order);
   }
 
-  /// As a whole or not at all: every frame of the axis carries the number of one and the same set.
+  /// Takes a set only complete: every frame of the axis carries the same set number.
   void take_sets(const CanFrame& frame) {
     for (std::size_t axis = 0; axis < controller->sets.size(); ++axis) {
       auto& set = controller->sets[axis];
@@ -380,7 +381,7 @@ struct SimulatedMachine::Parts {
       controller->frames.set_code(place, number);
   }
 
-  /// What the registers said before no longer counts.
+  /// Discards the registers' earlier values.
   void forget_offsets() {
     controller->cnc.forget();
     std::fill(controller->order.offset_um.begin(), controller->order.offset_um.end(), not_a_number);
@@ -400,7 +401,7 @@ struct SimulatedMachine::Parts {
     }
   }
 
-  /// What the tool is off by, and what a probe makes of it: new noise each second.
+  /// Error at the tool as measured by a probe, with new noise each second.
   double probed_um(std::size_t signal, double plant_time_s, double displacement_um) {
     const SimulatedControllerSignal& probe = controller->config.signals[signal];
     double& start_um = controller->start[signal];
@@ -449,8 +450,8 @@ struct SimulatedMachine::Parts {
     return thermocomp::code_for(codes, effect.fault, effect.code);
   }
 
-  /// A device that tells a fault beside the value leaves a temperature in the value's place; one
-  /// that has no code at all for an open circuit shows its highest value, or NaN.
+  /// A device that reports a fault in a status still shows a temperature; one without a code for an
+  /// open circuit shows its highest value, or NaN.
   static double shown(const SimulatedChannel& channel, const ChannelEffect& effect, double value) {
     const bool shown_beside = (channel.status && code_for(channel.status->codes, effect)) ||
                               code_for(channel.can_status.codes, effect);
@@ -507,7 +508,7 @@ struct SimulatedMachine::Parts {
     const bool due = now >= device.next_conversion;
     if (!due && !new_row) return;
     if (due) {
-      // Keeps the phase unless it has fallen behind.
+      // Keeps the phase unless late.
       const nanoseconds period = from_seconds(device.config.period_s);
       device.next_conversion = std::max(device.next_conversion + period, now + period / 2);
     }

@@ -1,4 +1,4 @@
-/// Buses, devices and controller of the simulated machine: values in, bytes on real buses out.
+/// Buses, devices and controller of the simulated machine; transfers values to real buses.
 #pragma once
 
 #include <cstdint>
@@ -14,37 +14,37 @@
 
 namespace thermocomp {
 
-/// Where a bus can be reached.
+/// Address of a bus.
 struct BusPlace {
   std::string name;
   SimulatedBusKind kind{SimulatedBusKind::modbus_tcp};
   int port{0};              ///< Modbus TCP
   std::string path;         ///< RTU: the link; CAN: the interface
-  std::string unavailable;  ///< why it is not there (CAN only); else empty
+  std::string unavailable;  ///< reason why it is missing (CAN only); else empty
 };
 
 class SimulatedMachine {
  public:
-  /// Opens every bus. A CAN interface that is not there is reported in places() and tried again.
-  /// @param columns  names of the values that update() gets
-  /// @param source   what has these columns, for messages
-  /// @throws std::runtime_error for a column that is missing or a bus that cannot be opened
+  /// Opens every bus. A missing CAN interface is reported in places() and retried.
+  /// @param columns  names of update()'s values
+  /// @param source   origin of the columns, for messages
+  /// @throws std::runtime_error for a missing column or a bus that cannot be opened
   SimulatedMachine(EventLoop& loop, const MachineConfig& config,
                    const std::vector<std::string>& columns, const std::string& source);
   ~SimulatedMachine();
 
   [[nodiscard]] const std::vector<BusPlace>& places() const noexcept;
-  /// Carries values and scripted events into registers and frames; all registers change between
-  /// two requests of any client.
+  /// Transfers values and scripted events to registers and frames. All registers change between two
+  /// requests of any client.
   /// @param now      real time
-  /// @param row      one value a column
-  /// @param new_row  every device converts now, whatever its period
+  /// @param row      one value per column
+  /// @param new_row  every device converts now, regardless of its period
   void update(nanoseconds now, double plant_time_s, std::span<const double> row, bool new_row);
 
-  /// Offset that the controller applies to the axis of this output, in the positive direction of
-  /// the axis; 0 where no axis has it.
+  /// Offset that the controller applies to this output's axis, in the axis' positive direction; 0:
+  /// no such axis.
   [[nodiscard]] double applied_um(const std::string& output) const;
-  /// Whether a heartbeat has ever been seen to beat (true without a controller).
+  /// The heartbeat has ever changed (true without a controller).
   [[nodiscard]] bool heartbeat_seen() const;
 
  private:

@@ -1,4 +1,4 @@
-/// What really happened at the tool, as a run file and as two figures.
+/// Record of the true displacement at the tool, as a run file and two RMS figures.
 #pragma once
 
 #include <cstddef>
@@ -11,26 +11,25 @@
 
 namespace thermocomp {
 
-/// For each displacement x_um: x_um as it is, x_offset_um applied by the controller, x_error_um =
-/// what is left = displacement since the first row + offset. Beside them temperatures and
-/// positions.
+/// For each displacement x_um: x_um itself, x_offset_um applied by the controller, and x_error_um =
+/// displacement since the first row + offset. Also temperatures and positions.
 class TruthRecord {
  public:
   using Applied = std::function<double(const std::string& output)>;
 
-  /// @param columns  of the rows that add() gets
-  /// @param file     empty: no file, figures only. @throws std::runtime_error
+  /// @param columns  of add()'s rows
+  /// @param file  empty: figures only. @throws std::runtime_error
   TruthRecord(const std::vector<std::string>& columns, const std::filesystem::path& file);
 
   void add(double time_s, std::span<const double> row, const Applied& applied_um);
-  /// @throws std::runtime_error when the file could not be written
+  /// @throws std::runtime_error if the file could not be written
   void close();
 
-  /// Root of the mean over the rows of the squared Euclidean norm over all outputs in um.
+  /// RMS over the rows of the Euclidean norm over all outputs in um.
   [[nodiscard]] double uncompensated_rms_um() const;
   [[nodiscard]] double compensated_rms_um() const;
   [[nodiscard]] bool has_outputs() const noexcept { return !outputs_.empty(); }
-  /// Of the last row, order of the outputs; for the status line.
+  /// Of the last row, by output; for the status line.
   [[nodiscard]] const std::vector<double>& last_error_um() const noexcept { return error_um_; }
   /// "error rms at the tool: uncompensated A um, compensated B um"
   [[nodiscard]] std::string summary() const;
@@ -40,7 +39,7 @@ class TruthRecord {
     std::string name;
     std::size_t column;
     double start;
-    bool counts;  ///< in um, so part of the norm
+    bool counts;  ///< unit um: part of the norm
   };
   std::vector<Output> outputs_;
   std::vector<std::size_t> beside_;  ///< temperatures and positions

@@ -1,4 +1,4 @@
-// Frames of a simulated CAN node: pages, counters, FD.
+// Tests of a simulated CAN node's frames: pages, counters, FD.
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -28,7 +28,8 @@ double shown(const CanFrame& frame, const CanSignal& signal) {
 
 }  // namespace
 
-TEST_CASE("a simulated node sends a frame a page, plain values in each", "[simulator][can]") {
+TEST_CASE("a simulated node sends one frame per page, each with the plain values",
+          "[simulator][can]") {
   CanFrames frames;
   const std::vector<CanSignal> signals{value(8), value(24, 2), value(24, 5), value(40, 2)};
   for (const CanSignal& signal : signals) frames.define(signal);
@@ -46,7 +47,7 @@ TEST_CASE("a simulated node sends a frame a page, plain values in each", "[simul
   CHECK(shown(sent[1], signals[2]) == Approx(22.0));
 }
 
-TEST_CASE("a simulated node's counter goes up and around in its own bits", "[simulator][can]") {
+TEST_CASE("a simulated node's counter increments and wraps within its bits", "[simulator][can]") {
   CanFrames frames;
   const CanField counter{60, 2, ByteOrder::little_endian};
   frames.define(value(0));
@@ -74,7 +75,8 @@ TEST_CASE("a simulated value beyond 8 bytes makes its frame CAN FD", "[simulator
   CHECK(shown(frame, far) == Approx(-12.5));
 }
 
-TEST_CASE("values of one page share no bits, those of two may", "[simulator][can]") {
+TEST_CASE("values of one page must not share bits, values of different pages may",
+          "[simulator][can]") {
   FramesTaken taken;
   CHECK(taken.take(value(24, 2)));
   CHECK(taken.take(value(24, 5)));

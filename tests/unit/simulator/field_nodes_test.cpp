@@ -1,4 +1,4 @@
-// Simulated CANopen and J1939 nodes and the machines of the daemon's drivers, joined without a bus.
+// Tests of simulated CANopen and J1939 nodes, connected to the daemon's drivers without a bus.
 #include <string>
 #include <vector>
 
@@ -16,7 +16,7 @@ namespace {
 
 constexpr double long_s = 1e9;
 
-/// Hands frames to and fro, 10 ms at a time.
+/// Exchanges frames in both directions in steps of 10 ms.
 template <class Line, class Take>
 void exchange(Line& line, nanoseconds& now, nanoseconds time, const std::vector<double>& temps_degC,
               auto& node, Take take) {
@@ -104,7 +104,7 @@ TEST_CASE("a simulated node is set up, asked for its mapping, started and read",
   CHECK(pair.line.readings()[2].temp_degC == Approx(-3.2));
 }
 
-TEST_CASE("each event of a simulated node becomes its fault, and heals", "[nodes]") {
+TEST_CASE("each event of a simulated node causes its fault, and ends", "[nodes]") {
   SimulatedCanopenNode config = two_channels();
   const auto with = [&](NodeEventKind kind, std::size_t channel) {
     config.events = {{kind, channel, 2.0, 2.0}};

@@ -1,4 +1,4 @@
-// The machine file is read strictly, and the files that ship are right.
+// Tests of the machine file's reader and of the files that ship.
 #include "simulator/files/machine_file.hpp"
 
 #include <cmath>
@@ -75,7 +75,7 @@ struct Broken {
 
 }  // namespace
 
-TEST_CASE("the small machine is read as it stands") {
+TEST_CASE("the small machine is read completely") {
   const MachineConfig machine = parse_machine(small, "small");
   CHECK(machine.plant->nodes[0].displacement_um_per_K.at("z_um") == 2.0);
   CHECK(machine.devices[0].channels[0].column == "spindle_degC");
@@ -149,7 +149,7 @@ address = 0
   CHECK(machine.devices[0].channels[0].column == "t1_degC");
 }
 
-TEST_CASE("the commented example is right and every event kind is in it") {
+TEST_CASE("the commented example is valid and contains every kind of event") {
   const MachineConfig machine = load_machine(folder + "/examples/machine.toml");
   for (int kind = 0; kind <= static_cast<int>(MachineEventKind::rehome); ++kind) {
     bool there = false;
@@ -177,7 +177,7 @@ TEST_CASE("block temperatures of the demonstration explain all but 16 % of its d
     for (const std::string& column : sensors[block]) sum += run.column(column)[row];
     return sum / static_cast<double>(sensors[block].size());
   };
-  // As the daemon does it: with the guideway's rows where the head is.
+  // As in the daemon: with the guideway's rows at the head's position.
   DisplacementModel displacement(model);
   std::vector<double> reference_degC;
   for (std::size_t block = 0; block < sensors.size(); ++block)
@@ -206,7 +206,7 @@ TEST_CASE("block temperatures of the demonstration explain all but 16 % of its d
 
 namespace {
 
-/// Two states, of which the first is the whole body's temperature.
+/// Two states; the first is the temperature of the whole body.
 const std::string body_text = R"(format = 1
 states = 2
 conductance = [[10.0, 0.0], [0.0, 40.0]]
@@ -229,7 +229,7 @@ name = "z_um"
 row = [3.0, -2.0]
 )";
 
-/// A machine whose body is in a file beside its own.
+/// A machine with its body in a separate file.
 std::string machine_text(const std::string& more) {
   return R"(format = 1
 [plant]
@@ -262,7 +262,7 @@ std::string problems_of_machine(const std::string& text, const std::string& body
 
 }  // namespace
 
-TEST_CASE("a machine with a body of its own warms as its states say") {
+TEST_CASE("a machine with a reduced body warms according to its states") {
   const thermocomp::testing::TempFolder folder_of_body;
   std::ofstream(folder_of_body.path() / "body.toml") << body_text;
   const MachineConfig machine =
@@ -271,7 +271,7 @@ TEST_CASE("a machine with a body of its own warms as its states say") {
   CHECK(plant.thermocouple_degC(0) == Approx(20.0));
   CHECK(plant.displacement_um(0) == Approx(0.0).margin(1e-12));
   plant.advance_to(1e4);
-  // 20 W (2000/1000)^2 = 80 W: the states end at 20 + 80/10 and 160/40.
+  // 20 W (2000/1000)^2 = 80 W: the steady states are 20 + 80/10 and 160/40.
   CHECK(plant.thermocouple_degC(0) == Approx(28.0 + 0.5 * 4.0));
   CHECK(plant.displacement_um(0) == Approx(3.0 * 8.0 - 2.0 * 4.0));
 }
@@ -287,7 +287,7 @@ TEST_CASE("a body is the same after writing and reading") {
   CHECK(again.outputs.at(0).row == body.outputs.at(0).row);
 }
 
-TEST_CASE("what is wrong with a body or a machine that has one is named") {
+TEST_CASE("problems of a body, or of a machine with one, are named") {
   const auto without = [](std::string text, const std::string& what, const std::string& with) {
     return text.replace(text.find(what), what.size(), with);
   };

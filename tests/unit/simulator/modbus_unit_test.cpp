@@ -1,4 +1,4 @@
-// A simulated unit's bytes, by the Modbus specification's own examples where it has some.
+// Tests of a simulated unit's bytes, with the Modbus specification's examples where available.
 #include "simulator/devices/modbus_unit.hpp"
 
 #include <cmath>
@@ -30,13 +30,13 @@ ModbusUnit small_unit() {
 
 }  // namespace
 
-TEST_CASE("registers and bits are read as the specification shows") {
+TEST_CASE("registers and bits are read as in the specification") {
   ModbusUnit unit = small_unit();
   CHECK(unit.answer(Bytes{3, 0, 0x6B, 0, 3}).pdu == Bytes{3, 6, 2, 0x2B, 0, 0, 0, 0x64});
   CHECK(unit.answer(Bytes{2, 0, 0, 0, 10}).pdu == Bytes{2, 2, 0x01, 0x02});
 }
 
-TEST_CASE("writing changes what may be written and nothing else") {
+TEST_CASE("a write changes writable registers and nothing else") {
   ModbusUnit unit = small_unit();
   CHECK(unit.answer(Bytes{6, 0, 107, 0x12, 0x34}).pdu == Bytes{6, 0, 107, 0x12, 0x34});
   CHECK(unit.word(ModbusTable::holding, 107) == 0x1234);
@@ -50,10 +50,10 @@ TEST_CASE("writing changes what may be written and nothing else") {
   CHECK(unit.answer(Bytes{1, 0, 0, 0, 4}).pdu == Bytes{1, 1, 0b0100});
 }
 
-TEST_CASE("what cannot be answered is refused with the code that says why") {
+TEST_CASE("an invalid request is refused with the matching exception") {
   ModbusUnit unit = small_unit();
   const std::vector<std::pair<Bytes, int>> refused{
-      {{0x2B, 14, 1, 0}, 1},                   // a function it does not have
+      {{0x2B, 14, 1, 0}, 1},                   // unknown function
       {{3, 0, 106, 0, 1}, 2},                  // before the first register
       {{3, 0, 107, 0, 4}, 2},                  // beyond the last
       {{3, 0xFF, 0xFF, 0, 125}, 2},            // beyond the table
@@ -64,7 +64,7 @@ TEST_CASE("what cannot be answered is refused with the code that says why") {
       {{5, 0, 0, 0x12, 0}, 3},                 // neither on nor off
       {{6, 0, 110, 0, 1}, 2},                  // not writable
       {{16, 0, 107, 0, 2, 3, 0, 1, 0}, 3},     // counts disagree
-      {{16, 0, 109, 0, 2, 4, 0, 1, 0, 1}, 2},  // half of it beyond
+      {{16, 0, 109, 0, 2, 4, 0, 1, 0, 1}, 2},  // partly beyond the last
   };
   for (const auto& [request, code] : refused) {
     const auto answer = unit.answer(request);
@@ -74,7 +74,7 @@ TEST_CASE("what cannot be answered is refused with the code that says why") {
   }
 }
 
-TEST_CASE("values stand in registers in every encoding and word order") {
+TEST_CASE("values are encoded in registers in every encoding and word order") {
   const auto encoding =
       GENERATE(Encoding::int16, Encoding::int32, Encoding::float32, Encoding::float64);
   const auto order = GENERATE(WordOrder::abcd, WordOrder::dcba, WordOrder::badc, WordOrder::cdab);
@@ -83,7 +83,7 @@ TEST_CASE("values stand in registers in every encoding and word order") {
   unit.define(place, false);
   unit.set_value(place, 0.0, -12.34);
   CHECK(unit.value(place) == Approx(-12.34).epsilon(1e-6));
-  unit.set_value(place, 0.0, NAN);  // no code: as burn-out shows
+  unit.set_value(place, 0.0, NAN);  // no code: as in burn-out
   if (encoding == Encoding::float32 || encoding == Encoding::float64) {
     CHECK(std::isnan(unit.value(place)));
   } else {
@@ -93,7 +93,7 @@ TEST_CASE("values stand in registers in every encoding and word order") {
   CHECK(unit.value(place) == Approx(99.99));
 }
 
-TEST_CASE("a float32 stands in registers word for word as its order says") {
+TEST_CASE("the words of a float32 are in the configured order") {
   const ModbusValue place{ModbusTable::input, 0, Encoding::float32, WordOrder::cdab, 1.0};
   ModbusUnit unit;
   unit.define(place, false);
@@ -102,11 +102,11 @@ TEST_CASE("a float32 stands in registers word for word as its order says") {
   CHECK(unit.word(ModbusTable::input, 1) == 0x42F6);
 }
 
-TEST_CASE("the checksum is the one everybody else computes") {
+TEST_CASE("the CRC equals that of other implementations") {
   CHECK(modbus_crc(Bytes{0x01, 0x03, 0x00, 0x00, 0x00, 0x0A}) == 0xCDC5);
 }
 
-TEST_CASE("requests are found in streams however they are cut") {
+TEST_CASE("requests are found in streams regardless of segmentation") {
   const Bytes pdu{3, 0, 1, 0, 2};
   const Bytes tcp = make_tcp_frame(0x1234, 9, pdu);
   const Bytes rtu = make_rtu_frame(9, pdu);
@@ -126,7 +126,7 @@ TEST_CASE("requests are found in streams however they are cut") {
   CHECK(Bytes(serial.pdu.begin(), serial.pdu.end()) == pdu);
 }
 
-TEST_CASE("a flipped bit on the serial line is never a request") {
+TEST_CASE("a serial request with a flipped bit is never accepted") {
   const Bytes good = make_rtu_frame(1, Bytes{6, 0, 1, 0, 2});
   for (std::size_t bit = 0; bit < 8 * good.size(); ++bit) {
     Bytes bad = good;
@@ -135,7 +135,7 @@ TEST_CASE("a flipped bit on the serial line is never a request") {
   }
 }
 
-TEST_CASE("no bytes whatever upset a unit or the search for frames") {
+TEST_CASE("arbitrary bytes break neither a unit nor the framing") {
   ModbusUnit unit = small_unit();
   for (std::uint64_t seed = 0; seed < 20000; ++seed) {
     Bytes bytes(1 + seeded_bits(seed, 1, 0) % 300);

@@ -1,4 +1,4 @@
-// The simulated body: heat goes where it should, and what is seen does not depend on who looks.
+// Tests of the simulated body: heat balance, and values independent of the reading times.
 #include "simulator/plant/plant.hpp"
 
 #include <cmath>
@@ -35,7 +35,7 @@ PlantConfig two_lumps() {
   return plant;
 }
 
-/// Everything that has a memory or chance in it.
+/// A plant with every stateful and random part.
 PlantConfig lively() {
   PlantConfig plant = two_lumps();
   plant.signals.push_back({"feed_mm_per_min",
@@ -86,7 +86,7 @@ std::vector<double> row_at(Plant& plant, double time_s) {
 
 }  // namespace
 
-TEST_CASE("a body without losses keeps every joule") {
+TEST_CASE("a body without losses conserves energy") {
   PlantConfig config = two_lumps();
   config.nodes[1].room_W_per_K = 0.0;
   Plant plant(config, 1);
@@ -96,7 +96,7 @@ TEST_CASE("a body without losses keeps every joule") {
   CHECK(stored_J == Approx(100.0 * 5000.0).epsilon(1e-9));
 }
 
-TEST_CASE("the steady state is the one found by hand") {
+TEST_CASE("the steady state matches the manual calculation") {
   Plant plant(two_lumps(), 1);
   plant.advance_to(3.0e5);
   // 100 W leave through 10 W/K to the room and cross 20 W/K on their way.
@@ -105,7 +105,7 @@ TEST_CASE("the steady state is the one found by hand") {
   CHECK(plant.displacement_um(0) == Approx(2.0 * 15.0 + 3.0 * 10.0).epsilon(1e-6));
 }
 
-TEST_CASE("one lump warms as the exponential says, at any step") {
+TEST_CASE("one lump warms exponentially, at any step") {
   const double dt_s = GENERATE(1.0, 37.0, 5000.0, 1e7);
   const ThermalNetwork network(std::vector{2000.0}, std::vector{4.0});
   std::vector<double> temp{10.0};
@@ -113,7 +113,7 @@ TEST_CASE("one lump warms as the exponential says, at any step") {
   CHECK(temp[0] == Approx(25.0 - 15.0 * std::exp(-dt_s / 500.0)));
 }
 
-TEST_CASE("heat falls with the power of the speed that the source has") {
+TEST_CASE("heat depends on the speed by the source's exponent") {
   PlantConfig config = two_lumps();
   config.signals = {constant("spindle_rpm", 4000.0)};
   CHECK(Plant(config, 1).heat_W(0) == Approx(100.0 * std::pow(0.5, 1.5)));
@@ -133,7 +133,7 @@ TEST_CASE("coolant cools only while it flows") {
   CHECK(always.node_degC(1) == Approx(20.0 + 100.0 / 60.0).epsilon(1e-6));
 }
 
-TEST_CASE("what is seen at a time does not depend on the times looked at before") {
+TEST_CASE("values at a time do not depend on earlier reading times") {
   Plant seldom(lively(), 7);
   Plant often(lively(), 7);
   for (double t = 0.0; t < 2000.0; t += 0.37) often.advance_to(t);
@@ -142,7 +142,7 @@ TEST_CASE("what is seen at a time does not depend on the times looked at before"
 
 TEST_CASE("a shorter step of the plant changes little") {
   PlantConfig fine = lively();
-  fine.room.wander_K = 0.0;  // its draws belong to the step
+  fine.room.wander_K = 0.0;  // its random numbers depend on the step
   PlantConfig coarse = fine;
   fine.step_s = 0.1;
   coarse.step_s = 10.0;
@@ -154,7 +154,7 @@ TEST_CASE("a shorter step of the plant changes little") {
   CHECK(a.displacement_um(0) == Approx(b.displacement_um(0)).margin(0.3));
 }
 
-TEST_CASE("the seed makes the run, and only the seed") {
+TEST_CASE("the run depends on the seed, and only on it") {
   MachineConfig machine;
   machine.plant = lively();
   machine.pitch_s = 5.0;
@@ -168,7 +168,7 @@ TEST_CASE("the seed makes the run, and only the seed") {
 
 TEST_CASE("a thermocouple shows its node with noise of the stated size, lag, offset, resolution") {
   PlantConfig config = two_lumps();
-  config.sources.clear();  // nothing warms
+  config.sources.clear();  // no heat
   config.thermocouples.resize(2);
   config.thermocouples[0].noise_K = 0.05;
   config.thermocouples[1].offset_K = 0.333;
@@ -191,7 +191,7 @@ TEST_CASE("a thermocouple shows its node with noise of the stated size, lag, off
 TEST_CASE("a lagging thermocouple trails a steady rise by slope times lag") {
   PlantConfig config = two_lumps();
   config.nodes.resize(1);
-  config.links.clear();  // 100 W into 5000 J/K: 0.02 K/s for ever
+  config.links.clear();  // 100 W into 5000 J/K: a constant 0.02 K/s
   config.thermocouples.resize(1);
   config.thermocouples[0].lag_s = 30.0;
   Plant plant(config, 1);
@@ -210,7 +210,7 @@ TEST_CASE("a position effect is zero at its centre and linear beside it") {
   CHECK(with.displacement_um(0) - without.displacement_um(0) == Approx(3.0 * 15.0 * 0.2));
 }
 
-TEST_CASE("a line goes straight from one value to the next, and anew when it repeats") {
+TEST_CASE("a line is linear between its values and restarts when it repeats") {
   PlantConfig config = two_lumps();
   SignalConfig line = constant("oil", 0.0);
   line.kind = SignalKind::line;
@@ -236,7 +236,7 @@ TEST_CASE("a line goes straight from one value to the next, and anew when it rep
   CHECK(again.signal(1) == Approx(35.0));
 }
 
-TEST_CASE("a coolant whose temperature is a signal has that, whatever the room does") {
+TEST_CASE("a coolant temperature given by a signal does not depend on the room") {
   PlantConfig config = two_lumps();
   config.sources.clear();
   config.nodes[0].coolant_W_per_K = 1e6;
@@ -262,7 +262,7 @@ TEST_CASE("a body's guideway adds its rows at the axis' position to the output")
   body.room_inflow = {1e-3};
   body.coolant_inflow = {0.0};
   body.one_degC = {1.0};
-  body.sources = {{"heat", "warm", 1.0, 1.0, 1.0, {1e-2}}};  // 10 K in the end
+  body.sources = {{"heat", "warm", 1.0, 1.0, 1.0, {1e-2}}};  // 10 K in steady state
   body.sensors = {{"there", {1.0}}};
   body.outputs = {{"x_um", {2.0}}};
   body.guideways = {{"rail", "z_mm", "x_um", {0.0, 100.0, 800.0}, {{-1.0}, {1.0}, {3.0}}}};

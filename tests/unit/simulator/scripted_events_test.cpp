@@ -1,4 +1,4 @@
-// The script of what goes wrong, and what the simulated controller does with offsets.
+// Tests of scripted events and of the simulated controller's response to offsets.
 #include "simulator/plant/scripted_events.hpp"
 
 #include <cmath>
@@ -41,7 +41,7 @@ SimulatedController two_axes() {
 
 }  // namespace
 
-TEST_CASE("an event is in force from its time until its duration is over, and only on its target") {
+TEST_CASE("an event is active from its time for its duration, and only on its target") {
   MachineConfig machine = one_device();
   machine.events = {event(MachineEventKind::open_circuit, TargetKind::channel, 100.0, 50.0)};
   CHECK_FALSE(effects_at(machine, 99.9).channels[0][1].fault.has_value());
@@ -51,7 +51,7 @@ TEST_CASE("an event is in force from its time until its duration is over, and on
   CHECK_FALSE(effects_at(machine, 150.0).channels[0][1].fault.has_value());
 }
 
-TEST_CASE("each kind of event does what its name says") {
+TEST_CASE("each kind of event has its effect") {
   MachineConfig machine = one_device();
   EventConfig made = event(
       GENERATE(MachineEventKind::freeze, MachineEventKind::drop, MachineEventKind::delay,
@@ -81,15 +81,15 @@ TEST_CASE("spikes and drifts add up and end") {
   CHECK(effects_at(machine, 3600.0).channels[0][1].added_K == 0.0);
 }
 
-TEST_CASE("a controller applies offsets only once and while the heartbeat beats") {
+TEST_CASE("a controller applies offsets only after a heartbeat and while it changes") {
   SimulatedCnc cnc(two_axes());
   cnc.take(0.0, {{5.0, 5.0}, 3, 1.0});
   cnc.step(0.1, {});
-  CHECK(cnc.applied_um(0) == 0.0);  // one value of the heartbeat is no beat
+  CHECK(cnc.applied_um(0) == 0.0);  // a single heartbeat value is not a change
   cnc.take(0.2, {{5.0, 5.0}, 3, 2.0});
   cnc.step(0.3, {});
   CHECK(cnc.applied_um(0) == 5.0);
-  cnc.take(1.5, {{7.0, 7.0}, 3, 2.0});  // it stands still
+  cnc.take(1.5, {{7.0, 7.0}, 3, 2.0});  // the heartbeat stops
   cnc.step(1.6, {});
   CHECK(cnc.applied_um(0) == 5.0);
   CHECK_FALSE(cnc.alive());
@@ -98,7 +98,7 @@ TEST_CASE("a controller applies offsets only once and while the heartbeat beats"
   CHECK(cnc.applied_um(0) == 7.0);
 }
 
-TEST_CASE("a controller leaves axes alone that are not valid, out of bound or not a number") {
+TEST_CASE("a controller ignores offsets that are not valid, out of bound or not a number") {
   SimulatedController config = two_axes();
   config.heartbeat.reset();
   SimulatedCnc cnc(config);
@@ -148,7 +148,7 @@ TEST_CASE("a controller takes all nodes of a travel or none, and interpolates by
   cnc.stand_at(0, 1.1, 200.0);
   CHECK(cnc.applied_um(0) == Approx(3.0));
   cnc.stand_at(0, 1.15, 150.0);
-  CHECK(cnc.applied_um(0) == Approx(3.5));  // a step of its own limit
+  CHECK(cnc.applied_um(0) == Approx(3.5));  // limited by its own rate
   CHECK(cnc.applied_um(1) == 7.0);
   cnc.take(1.2, {{1.0, 100.0, 1.0, 8.0}, 3, 0.0});
   cnc.step(1.3, {});
@@ -156,10 +156,10 @@ TEST_CASE("a controller takes all nodes of a travel or none, and interpolates by
   CHECK(cnc.nodes(0)[1] == 5.0);
   CHECK(cnc.applied_um(1) == 8.0);
   cnc.stand_at(0, 9.0, 900.0);
-  CHECK(cnc.applied_um(0) == Approx(1.0));  // a table's end holds beyond it
+  CHECK(cnc.applied_um(0) == Approx(1.0));  // a table is constant beyond its end
 }
 
-TEST_CASE("the number of a set is in effect with its values, and forgotten with them") {
+TEST_CASE("a set's number takes effect and is discarded with its values") {
   SimulatedController config = two_axes();
   config.heartbeat.reset();
   config.axes[0].travel.emplace();
@@ -179,7 +179,7 @@ TEST_CASE("the number of a set is in effect with its values, and forgotten with 
   CHECK(cnc.set_number(0) == 0);
 }
 
-TEST_CASE("a controller rejects, misapplies and forgets as the script says") {
+TEST_CASE("a controller rejects, misapplies and loses offsets as scripted") {
   SimulatedController config = two_axes();
   config.heartbeat.reset();
   SimulatedCnc cnc(config);
@@ -199,12 +199,12 @@ TEST_CASE("a controller rejects, misapplies and forgets as the script says") {
   CHECK(cnc.applied_um(0) == 6.0);
 }
 
-TEST_CASE("a piezo with a dead band has two branches, and only one for who comes from 0 V") {
+TEST_CASE("a piezo with a dead band has two branches, and only the rising one from 0 V") {
   const SimulatedPiezoConfig config{10.0, {0.0, 100.0}, {-20.0, 30.0}};
   SimulatedPiezo piezo(config);
   CHECK(piezo.step(8.0) == -20.0);  // within the dead band
   CHECK(piezo.step(70.0) == Approx(10.0));
-  CHECK(piezo.step(62.0) == Approx(10.0));  // turned: nothing moves for 10 V
+  CHECK(piezo.step(62.0) == Approx(10.0));  // reversed: no motion for 10 V
   CHECK(piezo.step(50.0) == Approx(5.0));
   CHECK(piezo.step(55.0) == Approx(5.0));
   CHECK(piezo.step(70.0) == Approx(10.0));
