@@ -1,4 +1,4 @@
-/// The command line of `thermocomp-fleet`; `--help`, manual page and completion are made from it.
+/// Command line of `thermocomp-fleet`; `--help`, manual page and completion are generated from it.
 #pragma once
 
 #include <functional>
@@ -10,9 +10,8 @@ class App;
 
 namespace thermocomp::fleet {
 
-/// @param store   outlives the parsing, which sets it to the store's connection
-/// @param action  outlives the parsing, which sets it to what was asked for; it returns the exit
-///                status
+/// @param store, action  must outlive the parsing, which sets them to the connection and to the
+///               requested command; the command returns the exit status
 void declare_fleet_command_line(CLI::App& app, std::string& store, std::function<int()>& action);
 
 }  // namespace thermocomp::fleet

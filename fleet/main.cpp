@@ -1,4 +1,4 @@
-// thermocomp-fleet: what an office does with the store of its machines.
+// thermocomp-fleet: office commands for the store of a series of machines.
 #include <string>
 
 #include "fleet/command_line.hpp"

@@ -60,7 +60,7 @@ Outputs BridgeState::show(const MachineView& view, nanoseconds now) {
   outputs_.fresh =
       answered_at_ && std::chrono::duration<double>(now - *answered_at_).count() <= limits_.fresh_s;
   outputs_.compensating = outputs_.fresh && view.taking && mode_ == "compensating";
-  // An operator who has switched it off knows.
+  // No warning if an operator has switched it off.
   if (!view.taking || outputs_.compensating || mode_ == "disabled")
     idle_since_.reset();
   else if (!idle_since_)

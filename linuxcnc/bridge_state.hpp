@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/// What the bridge's output pins show, decided from answers and from what HAL says. No I/O; time
-/// is an argument.
+/// State of the bridge's output pins, from the daemon's answers and the input pins. No I/O; time is
+/// an argument.
 #pragma once
 
 #include <chrono>
@@ -17,33 +17,33 @@ using std::chrono::nanoseconds;
 
 struct Limits {
   double offset_mm_max{0.2};     ///< a larger offset is refused
-  double fresh_s{1.0};           ///< so long after an answer offsets count as fresh
-  double mismatch_mm{0.005};     ///< applied and asked for may differ by so much
-  double mismatch_after_s{3.0};  ///< ... or longer by more; also how long a start may take
+  double fresh_s{1.0};           ///< maximum age of a fresh answer
+  double mismatch_mm{0.005};     ///< tolerance between applied and requested offset
+  double mismatch_after_s{3.0};  ///< duration of a mismatch before a warning; also of a start
 };
 
 struct Outputs {
-  /// None: the pin is not written, it keeps what it shows.
+  /// None: the pin is not written and keeps its value.
   std::vector<std::optional<double>> offset_mm;
-  bool heartbeat{false};  ///< changes with every answer
+  bool heartbeat{false};  ///< toggles with every answer
   bool fresh{false};
   bool compensating{false};
   bool mismatch{false};
   bool warning{false};
-  std::uint32_t faults{0};  ///< answers and values that were refused
+  std::uint32_t faults{0};  ///< refused answers and values
 };
 
-/// Offsets are taken from answers only. Without answers they stay as they are. A new epoch starts
-/// from what is applied, so that whatever happened meanwhile is no jump; while LinuxCNC takes no
-/// offsets, none is asked for, so that it does not find an old one when it takes them again.
+/// Offsets change only by answers. A new epoch starts from the applied offset, to avoid a jump.
+/// While LinuxCNC takes no offsets, zero is requested, so that no old offset is applied when it
+/// takes them again.
 class BridgeState {
  public:
   BridgeState(std::size_t axes, const Limits& limits);
 
-  /// An answer to the report made from `reported`.
+  /// Takes the answer to the request made from `reported`.
   void take(const Answer& answer, const MachineView& reported, nanoseconds now);
   void fault() noexcept { ++outputs_.faults; }
-  /// What to show now. Offsets are there once after they have changed.
+  /// Outputs for now. An offset is present only once after each change.
   [[nodiscard]] Outputs show(const MachineView& view, nanoseconds now);
 
  private:

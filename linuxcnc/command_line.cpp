@@ -6,7 +6,7 @@
 namespace thermocomp_linuxcnc {
 namespace {
 
-/// CLI::Range takes "nan" for a number within.
+/// CLI::Range accepts "nan".
 CLI::Validator between(double low, double high) {
   return {[low, high](const std::string& text) -> std::string {
             double value = 0.0;

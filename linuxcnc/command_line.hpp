@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/// The options of thermocomp-linuxcnc.
+/// Command line options of thermocomp-linuxcnc.
 #pragma once
 
 #include <optional>
@@ -18,16 +18,16 @@ struct BridgeOptions {
   Limits limits;
 };
 
-/// What is to be done: run as a bridge, or print a HAL file.
+/// Task: run as a bridge, or print a HAL file.
 struct Task {
   bool print_hal{false};
   BridgeOptions bridge;
   HalFileOptions hal;
-  std::string rejoin_as;  ///< not empty: the file for another component to take over
+  std::string rejoin_as;  ///< not empty: print the file for another component to take over
 };
 
-/// Prints help, version or what is wrong where that is due.
-/// @return nothing: `status` is the exit status
+/// Prints help, version or errors as needed.
+/// @return nullopt: exit with `status`
 [[nodiscard]] std::optional<Task> read_command_line(int argc, const char* const* argv, int& status);
 
 /// "x=0,z=2" @throws BadOption

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/// The connection to the daemon's status socket: lines out, lines in, never waits.
+/// The connection to the daemon's status socket: non-blocking exchange of lines.
 #pragma once
 
 #include <cstddef>
@@ -10,7 +10,7 @@ namespace thermocomp_linuxcnc {
 
 class DaemonLink {
  public:
-  /// No answer of the daemon is longer.
+  /// Longest answer of the daemon.
   static constexpr std::size_t line_bytes_max = std::size_t{256} * 1024;
 
   explicit DaemonLink(std::string path) : path_(std::move(path)) {}
@@ -18,17 +18,16 @@ class DaemonLink {
   DaemonLink(const DaemonLink&) = delete;
   DaemonLink& operator=(const DaemonLink&) = delete;
 
-  /// @return whether there is a connection now; error() says why not
+  /// @return connected; if not, error() gives the reason
   bool connect();
   void close();
   [[nodiscard]] bool connected() const noexcept { return fd_ >= 0; }
   [[nodiscard]] int fd() const noexcept { return fd_; }  ///< -1: none
   [[nodiscard]] const std::string& error() const noexcept { return error_; }
 
-  /// A request is far smaller than a socket's buffer: what does not fit at once ends the
-  /// connection.
+  /// A request is far smaller than a socket's buffer; a partial write ends the connection.
   bool send(const std::string& line);
-  /// The next whole line, if one is there. The connection may end here.
+  /// The next complete line, if any. May end the connection.
   std::optional<std::string> receive();
 
  private:

@@ -32,7 +32,7 @@ void check(const HalFileOptions& options) {
             "joint " + std::to_string(axis.joint) + " is given twice");
   }
   const auto positive = [](double value, double most, const char* what) {
-    // Negated so that NaN is refused too.
+    // Negated, so that NaN is refused too.
     if (!(value > 0.0 && value <= most))
       throw BadOption(std::string(what) + " must be more than 0 and at most " + number(most));
   };
@@ -50,7 +50,7 @@ class Writer {
   void line(const std::string& text) { text_.append(text).append("\n"); }
   void set(const std::string& pin, const std::string& value) { line("setp " + pin + " " + value); }
 
-  /// An instance of each name for every axis: limit3 names=tc.limit-x,tc.limit-y
+  /// Loads an instance per name and axis: limit3 names=tc.limit-x,tc.limit-y
   void load(const std::string& kind, const std::string& each, const std::string& further = {}) {
     std::string names = further;
     for (const HalAxis& axis : options_.axes) {
@@ -61,7 +61,7 @@ class Writer {
     line("loadrt " + kind + " names=" + names);
   }
 
-  /// A pin of LinuxCNC to pins of ours, by its own signal where it has one.
+  /// Connects a pin of LinuxCNC to our pins, by the machine's own signal if it has one.
   void from_machine(const std::string& pin, const std::string& signal, const std::string& ours) {
     const auto own = options_.signals.find(pin);
     if (own == options_.signals.end())
@@ -72,11 +72,11 @@ class Writer {
   void net(const std::string& signal, const std::string& from, const std::string& to) {
     line("net " + signal + " " + from + " => " + to);
   }
-  /// In the thread at the next place from the front, or at the end.
+  /// Adds a function to the thread at a position from the front (> 0) or the end (< 0).
   void run(const std::string& function, int position) {
     line("addf " + function + " " + options_.thread + " " + std::to_string(position));
   }
-  /// A loop over the axes: f(letter, joint pin, axis pin)
+  /// Calls f(letter, joint pin, axis pin) for each axis.
   template <class Each>
   void each(Each what) {
     for (const HalAxis& axis : options_.axes)
@@ -85,12 +85,12 @@ class Writer {
   }
   [[nodiscard]] std::string text() const { return text_; }
   [[nodiscard]] const HalFileOptions& options() const { return options_; }
-  /// The signal of a pin of ours that goes to a drive or comes from one.
+  /// Signal between one of our pins and a drive.
   [[nodiscard]] std::string drive_signal(const std::string& pin, const std::string& usual) const {
     const auto own = options_.signals.find(pin);
     return own == options_.signals.end() ? usual : own->second;
   }
-  /// The signal that says whether offsets are taken. Joint: whether all joints are homed.
+  /// Signal that is true while offsets are taken. Joint: all joints are homed.
   [[nodiscard]] std::string taking() const {
     if (options_.way == Way::external) return "tc-taking";
     const auto own = options_.signals.find("motion.is-all-homed");
@@ -113,8 +113,8 @@ void load_bridge(Writer& out, const std::string& name) {
            letters + (options.arguments.empty() ? "" : " " + options.arguments));
 }
 
-/// What the bridge reads, then what it gives: in this order a bridge that joins a running machine
-/// knows what is applied before its offsets reach anything.
+/// Connects inputs before outputs, so that a bridge that joins a running machine knows the applied
+/// offsets before its own take effect.
 void connect_bridge(Writer& out, const std::string& name) {
   const auto pin = [&](const std::string& end) { return name + "." + end; };
   out.each([&](const std::string& axis, const std::string&, const std::string& axis_pin) {
@@ -139,8 +139,7 @@ void connect_bridge(Writer& out, const std::string& name) {
   });
 }
 
-/// A bridge that stands still, or a daemon that does, is seen here: the heartbeat no longer
-/// changes. It only warns; the offsets stay.
+/// Detects a stopped bridge or daemon by a constant heartbeat. It only warns; the offsets hold.
 void write_warning(Writer& out) {
   out.line("\n# ---- fresh and warning: signals tc-fresh, tc-warning and an operator message");
   out.set("tc.alive.rising", "1");
@@ -153,7 +152,7 @@ void write_warning(Writer& out) {
   out.net("tc-stale", "tc.stale.out", "tc.warn.in0");
   out.line("net tc-bridge-warning => tc.warn.in1");
   out.net("tc-warning", "tc.warn.out", "tc.tell.in0");
-  // A machine that is off needs no message; one that is switched on without offsets does.
+  // Only an enabled machine without offsets needs a message.
   out.from_machine("motion.motion-enabled", "tc-enabled", "tc.tell.in1");
   out.net("tc-tell", "tc.tell.out", "tc.message.trigger");
 }
@@ -231,7 +230,7 @@ void write_joint(Writer& out) {
   });
 }
 
-/// One count of eoffset-counts [mm]: finer than anything that is asked for.
+/// One count of eoffset-counts [mm]; finer than any offset.
 constexpr double count_mm = 1e-5;
 
 void write_external(Writer& out) {
@@ -303,7 +302,7 @@ std::string rejoin_file(const HalFileOptions& options, const std::string& name) 
   if (name.empty()) throw BadOption("the component that takes over needs a name");
   Writer out(options);
   if (name != options.name) {
-    // A component that ended in order took its pins with it; a killed one still holds its signals.
+    // After a clean end a component's pins are gone; a killed one still holds its signals.
     for (const char* pin : {"heartbeat", "fresh", "warning"})
       out.line("unlinkp " + out.bridge(pin));
     out.each([&](const std::string& axis, const std::string&, const std::string&) {

@@ -119,7 +119,7 @@ void HalPins::write(const Outputs& outputs, bool connected) {
   *pins_->mismatch = outputs.mismatch;
   *pins_->warning = outputs.warning;
   *pins_->faults = outputs.faults;
-  *pins_->heartbeat = outputs.heartbeat;  // last: what it vouches for is there
+  *pins_->heartbeat = outputs.heartbeat;  // last, after the values that it confirms
 }
 
 }  // namespace thermocomp_linuxcnc

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/// The bridge as a HAL component: its pins, read and written.
+/// The bridge's HAL component: reads and writes its pins.
 #pragma once
 
 #include <stdexcept>
@@ -17,9 +17,9 @@ class HalError : public std::runtime_error {
 
 class HalPins {
  public:
-  /// Makes the component and its pins, and says that it is ready. @throws HalError
+  /// Creates the component with its pins and marks it ready. @throws HalError
   HalPins(const std::string& name, const std::string& axes);
-  ~HalPins();  ///< leaves HAL: the component can be loaded again
+  ~HalPins();  ///< leaves HAL, so that the component can be loaded again
   HalPins(const HalPins&) = delete;
   HalPins& operator=(const HalPins&) = delete;
 

@@ -1,5 +1,5 @@
-// SPDX-License-Identifier: GPL-2.0-or-later
-// thermocomp-linuxcnc, the running bridge: HAL on one side, the daemon's socket on the other.
+// SPDX-License-Identifier: GPL-2.0-or-later thermocomp-linuxcnc: bridge between HAL and the
+// daemon's socket.
 #include <cerrno>
 #include <chrono>
 #include <csignal>
@@ -25,7 +25,7 @@ using Clock = std::chrono::steady_clock;
 using namespace std::chrono_literals;
 
 constexpr auto reconnect_after = 500ms;
-/// The daemon carries a command out before it answers, for some seconds at most.
+/// Longest time for an answer: the daemon executes a command first.
 constexpr auto answer_max = 10s;
 constexpr auto offsets_cleared_within = 300ms;
 
@@ -37,7 +37,7 @@ int open_signals() {
   return signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
 }
 
-/// Another one for every connection: whoever asks again after a break is not who asked before.
+/// A new number per connection, which marks a client that asks again after a break as new.
 std::uint64_t new_session() {
   std::uint32_t number = 0;
   while (number == 0)
@@ -45,8 +45,8 @@ std::uint64_t new_session() {
   return number;
 }
 
-/// When the machine has been switched on and homed LinuxCNC clears an external offset only some
-/// servo periods later. What is applied until then is of before: it is not reported as taking yet.
+/// After power-on and homing, LinuxCNC clears an external offset some servo periods late. Until
+/// then the applied offset is an old one and is not reported as taken.
 class Settled {
  public:
   bool taking(bool taking, Clock::time_point now) {
@@ -65,7 +65,7 @@ class Exchange {
   Exchange(const BridgeOptions& options, BridgeState& state)
       : options_(options), state_(state), link_(options.socket) {}
 
-  /// Connects where it is time to, and asks unless an answer is awaited.
+  /// Connects when due, and sends a request unless an answer is pending.
   void ask(const MachineView& view, Clock::time_point now) {
     if (asked_ && now - asked_at_ > answer_max) {
       link_.close();
@@ -110,7 +110,7 @@ class Exchange {
     if (!link_.connect()) say(link_.error());
   }
 
-  /// Once each time that it changes; empty: all is well.
+  /// Prints each new message once; empty: no problem.
   void say(const std::string& what) {
     if (what == last_said_) return;
     last_said_ = what;
@@ -130,7 +130,7 @@ class Exchange {
   std::string last_said_;
 };
 
-/// Exchanges until SIGTERM or SIGINT. @throws HalError at the start
+/// Runs until SIGTERM or SIGINT. @throws HalError at the start
 void run_bridge(const BridgeOptions& options) {
   const int signals = open_signals();
   HalPins pins(options.name, options.axes);

@@ -16,8 +16,8 @@ json number(double value) {
   return std::isfinite(value) ? json(value) : json(nullptr);
 }
 
-/// Brackets within brackets are copied and destroyed recursively: no deeper than any answer is.
-/// Brackets in strings do not count, in either direction.
+/// Refuses deep nesting, since JSON values are copied and destroyed recursively. Brackets in
+/// strings do not count.
 bool is_flat(std::string_view line) {
   constexpr int depth_max = 16;
   int depth = 0;
@@ -34,7 +34,7 @@ bool is_flat(std::string_view line) {
   return true;
 }
 
-/// The daemon's words end on a terminal: what is not plain there becomes a blank.
+/// Replaces control characters by blanks, since the daemon's text is shown on a terminal.
 std::string plain(std::string text) {
   for (char& c : text)
     if (c < ' ' || c > '~') c = ' ';
@@ -50,10 +50,10 @@ const json& member(const json& object, const char* key) {
 std::optional<double> read_offset(const json& offsets, const std::string& axis,
                                   double offset_mm_max) {
   const auto found = offsets.find(axis);
-  // The daemon's configuration does not have it: nothing to do for this axis.
+  // The axis is not in the daemon's configuration.
   if (found == offsets.end() || found->is_null()) return std::nullopt;
   const double offset_mm = found->is_number() ? found->get<double>() / um_per_mm : NAN;
-  // Negated so that NaN is refused too.
+  // Negated, so that NaN is refused too.
   if (!(std::abs(offset_mm) <= offset_mm_max))
     throw BadAnswer("the offset of axis " + axis + " is no number within the bound");
   return offset_mm;

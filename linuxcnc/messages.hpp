@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/// The two lines of an exchange with the daemon: JSON-RPC `controller_state`, which reports the
-/// input pins of the HAL component at one moment, and its answer.
+/// Lines of an exchange with the daemon: JSON-RPC `controller_state`, a snapshot of the HAL
+/// component's input pins, and its answer.
 #pragma once
 
 #include <cmath>
@@ -13,7 +13,7 @@
 
 namespace thermocomp_linuxcnc {
 
-/// LinuxCNC's numbers of a kind of motion (pin motion.motion-type).
+/// Values of LinuxCNC's pin motion.motion-type.
 enum class MotionType {
   none = 0,
   rapid = 1,
@@ -26,12 +26,13 @@ enum class MotionType {
 
 struct AxisView {
   double applied_mm{NAN};   ///< offset in effect
-  double wanted_mm{NAN};    ///< setpoint of the offset in LinuxCNC; differs while it moves there
-  double position_mm{NAN};  ///< of the axis, commanded
+  double wanted_mm{NAN};    ///< LinuxCNC's setpoint of the offset; differs during a move
+  double position_mm{NAN};  ///< commanded position of the axis
 };
 
 struct MachineView {
-  bool taking{false};  ///< offsets are added to the positions: on, homed, as the HAL file has it
+  bool taking{false};  ///< offsets are added to the positions: machine on and homed, as defined in
+                       ///< the HAL file
   bool enabled{false};
   bool homed{false};
   bool program_running{false};
@@ -42,8 +43,8 @@ struct MachineView {
   std::vector<AxisView> axes;
 };
 
-/// Program running and not a rapid, a tool change or an indexing; or feeding without a program. A
-/// dwell or a feed hold within a program is a cut: the tool may stand in the work.
+/// A program runs without a rapid, tool change or indexing, or a feed without a program. A dwell or
+/// feed hold within a program is a cut, since the tool may be in contact.
 [[nodiscard]] inline bool in_cut(const MachineView& view) noexcept {
   const auto type = static_cast<MotionType>(view.motion_type);
   if (view.program_running)
@@ -52,26 +53,25 @@ struct MachineView {
   return type == MotionType::feed || type == MotionType::arc || type == MotionType::probe;
 }
 
-/// An answer that must not be acted on.
+/// An answer that must not be used.
 class BadAnswer : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
 struct Answer {
-  bool anew{false};                              ///< offsets go on from what was reported
-  std::string mode;                              ///< of the daemon: "compensating", "holding", ...
-  std::vector<std::optional<double>> offset_mm;  ///< order of the axes; none: leave it as it is
+  bool anew{false};                              ///< offsets continue from the reported ones
+  std::string mode;                              ///< daemon's mode: "compensating", "holding", ...
+  std::vector<std::optional<double>> offset_mm;  ///< by axis; none: unchanged
 };
 
-/// @param axes  letters; view.axes is in their order
-/// @return with its line's end. Values that are not finite become null
+/// @param axes  letters, in the order of view.axes
+/// @return the line with its line feed. Values that are not finite become null
 [[nodiscard]] std::string request_line(std::uint64_t session, std::uint64_t id,
                                        std::string_view axes, const MachineView& view);
 
-/// @param offset_mm_max  a larger offset is no offset
-/// @throws BadAnswer: not JSON, of another request, an error, an axis left out, a value that
-///         cannot be
+/// @param offset_mm_max  larger offsets are refused
+/// @throws BadAnswer: not JSON, of another request, an error, a missing axis, an invalid value
 [[nodiscard]] Answer read_answer(std::string_view line, std::uint64_t id, std::string_view axes,
                                  double offset_mm_max);
 

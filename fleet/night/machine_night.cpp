@@ -28,13 +28,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int probings_min = 8;              ///< of a night; fewer say nothing of a machine
-constexpr std::size_t nights_of_series = 7;  ///< of each machine, before the night that is judged
-constexpr double probability_least = 1e-30;  ///< a real of PostgreSQL holds hardly less
-constexpr int machines_min = 3;              ///< besides the one that is judged
-constexpr std::size_t sisters_max = 3 + 60;  ///< words of the command; more show hardly more of S
+constexpr int probings_min = 8;              ///< required per night
+constexpr std::size_t nights_of_series = 7;  ///< of each machine, before the night under test
+constexpr double probability_least = 1e-30;  ///< close to the smallest PostgreSQL real
+constexpr int machines_min = 3;              ///< besides the one under test
+constexpr std::size_t sisters_max =
+    3 + 60;  ///< arguments of the command; more machines hardly improve S
 
-/// Of a machine: what it was given and did is no input of its displacement.
+/// Offsets, sent or applied, are not inputs of a machine's displacement.
 bool is_column_of_run(const std::string& name) {
   return !name.ends_with("_offset_um") && !name.ends_with("_applied_um");
 }
@@ -47,7 +48,7 @@ constexpr const char* probings_of_night =
     "SELECT extract(epoch FROM date_trunc('minute', at))::bigint, output, avg(displacement_um)"
     " FROM fleet.probing WHERE machine = $1 AND at >= $2::date AND at < $2::date + 1 GROUP BY 1, 2";
 
-/// Of PostgreSQL: {a,NULL,"b c"}; our names need no quotes.
+/// Elements of a PostgreSQL array, {a,NULL,"b c"}; our names need no escapes.
 std::vector<std::string> elements(const std::string& array) {
   std::vector<std::string> all;
   std::string element;
@@ -91,7 +92,7 @@ struct Verdict {
   nlohmann::json answer = nullptr;  ///< "departure" of `inspect`
 };
 
-/// Takes the answer, since the exit status is 1 for a fault of the recording, too.
+/// Uses the answer, since exit status 1 can also mean a fault of the recording.
 Verdict compared(const WorkFolder& folder, const fs::path& run, const std::string& series) {
   write_text(folder / "series.toml", series);
   run_modelling({"inspect", run.string(), "--series", folder / "series.toml", "--json",
@@ -107,7 +108,7 @@ Verdict compared(const WorkFolder& folder, const fs::path& run, const std::strin
   return verdict;
 }
 
-/// Largest subject of the output that departs: "column_degC, 6.1 um".
+/// Largest subject of the departing output: "column_degC, 6.1 um".
 std::string subject_text(const nlohmann::json& answer) {
   for (const auto& [name, output] : answer.items()) {
     if (!output.value("departs", false) || output["subjects"].empty()) continue;
@@ -120,7 +121,7 @@ std::string subject_text(const nlohmann::json& answer) {
   return "more is left than of its sisters";
 }
 
-/// Whether the last night before that was judged was unusual too: one alone happens by chance.
+/// The last compared night was unusual too; a single unusual night happens by chance.
 bool was_unusual(pqxx::connection& store, const MachineNight& night) {
   pqxx::nontransaction work(store);
   const pqxx::result before = work.exec_params(
@@ -131,7 +132,8 @@ bool was_unusual(pqxx::connection& store, const MachineNight& night) {
   return !before.empty() && before[0][0].as<bool>();
 }
 
-/// `diagnose` with the model in use: the week before shows, the night decides.
+/// Runs `diagnose` with the model in use, trained on the three nights before and tested on this
+/// one.
 nlohmann::json diagnosed(pqxx::connection& store, const MachineNight& night,
                          const WorkFolder& folder, const fs::path& run) {
   pqxx::nontransaction work(store);
@@ -269,7 +271,7 @@ int write_run(pqxx::connection& store, const MachineNight& night, const fs::path
   for (const pqxx::row& row : work.exec_params(probings_of_night, night.machine, night.night)) {
     const auto output = row[1].as<std::string>();
     note(outputs, output);
-    // A minute without a sample has no temperatures beside which it could count.
+    // Skips probings in minutes without a sample, since these have no temperatures.
     if (const auto found = rows.find(row[0].as<std::int64_t>()); found != rows.end())
       found->second[output] = row[2].as<std::string>();
   }
@@ -347,7 +349,7 @@ void note_failure(pqxx::connection& store, const MachineNight& night, const std:
 
 namespace {
 
-/// A machine with enough nights before this one.
+/// A machine with enough nights before the one under test.
 struct Ready {
   int machine{0};
   bool has_past{false};
@@ -355,14 +357,14 @@ struct Ready {
   std::string statistics;
 };
 
-/// Makes the minute means of a night that is over. `--slurm` makes the series before the nights
-/// themselves, which otherwise make them.
+/// Creates missing minute means of a past night; `--slurm` needs the series before the nights'
+/// tasks create them.
 constexpr const char* make_missing_minutes =
     "SELECT fleet.make_minutes($1, $2::date) FROM fleet.uplink WHERE machine = $1 AND NOT EXISTS"
     " (SELECT FROM fleet.minute WHERE machine = $1 AND at >= $2::date AND at < $2::date + 1)"
     " GROUP BY machine HAVING max(newest) >= $2::date + 1";
 
-/// Writes their runs and statistics into the folder.
+/// Writes the machines' runs and statistics into the folder.
 std::vector<Ready> ready_machines(pqxx::connection& store, const WorkFolder& folder,
                                   const std::string& type, const pqxx::result& machines,
                                   const pqxx::result& days) {
@@ -421,7 +423,7 @@ void make_series(pqxx::connection& store, const std::string& type, const std::st
         type, kind, id, night, count, THERMOCOMP_VERSION, read_text_file(file));
     keeping.commit();
   };
-  /// Of all machines but a group. @return how many
+  /// Makes the series of all machines except one group. @return number of machines
   const auto make = [&](std::size_t groups, std::size_t left_out, const std::string& file) {
     std::vector<std::string> arguments{"series", "-o", file};
     for (std::size_t i = 0; i < ready.size(); ++i)
@@ -430,7 +432,7 @@ void make_series(pqxx::connection& store, const std::string& type, const std::st
     run_modelling(arguments, folder / "log");
     return arguments.size() - 3;
   };
-  // A machine is no sister of its own; of many machines a half at a time is left out.
+  // Excludes each machine from its own series; with many machines, half of them at a time.
   const std::size_t groups = ready.size() < 8 ? ready.size() : 2;
   for (std::size_t group = 0; group < groups; ++group) {
     const std::string sisters = folder / "sisters.toml";
@@ -445,7 +447,7 @@ void make_series(pqxx::connection& store, const std::string& type, const std::st
       keep("own_past", &ready[i], 1, folder / "past.toml");
     }
   }
-  // Last: with it the week's series are complete.
+  // Kept last: it marks the week's series as complete.
   const std::size_t count = make(1, 1, folder / "type.toml");
   keep("type", nullptr, count, folder / "type.toml");
 }

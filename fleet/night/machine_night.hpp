@@ -1,4 +1,4 @@
-/// The work of one machine's night.
+/// Evaluation of one machine's night.
 #pragma once
 
 #include <filesystem>
@@ -15,7 +15,7 @@ struct MachineNight {
   std::string night;  ///< date: 24 h from 0:00 UTC
 };
 
-/// A folder that goes with this.
+/// Temporary folder; the destructor removes it.
 class WorkFolder {
  public:
   WorkFolder();
@@ -30,31 +30,31 @@ class WorkFolder {
   std::filesystem::path path_;
 };
 
-/// Runs a program to its end. @param log  of its output; empty: the output is ours
-/// @return its exit status, or 128 and the signal that ended it. @throws std::system_error
+/// Runs a program to its end. @param log  receives its output; empty: the output is inherited
+/// @return its exit status, or 128 plus the signal that ended it. @throws std::system_error
 int run_and_wait(const std::string& program, const std::vector<std::string>& arguments,
                  const std::filesystem::path& log);
 
-/// Runs `thermocomp-modelling`, of the program's own folder, with these arguments.
-/// @return its exit status, 0 or 1. @throws std::runtime_error with its last words otherwise
+/// Runs `thermocomp-modelling` from the program's own folder.
+/// @return its exit status, 0 or 1. @throws std::runtime_error with its last output otherwise
 int run_modelling(const std::vector<std::string>& arguments, const std::filesystem::path& log);
 
-/// A run file of minute means and probings: time_s, temperatures, signals, outputs.
-/// @return how often all outputs were probed
+/// Writes a run file of minute means and probings: time_s, temperatures, signals, outputs.
+/// @return number of probings of all outputs
 int write_run(pqxx::connection& store, const MachineNight& night,
               const std::filesystem::path& file);
 
 struct NightOutcome {
   bool departs{false};
-  std::string text;  ///< one line for people
+  std::string text;  ///< one line
 };
-/// Compares, and writes the result. @throws std::exception: nothing was written
+/// Compares the night and stores the result. @throws std::exception: nothing was stored
 NightOutcome work_off(pqxx::connection& store, const MachineNight& night);
-/// That it failed, and why; the next run tries again.
+/// Stores the failure with its reason; the next run retries.
 void note_failure(pqxx::connection& store, const MachineNight& night, const std::string& why);
 
-/// The series of a type, of each machine's sisters and of its own past, from the seven nights
-/// before `night`, where those of a type are older than a week. A machine's own past is made once.
+/// Makes the series of a type, of each machine's sisters and of its own past from the seven nights
+/// before `night`, if the type's series is older than a week. A machine's own past is made once.
 void make_series(pqxx::connection& store, const std::string& type, const std::string& night);
 
 }  // namespace thermocomp::fleet

@@ -37,7 +37,7 @@ struct Tally {
   std::size_t departing{0};
 };
 
-/// Until all are taken. What fails is noted, and does not stop the others.
+/// Works until all nights are taken. A failure is stored and does not stop the others.
 void work_off_some(const std::string& conninfo, const Nights& nights, std::size_t all,
                    Tally& tally) {
   pqxx::connection store = open_store(conninfo);
@@ -79,7 +79,7 @@ Nights::const_iterator end_of_date(Nights::const_iterator begin, Nights::const_i
                       [&](const MachineNight& each) { return each.night != begin->night; });
 }
 
-/// Makes the series that these nights of one date are compared with.
+/// Makes the series for the comparison of these nights, all of one date.
 void make_all_series(pqxx::connection& store, Nights::const_iterator begin,
                      Nights::const_iterator end) {
   std::set<std::string> types;
@@ -93,7 +93,7 @@ void make_all_series(pqxx::connection& store, Nights::const_iterator begin,
   }
 }
 
-/// Night by night, since what is judged is compared with what was before it.
+/// Date by date, since each night is compared with earlier ones.
 int run_here(const std::string& conninfo, const NightOptions& options) {
   pqxx::connection store = open_store(conninfo);
   const Nights all = open_nights(store, options);
@@ -108,7 +108,7 @@ int run_here(const std::string& conninfo, const NightOptions& options) {
       threads.emplace_back([&] {
         try {
           work_off_some(conninfo, nights, all.size(), tally);
-        } catch (const std::exception& error) {  // the store is gone; the rest is open still
+        } catch (const std::exception& error) {  // the store is unreachable; the rest stays open
           std::fprintf(stderr, "%s\n", error.what());
           ++tally.failed;
         }
@@ -121,7 +121,7 @@ int run_here(const std::string& conninfo, const NightOptions& options) {
   return tally.failed > 0 || tally.departing > 0 ? cli::exit_no : cli::exit_success;
 }
 
-/// As Slurm takes it: 1-3,5.
+/// Slurm notation: 1-3,5.
 std::string ranges(const std::set<int>& numbers) {
   std::string text;
   for (auto first = numbers.begin(); first != numbers.end();) {
@@ -134,8 +134,8 @@ std::string ranges(const std::set<int>& numbers) {
   return text;
 }
 
-/// One job array, a task a machine: a task that is repeated does what has no result yet. The series
-/// are made here, before, since each needs the nights of all machines.
+/// One job array with one task per machine; a repeated task evaluates nights without a result. The
+/// series are made here first, since each needs the nights of all machines.
 int run_by_slurm(const std::string& conninfo, const NightOptions& options) {
   std::set<int> machines;
   std::string began;
@@ -153,8 +153,8 @@ int run_by_slurm(const std::string& conninfo, const NightOptions& options) {
     std::fflush(stdout);
   }
   if (!machines.empty()) {
-    ::setenv("THERMOCOMP_FLEET_STORE", conninfo.c_str(), 1);  // sbatch hands it to the tasks
-    // Exit status 1, a departure or a failed night, is a result: it stands in the store.
+    ::setenv("THERMOCOMP_FLEET_STORE", conninfo.c_str(), 1);  // sbatch passes it to the tasks
+    // Exit status 1, a departure or a failed night, is stored, so it does not fail the task.
     const std::string task = "'" + std::filesystem::read_symlink("/proc/self/exe").string() +
                              "' night --machine-number $SLURM_ARRAY_TASK_ID --nights " +
                              std::to_string(options.nights) + "; [ $? -lt 2 ]";

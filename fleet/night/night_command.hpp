@@ -1,5 +1,5 @@
-/// `thermocomp-fleet night`: every machine's day that is over, compared with its sisters and with
-/// its own past, by ordinary modelling commands.
+/// `thermocomp-fleet night`: compares each machine's past days with its sisters and its own past,
+/// by modelling commands.
 #pragma once
 
 #include <string>
@@ -8,7 +8,7 @@
 
 namespace thermocomp::fleet {
 
-/// @param store  outlives the parsing, as does `action`
+/// @param store, action  must outlive the parsing
 void add_night_command(CLI::App& app, const std::string& store, cli::Action& action);
 
 }  // namespace thermocomp::fleet

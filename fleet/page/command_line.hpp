@@ -1,4 +1,4 @@
-/// The command line of `thermocomp-fleet-page`; `--help`, manual page and completion are made from
+/// Command line of `thermocomp-fleet-page`; `--help`, manual page and completion are generated from
 /// it.
 #pragma once
 
@@ -10,7 +10,7 @@ class App;
 
 namespace thermocomp::fleet {
 
-/// @param file  outlives the parsing, which sets it to the configuration's
+/// @param file  set to the configuration file; must outlive the parsing
 void declare_page_command_line(CLI::App& app, std::string& file);
 
 }  // namespace thermocomp::fleet

@@ -1,4 +1,4 @@
-// thermocomp-fleet-page: the store of a series of machines, for browsers.
+// thermocomp-fleet-page: web page of the store of a series of machines.
 #include <charconv>
 #include <chrono>
 #include <csignal>
@@ -46,12 +46,12 @@ PageSettings load_settings(const std::filesystem::path& file) {
   return settings;
 }
 
-/// Asks the store on a thread of its own, over a connection of its own that changes nothing.
+/// Queries the store on its own thread over its own read-only connection.
 class Asker {
  public:
   explicit Asker(std::string conninfo) : conninfo_(std::move(conninfo)) {}
 
-  /// @param call  a function of the schema, with $1, $2, ... where `values` go
+  /// @param call  function of the schema, with $1, $2, ... for `values`
   void ask(HttpExchange& exchange, const char* call, std::vector<std::string> values) {
     exchange.later(thread_, [this, call, values = std::move(values)] {
       return answer(std::string("SELECT ").append(call), values);
@@ -78,7 +78,7 @@ class Asker {
   }
 
   std::string conninfo_;
-  std::optional<pqxx::connection> store_;  ///< the thread's
+  std::optional<pqxx::connection> store_;  ///< used by the thread only
   AnswerThread thread_;
 };
 
@@ -114,7 +114,7 @@ class Page {
     exchange.answer(404, json_type, error_text("there is no such page"));
   }
 
-  /// `seconds` up to now, at most a year.
+  /// Curves of the last `seconds`, at most a year.
   void ask_curves(HttpExchange& exchange) {
     const std::optional<double> seconds = number_in(exchange, "seconds");
     constexpr double seconds_max = 366.0 * 86400.0;
@@ -128,12 +128,12 @@ class Page {
   }
 
   Asker tables_;
-  Asker curves_;  ///< of its own: nobody's curves are in the way of the table
+  Asker curves_;  ///< separate, so that curves do not delay the table
   gateway::PageFiles files_;
-  gateway::HttpDoor door_;  ///< last: what its handler uses is there
+  gateway::HttpDoor door_;  ///< last, since its handler uses the others
 };
 
-/// Until a signal ends it.
+/// Runs until a signal.
 void run(const PageSettings& settings) {
   sigset_t signals;
   sigemptyset(&signals);

@@ -21,10 +21,10 @@ struct OfferOptions {
   std::string note;
 };
 
-/// To one machine, or to all of a type.
+/// Offers a model to one machine or to all of a type.
 int offer(const std::string& conninfo, const OfferOptions& options) {
   const std::string text = read_text_file(options.model, model_bytes_max);
-  static_cast<void>(parse_model(text, options.model));  // half a file is not offered
+  static_cast<void>(parse_model(text, options.model));  // refuses an incomplete file
   pqxx::connection store = open_store(conninfo);
   pqxx::work work(store);
   work.exec_params0(
@@ -57,7 +57,7 @@ struct OrderOptions {
   bool takes_back{false};
 };
 
-/// What the machine has done with it; empty: nothing yet.
+/// The machine's last step with this release; empty: none.
 std::string done_with(pqxx::work& work, std::uint64_t release) {
   const pqxx::result steps = work.exec_params(
       "SELECT step FROM fleet.release_step WHERE release = $1 AND step IN ('checked', 'refused',"

@@ -7,7 +7,7 @@
 
 namespace thermocomp::fleet {
 
-/// @param store  outlives the parsing, as does `action`
+/// @param store, action  must outlive the parsing
 void add_release_commands(CLI::App& app, const std::string& store, cli::Action& action);
 
 }  // namespace thermocomp::fleet

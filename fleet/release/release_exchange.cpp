@@ -18,7 +18,7 @@ using nlohmann::json;
 
 constexpr std::uintmax_t file_bytes_max = 2 * model_bytes_max;
 
-/// Null where it is not there, or not whole.
+/// Null if the file is missing or incomplete.
 json json_in(const std::filesystem::path& file) {
   std::error_code error;
   if (!std::filesystem::exists(file, error)) return nullptr;

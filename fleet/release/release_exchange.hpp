@@ -1,5 +1,5 @@
-/// What the uplink carries between the store and `thermocomp admit`: an offer one way, the steps
-/// that were taken the other. It decides nothing, and needs no right at the daemon's socket.
+/// Exchange of releases between the store and `thermocomp admit`: offers in one direction, steps in
+/// the other. It decides nothing and needs no access to the daemon's socket.
 #pragma once
 
 #include <filesystem>
@@ -9,11 +9,11 @@ namespace thermocomp::fleet {
 
 struct ReleaseFiles {
   std::filesystem::path offer;  ///< written
-  std::filesystem::path steps;  ///< read; absent: nothing was decided yet
+  std::filesystem::path steps;  ///< read; absent: no decision yet
 };
 
-/// Once: the newest release of the machine that `store` is connected as, where it is new or an
-/// order came; steps that the store does not have.
+/// One exchange: the newest release of the machine that `store` is logged in as, if it is new or
+/// has a new order, and steps that the store lacks.
 /// @throws pqxx::failure, cli::Failure, ConfigurationError
 void exchange_releases(pqxx::connection& store, const ReleaseFiles& files);
 

@@ -13,7 +13,7 @@
 namespace thermocomp::fleet {
 namespace {
 
-/// '{1.5,NULL}'
+/// Builds an array literal: '{1.5,NULL}'.
 class ArrayText {
  public:
   template <class Value>
@@ -41,7 +41,7 @@ class ArrayText {
   std::string text_{"{"};
 };
 
-/// The times that the store takes [s since 1970].
+/// Range of times that the store accepts [s since 1970].
 struct SoundTimes {
   explicit SoundTimes(pqxx::work& work) {
     const pqxx::row row = work.exec1(
@@ -108,7 +108,7 @@ Progress MachineRows::progress() {
           row[4].as<std::uint64_t>()};
 }
 
-/// Of configuration, model and version; the store learns them with the first row.
+/// Number of the configuration, model and version; the first row adds them to the store.
 int MachineRows::setup_number(pqxx::work& work, const MeansBatch& batch) {
   const std::string configuration = sha256_hex(batch.setup.config_text);
   const std::string model = sha256_hex(batch.setup.model_text);

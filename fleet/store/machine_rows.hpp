@@ -1,5 +1,5 @@
-/// What a machine sends, each batch in one transaction together with how far it goes: a batch that
-/// is sent again changes nothing.
+/// A machine's data in the store. Each batch is one transaction together with its position, so
+/// sending a batch again changes nothing.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@
 
 namespace thermocomp::fleet {
 
-/// Of a machine's history, as the store has it.
+/// The store's progress in a machine's history.
 struct Progress {
   HistoryPosition position;
   std::int64_t event_run{0};
@@ -22,23 +22,23 @@ struct Progress {
 
 struct Taken {
   std::uint64_t sent{0};
-  std::uint64_t refused{0};   ///< of an impossible time
-  std::uint64_t repeated{0};  ///< of a time that was there already
+  std::uint64_t refused{0};   ///< impossible time
+  std::uint64_t repeated{0};  ///< time already present
 };
 
 class MachineRows {
  public:
-  /// @param machine  nullopt: the one whose role is logged in
-  /// @param history  the file's name
-  /// @throws std::runtime_error: there is no such machine; pqxx::failure
+  /// @param machine  empty: the one whose role is logged in
+  /// @param history  name of the file
+  /// @throws std::runtime_error if there is no such machine; pqxx::failure
   MachineRows(pqxx::connection& store, const std::string& machine, std::string history);
 
   [[nodiscard]] Progress progress();
-  /// @throws pqxx::failure; nothing was taken then, or everything (pqxx::in_doubt_error)
+  /// @throws pqxx::failure; then nothing was stored, or everything (pqxx::in_doubt_error)
   Taken send(const MeansBatch& batch);
   void send(const std::vector<RecordedEvent>& events);
-  /// That the uplink is there, though nothing is new.
-  /// @param damaged  parts of the history that could not be read
+  /// Reports a live uplink without new data.
+  /// @param damaged  number of unreadable parts of the history
   void greet(std::uint64_t damaged);
 
  private:

@@ -27,7 +27,7 @@ std::string quoted(const std::string& value) {
   return text;
 }
 
-/// 32 hexadecimal digits from the kernel's generator.
+/// 32 hexadecimal digits from the kernel's random generator.
 std::string random_password() {
   std::array<unsigned char, 16> bytes{};
   if (getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size()))
@@ -53,8 +53,7 @@ std::string complete_conninfo(const std::string& conninfo,
     PQfreemem(problem);
     throw std::invalid_argument(std::string("connection \"").append(conninfo).append("\": ") + why);
   }
-  // A server that has gone without a word must not hold a program for ever; tickets are not looked
-  // for, since that takes 0.6 MB of an uplink.
+  // Timeouts detect a server that vanished. GSS is off, since it takes 0.6 MB of an uplink.
   std::map<std::string, std::string> given{
       {"sslmode", "verify-full"},    {"options", "-c timezone=UTC"}, {"connect_timeout", "10"},
       {"keepalives_idle", "30"},     {"keepalives_interval", "10"},  {"keepalives_count", "3"},
@@ -78,7 +77,7 @@ std::filesystem::path schema_folder() {
 }
 
 MigrationResult migrate(pqxx::connection& store, const std::filesystem::path& folder) {
-  std::map<std::string, std::string> files;  // name -> text
+  std::map<std::string, std::string> files;  // name: text
   for (const auto& entry : std::filesystem::directory_iterator(folder))
     if (entry.path().extension() == ".sql")
       files[entry.path().filename().string()] = read_text_file(entry.path());

@@ -1,4 +1,4 @@
-/// The store of a series: a PostgreSQL database with the schema of fleet/schema.
+/// Store of a series: a PostgreSQL database with the schema of fleet/schema.
 #pragma once
 
 #include <filesystem>
@@ -9,10 +9,10 @@
 
 namespace thermocomp::fleet {
 
-/// `conninfo` with what it leaves out: TLS with a verified name (a Unix socket has none), times
-/// after which a server counts as gone, and `more`.
+/// Adds defaults to `conninfo`: TLS with a verified name (not for a Unix socket), timeouts, and
+/// `more`.
 /// @param conninfo  of libpq: "host=... dbname=..." or a URL
-/// @throws std::invalid_argument when it cannot be parsed
+/// @throws std::invalid_argument if it cannot be parsed
 [[nodiscard]] std::string complete_conninfo(const std::string& conninfo,
                                             std::map<std::string, std::string> more = {});
 
@@ -20,15 +20,14 @@ namespace thermocomp::fleet {
 [[nodiscard]] pqxx::connection open_store(const std::string& conninfo);
 
 struct MigrationResult {
-  std::vector<std::string> applied;  ///< just now
-  std::vector<std::string> present;  ///< before
+  std::vector<std::string> applied;  ///< by this call
+  std::vector<std::string> present;  ///< earlier
 };
-/// Applies the files NNN_*.sql of the folder that the store does not have yet, in order of their
-/// names, all in one transaction.
+/// Applies the folder's files NNN_*.sql that the store lacks, by name, in one transaction.
 /// @throws std::runtime_error: an applied file is missing or was changed; pqxx::sql_error
 MigrationResult migrate(pqxx::connection& store, const std::filesystem::path& folder);
 
-/// Of the build tree or the installed package, beside the folder of the program.
+/// Schema of the build tree or the installed package, beside the program's folder.
 [[nodiscard]] std::filesystem::path schema_folder();
 
 struct NewMachine {
@@ -37,8 +36,8 @@ struct NewMachine {
   std::string hall;
   bool central_approval{false};
 };
-/// A row, and a role machine_NAME that may log in with a password made here.
-/// @return the password. @throws pqxx::sql_error: the name is there already or no name
+/// Adds a row, and a role machine_NAME with a generated password.
+/// @return the password. @throws pqxx::sql_error: the name exists or is invalid
 [[nodiscard]] std::string add_machine(pqxx::connection& store, const NewMachine& machine);
 
 }  // namespace thermocomp::fleet

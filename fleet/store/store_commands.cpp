@@ -39,7 +39,7 @@ int init(const std::string& conninfo) {
   return cli::exit_success;
 }
 
-/// A file that nobody else may read, and that was not there before.
+/// Creates a file that only the owner can read; fails if it exists.
 void write_secret(const fs::path& file, const std::string& text) {
   const int descriptor = open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
   if (descriptor < 0) throw cli::Failure(file.string() + ": " + std::strerror(errno));
@@ -58,7 +58,7 @@ int add(const std::string& conninfo, const NewMachine& machine, const fs::path& 
   return cli::exit_success;
 }
 
-/// "3 min", "2 d"; of a NULL "never".
+/// "3 min", "2 d"; NULL: "never".
 std::string age_text(const pqxx::field& age_s) {
   if (age_s.is_null()) return "never";
   const double seconds = std::max(0.0, age_s.as<double>());
@@ -116,7 +116,7 @@ void print_releases(pqxx::read_transaction& work) {
                 row[4].c_str());
 }
 
-/// Exit status 1: a machine departs, a night failed, or an uplink was not seen for a day.
+/// @return exit status 1: a machine departs, a night failed, or an uplink was not seen for a day
 int status(const std::string& conninfo) {
   pqxx::connection store = open_store(conninfo);
   pqxx::read_transaction work(store);
@@ -143,7 +143,7 @@ struct LoadOptions {
   std::string model;
 };
 
-/// Means of 10 s of a run file; each displacement that stands there is a probing.
+/// Means over 10 s of a run file; each measured displacement is a probing.
 MeansBatch batch_of(const RunFile& run, std::int64_t begin_ns) {
   MeansBatch batch;
   for (const std::string& column : run.columns)

@@ -1,4 +1,4 @@
-/// The command line of `thermocomp-uplink`; `--help`, manual page and completion are made from it.
+/// Command line of `thermocomp-uplink`; `--help`, manual page and completion are generated from it.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// thermocomp-uplink: what thermocompd has recorded, for the store of a series of machines.
+// thermocomp-uplink: sends the daemon's history to the store of a series of machines.
 #include <algorithm>
 #include <chrono>
 #include <csignal>
@@ -19,7 +19,7 @@ namespace {
 constexpr std::chrono::seconds first_wait(2);
 constexpr std::chrono::seconds longest_wait(300);
 
-/// The first line; of a server's answer the rest repeats the statement.
+/// First line; the rest of a server's answer repeats the statement.
 std::string first_line(const std::string& text) {
   return text.substr(0, text.find('\n'));
 }
@@ -36,7 +36,7 @@ int run_once(Uplink& uplink) {
   }
 }
 
-/// Until a signal ends it. A server that is away is asked again after 2 s, 4 s, ... 5 min.
+/// Runs until a signal. Retries an unreachable server after 2 s, 4 s, ... 5 min.
 void run_on(Uplink& uplink, const UplinkSettings& settings, const Pace& pace) {
   std::chrono::duration<double> wait = first_wait;
   std::string reported;

@@ -58,7 +58,7 @@ bool Uplink::send_new() {
   return is_new;
 }
 
-/// What is wrong with a release stops nothing else.
+/// Problems with a release do not stop the uplink.
 void Uplink::exchange() {
   try {
     exchange_releases(*store_, settings_.releases);

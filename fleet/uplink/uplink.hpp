@@ -1,4 +1,4 @@
-/// From a daemon's history to the store: what is new, again and again, within a share of a core.
+/// Sends new data of the daemon's history to the store within a share of a core.
 #pragma once
 
 #include <chrono>
@@ -16,16 +16,17 @@
 
 namespace thermocomp::fleet {
 
-/// Thrown where a signal ended the program.
+/// Thrown when a signal ends the program.
 struct Stopped {};
 
-/// Sleeps so long that the program takes its share of a core at most.
+/// Limits the program to its share of a core by sleeping.
 class Pace {
  public:
   /// @param ending  blocked signals that end a sleep
   Pace(double cpu_percent_max, const sigset_t& ending)
       : rest_per_work_(100.0 / cpu_percent_max - 1.0), ending_(ending) {}
-  /// For what was computed since the last time. Cheap where that is little. @throws Stopped
+  /// Sleeps in proportion to the CPU time since the last call; cheap if that is little. @throws
+  /// Stopped
   void rest();
   /// @throws Stopped
   void sleep(std::chrono::duration<double> time) const;
@@ -34,18 +35,18 @@ class Pace {
   static constexpr double work_s_max = 0.002;
   double rest_per_work_;
   sigset_t ending_;
-  double rested_at_s_{0.0};  ///< of the process' own time
+  double rested_at_s_{0.0};  ///< process CPU time
 };
 
 class Uplink {
  public:
   Uplink(const UplinkSettings& settings, Pace& pace);
 
-  /// Sends what is new in all histories. After an error the next one begins with a new connection,
-  /// and with what the store then says it has.
-  /// @return whether there was anything. @throws pqxx::failure, HistoryError, Stopped
+  /// Sends new data of all histories. After an error the next call reconnects and continues from
+  /// the store's progress.
+  /// @return there was new data. @throws pqxx::failure, HistoryError, Stopped
   bool send_new();
-  /// The connection is given up; the next send_new() makes another.
+  /// Closes the connection; the next send_new() reconnects.
   void hang_up() noexcept;
 
  private:
@@ -64,7 +65,7 @@ class Uplink {
   Pace& pace_;
   std::optional<pqxx::connection> store_;
   std::vector<Source> sources_;
-  std::string reported_error_;  ///< of releases, wrong since
+  std::string reported_error_;  ///< last reported problem with releases
 };
 
 }  // namespace thermocomp::fleet

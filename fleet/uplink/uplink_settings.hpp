@@ -1,4 +1,4 @@
-/// The configuration of thermocomp-uplink.
+/// Configuration of thermocomp-uplink.
 #pragma once
 
 #include <filesystem>
@@ -11,10 +11,10 @@
 namespace thermocomp::fleet {
 
 struct UplinkSettings {
-  std::string store;                           ///< connection, complete
-  std::vector<std::filesystem::path> history;  ///< files of the daemon, or of daemons, here
-  ReleaseFiles releases;                       ///< what `thermocomp admit` reads and writes
-  double period_s{60.0};                       ///< asked for what is new so often
+  std::string store;                           ///< complete connection string
+  std::vector<std::filesystem::path> history;  ///< histories of the daemons on this computer
+  ReleaseFiles releases;                       ///< files shared with `thermocomp admit`
+  double period_s{60.0};                       ///< polling period
   double cpu_percent_max{1.0};                 ///< of one core, on average
 };
 

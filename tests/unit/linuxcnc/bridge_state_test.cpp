@@ -1,4 +1,4 @@
-// What the bridge's pins show.
+// Tests of the state of the bridge's pins.
 #include "linuxcnc/bridge_state.hpp"
 
 #include <cmath>
@@ -40,7 +40,7 @@ struct Bench {
 
 }  // namespace
 
-TEST_CASE("an answered offset is shown once, fresh and with another heartbeat", "[linuxcnc]") {
+TEST_CASE("an answered offset is shown once, fresh and with a toggled heartbeat", "[linuxcnc]") {
   Bench bench;
   const Outputs none = bench.waited(0s, machine(0.0));
   CHECK_FALSE(none.fresh);
@@ -53,7 +53,7 @@ TEST_CASE("an answered offset is shown once, fresh and with another heartbeat", 
   CHECK_FALSE(first.warning);
   CHECK(first.heartbeat != none.heartbeat);
   const Outputs between = bench.waited(10ms, machine(0.01));
-  CHECK_FALSE(between.offset_mm[0]);  // the pin keeps it
+  CHECK_FALSE(between.offset_mm[0]);  // the pin keeps its value
   CHECK(between.heartbeat == first.heartbeat);
 }
 
@@ -70,14 +70,14 @@ TEST_CASE("without answers the offset stays, is no longer fresh, and a warning i
   CHECK_FALSE(bench.answered(offsets(0.01), machine(0.01)).warning);
 }
 
-TEST_CASE("a new epoch goes on from what is applied", "[linuxcnc]") {
+TEST_CASE("a new epoch starts from the applied offset", "[linuxcnc]") {
   Bench bench;
   CHECK(bench.answered(begin_anew, machine(0.03)).offset_mm[0] == 0.03);
-  CHECK(bench.answered(begin_anew, machine(0.5)).offset_mm[0] == 0.2);  // never beyond the bound
+  CHECK(bench.answered(begin_anew, machine(0.5)).offset_mm[0] == 0.2);  // limited to the bound
   CHECK_FALSE(bench.answered(begin_anew, machine(NAN)).offset_mm[0]);
 }
 
-TEST_CASE("while no offsets are taken none is asked for", "[linuxcnc]") {
+TEST_CASE("while no offsets are taken, zero is requested", "[linuxcnc]") {
   Bench bench;
   bench.answered(offsets(0.05), machine(0.05));
   MachineView off = machine(0.0);
@@ -87,7 +87,7 @@ TEST_CASE("while no offsets are taken none is asked for", "[linuxcnc]") {
   CHECK_FALSE(bench.waited(1s, machine(0.0)).offset_mm[0]);
 }
 
-TEST_CASE("what is applied beside what is asked for is a mismatch after a while", "[linuxcnc]") {
+TEST_CASE("a lasting difference between applied and requested offset is a mismatch", "[linuxcnc]") {
   Bench bench;
   MachineView view = machine(0.02);
   bench.answered(offsets(0.01), view);
@@ -96,7 +96,7 @@ TEST_CASE("what is applied beside what is asked for is a mismatch after a while"
   CHECK(bench.waited(200ms, view).mismatch);
   CHECK(bench.waited(1ms, view).warning);
   view.axes[0].applied_mm = 0.01;
-  CHECK(bench.waited(1ms, view).mismatch);  // what LinuxCNC was told is beside it still
+  CHECK(bench.waited(1ms, view).mismatch);  // LinuxCNC's setpoint still differs
   view.axes[0].wanted_mm = 0.01;
   CHECK_FALSE(bench.waited(1ms, view).mismatch);
   view.axes[0].applied_mm = NAN;
@@ -104,7 +104,7 @@ TEST_CASE("what is applied beside what is asked for is a mismatch after a while"
   CHECK(bench.waited(3100ms, view).mismatch);
 }
 
-TEST_CASE("a daemon that holds is a warning after a while, one that is switched off is none",
+TEST_CASE("a daemon that keeps holding causes a warning, one that is switched off does not",
           "[linuxcnc]") {
   Bench bench;
   for (int i = 0; i < 50; ++i)
@@ -116,7 +116,7 @@ TEST_CASE("a daemon that holds is a warning after a while, one that is switched 
   CHECK_FALSE(bench.answered(offsets(0.01, "disabled"), machine(0.01)).warning);
 }
 
-TEST_CASE("values that are no numbers are counted", "[linuxcnc]") {
+TEST_CASE("values that are not numbers are counted", "[linuxcnc]") {
   Bench bench;
   MachineView view = machine(0.0);
   CHECK(bench.waited(1ms, view).faults == 0);

@@ -1,4 +1,4 @@
-// The connection to the daemon, against a socket that behaves badly.
+// Tests of the connection to the daemon with a misbehaving socket.
 #include "linuxcnc/daemon_link.hpp"
 
 #include <cstdlib>
@@ -15,7 +15,7 @@ using namespace thermocomp_linuxcnc;
 
 namespace {
 
-/// Listens; the connection that it accepts is the test's to write to.
+/// A listening socket; the test writes to the accepted connection.
 struct Peer {
   Peer() {
     char name[] = "/tmp/tclinkXXXXXX";
@@ -56,7 +56,7 @@ struct Peer {
 
 }  // namespace
 
-TEST_CASE("lines go out and come in, whole ones only", "[linuxcnc]") {
+TEST_CASE("only complete lines are sent and received", "[linuxcnc]") {
   Peer peer;
   DaemonLink link(peer.path);
   REQUIRE(link.connect());
@@ -72,7 +72,7 @@ TEST_CASE("lines go out and come in, whole ones only", "[linuxcnc]") {
   CHECK(link.connected());
 }
 
-TEST_CASE("nobody there, a path that is none, and a peer that hangs up", "[linuxcnc]") {
+TEST_CASE("no listener, an invalid path, and a peer that closes are reported", "[linuxcnc]") {
   DaemonLink nobody("/tmp/tclink-nobody-is-here/s");
   CHECK_FALSE(nobody.connect());
   CHECK(nobody.error().find("not reached") != std::string::npos);

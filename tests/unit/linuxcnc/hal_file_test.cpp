@@ -1,4 +1,4 @@
-// The HAL files that the bridge writes, and the options that they are made from.
+// Tests of the generated HAL files and their options.
 #include "linuxcnc/hal_file.hpp"
 
 #include <algorithm>
@@ -25,7 +25,7 @@ bool has(const std::string& text, const std::string& line) {
   return ("\n" + text).find("\n" + line + "\n") != std::string::npos;
 }
 
-/// Of every net: pin -> signal. A pin on two signals would not load.
+/// Maps every connected pin to its signal. A pin on two signals would not load.
 std::map<std::string, std::string> nets(const std::string& text) {
   std::map<std::string, std::string> signals;
   std::istringstream lines(text);
@@ -45,7 +45,7 @@ std::map<std::string, std::string> nets(const std::string& text) {
 
 }  // namespace
 
-TEST_CASE("both ways put the offset of each axis where it belongs", "[linuxcnc]") {
+TEST_CASE("both ways add the offset of each axis at the right place", "[linuxcnc]") {
   const std::string joint = hal_file(options(Way::joint, "x=0,z=3"));
   auto signals = nets(joint);
   CHECK(signals.at("joint.3.motor-pos-cmd") == signals.at("tc.offset-z.in"));
@@ -66,7 +66,7 @@ TEST_CASE("both ways put the offset of each axis where it belongs", "[linuxcnc]"
   CHECK(has(external, "setp axis.y.eoffset-enable 1"));
 }
 
-TEST_CASE("every part is loaded and run once", "[linuxcnc]") {
+TEST_CASE("every component is loaded and run once", "[linuxcnc]") {
   for (const Way way : {Way::joint, Way::external}) {
     std::istringstream lines(hal_file(options(way)));
     std::set<std::string> loaded;
@@ -95,7 +95,7 @@ TEST_CASE("every part is loaded and run once", "[linuxcnc]") {
   }
 }
 
-TEST_CASE("a pin that is on the machine's own signal is taken from there", "[linuxcnc]") {
+TEST_CASE("a pin already on a signal of the machine is read from that signal", "[linuxcnc]") {
   HalFileOptions made = options(Way::joint, "z=2");
   made.signals = {{"spindle.0.speed-out", "spindle-speed"},
                   {"motion.is-all-homed", "all-homed"},
@@ -115,14 +115,14 @@ TEST_CASE("a killed bridge's signals are taken over, a bridge that ended is load
   CHECK(has(over, "net tc-asked-x <= second.offset-x"));
   CHECK(over.find("loadrt") == std::string::npos);
   CHECK(over.find("loadusr -Wn second ") != std::string::npos);
-  // What is applied is known before an offset reaches anything.
+  // Applied offsets are connected before requested ones.
   CHECK(over.find("applied-x") < over.find("net tc-asked-x"));
   const std::string again = rejoin_file(options(Way::external, "x=0"), "thermocomp");
   CHECK(again.find("unlinkp") == std::string::npos);
   CHECK_THROWS_AS(rejoin_file(options(Way::external), ""), BadOption);
 }
 
-TEST_CASE("options that cannot be are refused", "[linuxcnc]") {
+TEST_CASE("invalid options are refused", "[linuxcnc]") {
   for (const char* axes :
        {"", "x", "x=", "=0", "x=0,", "x=a", "x=-1", "xx=0", "x=123", "x=0;y=1"}) {
     INFO(axes);
@@ -143,7 +143,7 @@ TEST_CASE("options that cannot be are refused", "[linuxcnc]") {
   refused(&HalFileOptions::acceleration_mm_per_s2, NAN);
 }
 
-TEST_CASE("the command line is read, and what it cannot be ends with status 2", "[linuxcnc]") {
+TEST_CASE("the command line is parsed, and an invalid one ends with status 2", "[linuxcnc]") {
   int status = -1;
   const auto read = [&](std::vector<const char*> words) {
     words.insert(words.begin(), "thermocomp-linuxcnc");

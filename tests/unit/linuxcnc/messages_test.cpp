@@ -1,4 +1,4 @@
-// The lines between bridge and daemon.
+// Tests of the lines between bridge and daemon.
 #include "linuxcnc/messages.hpp"
 
 #include <cmath>
@@ -29,7 +29,7 @@ std::string answer_line(const json& offsets, std::uint64_t id = 3) {
 
 }  // namespace
 
-TEST_CASE("a request tells everything, in the daemon's units", "[linuxcnc]") {
+TEST_CASE("a request contains every value in the daemon's units", "[linuxcnc]") {
   const std::string line = request_line(77, 3, "xz", machine());
   CHECK(line.back() == '\n');
   const json request = json::parse(line);
@@ -49,7 +49,7 @@ TEST_CASE("a request tells everything, in the daemon's units", "[linuxcnc]") {
                                   {"homed_on", 1}});
 }
 
-TEST_CASE("a cut is a feed, or anything in a program but rapids and changes of tool",
+TEST_CASE("a cut is a feed, or any motion in a program except rapids and tool changes",
           "[linuxcnc]") {
   const auto cuts = [](bool program, MotionType type) {
     MachineView view;
@@ -74,11 +74,11 @@ TEST_CASE("an answer gives offsets in mm", "[linuxcnc]") {
   CHECK(answer.mode == "compensating");
   REQUIRE(answer.offset_mm.size() == 3);
   CHECK(*answer.offset_mm[0] == Approx(0.0125));
-  CHECK_FALSE(answer.offset_mm[1]);  // the daemon does not have it
+  CHECK_FALSE(answer.offset_mm[1]);  // not in the daemon's configuration
   CHECK_FALSE(answer.offset_mm[2]);
 }
 
-TEST_CASE("an answer that must not be acted on is refused", "[linuxcnc]") {
+TEST_CASE("an answer that must not be used is refused", "[linuxcnc]") {
   std::string deep;
   for (int i = 0; i < 100000; ++i) deep += "[";
   const std::vector<std::string> bad = {
@@ -108,8 +108,9 @@ TEST_CASE("an answer that must not be acted on is refused", "[linuxcnc]") {
   CHECK_NOTHROW(read_answer(answer_line({{"x", 200.0}}), 3, "x", 0.2));
 }
 
-TEST_CASE("brackets in a string hide no depth, and words of the daemon command no terminal",
-          "[linuxcnc]") {
+TEST_CASE(
+    "brackets in a string do not hide nesting, and the daemon's text contains no terminal controls",
+    "[linuxcnc]") {
   std::string hidden = R"({"a":")";
   hidden.append(400000, ']').append(R"(","id":3,"result":)");
   hidden.append(400000, '[').append(400000, ']').append("}");
