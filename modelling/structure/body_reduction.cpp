@@ -11,9 +11,9 @@
 namespace thermocomp::structure {
 namespace {
 
-/// 1/s: from the steady state to what happens within minutes.
+/// Krylov shifts, from the steady state to changes within minutes.
 constexpr std::array<double, 4> shifts_per_s{0.0, 1.0 / 14400.0, 1.0 / 2400.0, 1.0 / 400.0};
-/// Of these for what a film, a joint or a capacity of another strength would do.
+/// Shifts for changes of a film, joint or capacity.
 constexpr std::array<double, 2> part_shifts_per_s{0.0, 1.0 / 2400.0};
 constexpr double new_direction_least = 1e-7;
 constexpr double um = 1e6;
@@ -39,11 +39,11 @@ std::vector<double> plain(const Vector& x) {
 }
 
 std::vector<double> plain(const Matrix& x) {
-  const Matrix transposed = x.transpose();  // row by row
+  const Matrix transposed = x.transpose();  // row-major
   return {transposed.data(), transposed.data() + transposed.size()};
 }
 
-/// Fields that are orthonormal in the heat capacity.
+/// Fields orthonormal in the heat capacity.
 class Basis {
  public:
   explicit Basis(const SparseSymmetric& capacity) : capacity_(capacity) {}
@@ -77,7 +77,7 @@ class Basis {
   std::vector<Vector> weighted_;  ///< capacity times field
 };
 
-/// Everything in the free unknowns. The capacity twice, in the places of either conduction.
+/// Matrices and inputs in the free unknowns. Each conduction has a capacity with its own pattern.
 struct FreeModel {
   SparseSymmetric capacity;
   SparseSymmetric dry;
@@ -127,8 +127,8 @@ class Reducer {
   }
 
  private:
-  /// Their rows take no part in the choice of the basis, which has the field that every input
-  /// makes.
+  /// Guideway rows do not affect the choice of the basis, which contains the response to every
+  /// input.
   void add_guideways(const std::vector<std::vector<double>>& sensitivities,
                      ReducedBody& body) const {
     std::size_t next = spec_.outputs.size();
@@ -142,7 +142,7 @@ class Reducer {
     }
   }
 
-  /// The states' fields, on all nodes.
+  /// Fields of the states on all nodes.
   [[nodiscard]] std::vector<std::vector<double>> fields() const {
     std::vector<std::vector<double>> all;
     for (const auto& field : basis_.colwise())
@@ -151,7 +151,7 @@ class Reducer {
     return all;
   }
 
-  /// Each coupling is strength w w', so that its projection is strength v v' with v = V' w.
+  /// A coupling is strength w w'; its projection is strength v v' with v = V' w.
   void add_couplings(BodyReduction& reduction) const {
     ReducedBody& body = reduction.body;
     for (const NamedCouplings& named : heat_.named) {
@@ -183,8 +183,8 @@ class Reducer {
     }
   }
 
-  /// What changes with a strength is, first of all, an even flow: over a film, across a joint, into
-  /// a part. The fields that such flows make must be in the basis, or a weak joint could not open.
+  /// A change of a strength first changes a uniform flow: over a film, across a joint, into a part.
+  /// The basis must contain the fields of such flows, or a weak joint could not open.
   void find_parts() {
     const Mesh& mesh = structure_.mesh;
     for (const NamedCouplings& named : heat_.named) {
@@ -255,7 +255,8 @@ class Reducer {
     THERMOCOMP_ENSURE(solver.info() == Eigen::Success);
     rates_ = solver.eigenvalues();
     basis_ = basis_ * solver.eigenvectors();
-    // A mode's sign is free; one that does not hang on rounding makes files comparable.
+    // Fixes the arbitrary sign of each mode independently of rounding, so that files can be
+    // compared.
     for (Eigen::Index j = 0; j < basis_.cols(); ++j) {
       double most = 0.0;
       for (const Vector& input : free_.inputs) {
@@ -292,7 +293,7 @@ class Reducer {
   const Structure& structure_;
   const HeatModel& heat_;
   FreeModel free_;
-  std::vector<Vector> flows_;                ///< of films, joints and parts, where asked for
+  std::vector<Vector> flows_;                ///< of films, joints and parts, if requested
   std::vector<SparseSymmetric> capacities_;  ///< of each part alone
   Matrix basis_;                             ///< V
   Vector rates_;                             ///< of V^T L V

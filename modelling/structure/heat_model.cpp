@@ -9,7 +9,7 @@
 namespace thermocomp::structure {
 namespace {
 
-/// Adds what a kelvin of the other side brings to each node.
+/// Adds the heat into each node per kelvin of the other side.
 void add_inflow(std::span<const Coupling> couplings, std::vector<double>& inflow_W_per_K) {
   for (const Coupling& coupling : couplings) {
     for (std::size_t i = 0; i < coupling.count; ++i) {
@@ -26,8 +26,8 @@ std::vector<double> share_of(const HeatSpec& heat, const Mesh& mesh, RegionFinde
                              const std::vector<double>& volumes_m3) {
   std::vector<double> share(mesh.nodes_m.size(), 0.0);
   if (heat.inside) {
-    // Middle nodes stand for more than corners do: a tet10's corners for none, a hex20's for less
-    // than none. Their sum is the volume all the same.
+    // Volume integrals are larger at mid-side nodes; at corners they are zero in a tet10 and
+    // negative in a hex20. Their sum is the volume all the same.
     for (const Index node : finder.nodes_in(heat.on)) share[node] = volumes_m3[node];
   } else {
     add_inflow(couplings_on(mesh, finder.faces_in(heat.on)), share);
@@ -42,7 +42,7 @@ std::vector<double> share_of(const HeatSpec& heat, const Mesh& mesh, RegionFinde
   return share;
 }
 
-/// A body that neither room nor coolant nor another body cools would warm without end.
+/// Reports bodies without a heat path to room or coolant, which would warm without limit.
 void check_cooling(const Structure& structure, const HeatModel& heat, RegionFinder& finder) {
   const std::vector<Index> bodies = bodies_of_nodes(structure.mesh);
   std::vector<Index> root(structure.mesh.nodes_m.size() + 1);
@@ -75,7 +75,7 @@ void check_cooling(const Structure& structure, const HeatModel& heat, RegionFind
 }
 
 double signal_of(const HeatSpec& heat, const LoadCaseSpec& load) {
-  if (!heat.signal) return heat.at;  // constant: the heat as given
+  if (!heat.signal) return heat.at;  // constant heat
   const auto found = load.signals.find(*heat.signal);
   return found == load.signals.end() ? 0.0 : found->second;
 }
@@ -92,7 +92,7 @@ class CaseRun {
     }
   }
 
-  /// Of everything above the room's first temperature: the equations are linear.
+  /// Relative to the room's initial temperature, since the equations are linear.
   void fill(double time_s, HeatInput& input) const {
     const double share = load_.steady ? 1.0 : time_s / load_.duration_s;
     const double room_K = load_.room_change_K * share;
@@ -121,7 +121,7 @@ void run_transient(const Conduction& conduction, const CaseRun& run, const LoadC
     before_K = transient.temps_degC();
     const double begin_s = transient.time_s();
     transient.step([&](double time_s, double, HeatInput& input) { run.fill(time_s, input); });
-    // Moments between two steps: on the straight line between them.
+    // Interpolates linearly to times between two steps.
     while (wanted != load.at_s.end() && *wanted <= transient.time_s() * (1.0 + 1e-9)) {
       const double share = std::clamp((*wanted - begin_s) / step_s, 0.0, 1.0);
       RiseField field{index, *wanted, transient.temps_degC()};

@@ -16,15 +16,16 @@ namespace {
 constexpr double panel_px = 360.0;
 constexpr double margin_px = 24.0;
 constexpr std::size_t panels_in_a_row = 4;
-constexpr double shown_of_size = 0.08;          ///< greatest displacement in the picture
-constexpr std::size_t faces_with_edges = 4000;  ///< with more, edges would hide the colours
+constexpr double shown_of_size =
+    0.08;  ///< largest displacement in the picture, as a share of its size
+constexpr std::size_t faces_with_edges = 4000;  ///< above this number, edges would hide the colours
 
-/// Isometric: to the right, upwards, towards the viewer.
+/// Isometric directions: right, up, towards the viewer.
 const Vec3 right{std::sqrt(0.5), -std::sqrt(0.5), 0.0};
 const Vec3 up{-std::sqrt(1.0 / 6), -std::sqrt(1.0 / 6), std::sqrt(2.0 / 3)};
 const Vec3 viewer{std::sqrt(1.0 / 3), std::sqrt(1.0 / 3), std::sqrt(1.0 / 3)};
 
-/// Colours of equal strength around the circle; neighbours in number are far apart in hue.
+/// Colours evenly around the hue circle; consecutive numbers are far apart in hue.
 std::string colour(Index block, double light) {
   const double hue = std::fmod(137.508 * static_cast<double>(block), 360.0);
   char text[40];
@@ -76,14 +77,14 @@ class Picture {
   }
 
  private:
-  /// 0 where nothing moves.
+  /// @return 0 without displacement
   [[nodiscard]] double enlargement(const std::vector<double>& displacement_m) const {
     double largest = 0.0;
     for (const double value : displacement_m) largest = std::max(largest, std::fabs(value));
     return largest > 0.0 ? shown_of_size * box_.diagonal_m() / largest : 0.0;
   }
 
-  /// Pixels of a point in a panel; the scale and the middle are those of the undeformed structure.
+  /// Pixels of a point in a panel; scale and centre of the undeformed structure.
   [[nodiscard]] std::array<double, 2> pixel(const Vec3& point) const {
     const Vec3 from_middle = point - 0.5 * (box_.low_m + box_.high_m);
     const double scale = (panel_px - 2.0 * margin_px) / (box_.diagonal_m() * 1.1);
@@ -91,7 +92,7 @@ class Picture {
             0.5 * panel_px - scale * dot(from_middle, up)};
   }
 
-  /// From back to front, only those that look at the viewer.
+  /// Draws the faces towards the viewer from back to front.
   void draw_faces(const std::vector<Vec3>& points) {
     struct Seen {
       const Face* face;
@@ -129,7 +130,7 @@ class Picture {
   }
 
   void draw(const Face& face, const std::vector<Vec3>& points, double light, bool own_edges) {
-    // The block that most of the corners belong to.
+    // The block of most corners.
     const std::size_t corners = shape_info(face.shape).corners;
     std::vector<Index> blocks;
     for (std::size_t i = 0; i < corners; ++i) {
@@ -180,7 +181,7 @@ int cell_type(Shape shape) {
   }
 }
 
-/// Arrays stand behind the XML as raw bytes, each after its size; the XML holds their offsets.
+/// Arrays appended to the XML as raw bytes, each after its size; the XML contains their offsets.
 class Appended {
  public:
   template <class T>
@@ -323,7 +324,7 @@ void SurfacePicture::set_title(const std::string& title, const std::string& note
   picture_.note = note;
 }
 
-/// Outputs that are taken at one point are one point.
+/// Outputs at the same point share one point.
 void SurfacePicture::add_point(const std::string& name, bool is_sensor, const Vec3& at_m) {
   const BodyPoint point{name, is_sensor, {1e3 * at_m[0], 1e3 * at_m[1], 1e3 * at_m[2]}};
   for (BodyPoint& known : picture_.points) {

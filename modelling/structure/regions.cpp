@@ -42,7 +42,7 @@ Index RegionFinder::part_index(const std::string& name) const {
   return static_cast<Index>(found - mesh_.part_names.begin());
 }
 
-// The groups of that name, of the region's part or of all; a problem where there is none.
+// Groups with the region's name, of its part or of all parts; reports a missing one.
 std::vector<const Group*> RegionFinder::groups_of(const Region& region) {
   std::vector<const Group*> found;
   std::set<std::string> known;
@@ -115,7 +115,7 @@ void tie_faces(RegionFinder& finder, const Mesh& mesh, const JointSpec& joint,
                Reduction& reduction) {
   const std::vector<Face> from = finder.faces_in(joint.from);
   const std::vector<Face> to = finder.faces_in(joint.to);
-  if (from.empty() || to.empty()) return;  // a problem already
+  if (from.empty() || to.empty()) return;  // already reported
   std::set<Index> nodes;
   for (const Face& face : from) {
     const auto its = nodes_of(face);

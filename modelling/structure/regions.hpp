@@ -1,4 +1,4 @@
-/// Regions of the structure file on a mesh: nodes, faces, couplings over faces, faces that meet.
+/// Maps regions of the structure file to a mesh: nodes, faces, couplings, joints.
 #pragma once
 
 #include <string>
@@ -10,21 +10,21 @@
 
 namespace thermocomp::structure {
 
-/// Finds the nodes and faces of regions; what cannot be found is collected as problems.
+/// Finds the nodes and faces of regions; collects problems.
 class RegionFinder {
  public:
-  /// @pre the mesh outlives this
+  /// @pre the mesh must outlive this
   RegionFinder(const Mesh& mesh, std::string file);
 
   [[nodiscard]] std::vector<Index> nodes_in(const Region& region);
-  /// Whole faces of the group, or of the surface.
+  /// Complete faces of the group, or of the surface.
   [[nodiscard]] std::vector<Face> faces_in(const Region& region);
   [[nodiscard]] const std::vector<Face>& surface() const noexcept { return surface_; }
   [[nodiscard]] double tolerance_m() const noexcept { return tolerance_m_; }
 
   void problem(const Origin& origin, std::string rule);
   [[nodiscard]] bool has_problems() const noexcept { return !problems_.empty(); }
-  /// @throws ConfigurationError where there are problems
+  /// @throws ConfigurationError if there are problems
   void throw_problems();
 
  private:
@@ -40,8 +40,8 @@ class RegionFinder {
   std::vector<Problem> problems_;
 };
 
-/// One coupling per quadrature point of the faces, as strong as its share of the area [m^2].
-/// `complete(place_m, coupling)` adds what the point is coupled to; false: the point is left out.
+/// One coupling per quadrature point of the faces, with its share of the area as strength [m^2].
+/// `complete(place_m, coupling)` adds the other side; false: the point is omitted.
 template <class Complete>
 [[nodiscard]] std::vector<Coupling> couplings_on(const Mesh& mesh, const std::vector<Face>& faces,
                                                  const Complete& complete) {
@@ -67,12 +67,12 @@ template <class Complete>
   return couplings_on(mesh, faces, [](const Vec3&, Coupling&) { return true; });
 }
 
-/// Every node of the faces `from` follows the face of `to` that it lies on. Faces that come nowhere
-/// nearer than gap_m are a problem, told by the finder.
+/// Ties every node of the faces `from` to the nearest face of `to`. Faces further apart than gap_m
+/// everywhere are a problem.
 void tie_faces(RegionFinder& finder, const Mesh& mesh, const JointSpec& joint,
                Reduction& reduction);
 
-/// Couplings between the faces, each as strong as its area [m^2]; problems as above.
+/// Couplings between the faces, with their area as strength [m^2]; problems as above.
 [[nodiscard]] std::vector<Coupling> couplings_between(RegionFinder& finder, const Mesh& mesh,
                                                       const JointSpec& joint);
 

@@ -29,7 +29,7 @@ namespace thermocomp::structure {
 
 namespace {
 
-/// printf into a string.
+/// Formats like printf.
 template <class... Values>
 std::string line(const char* format, Values... values) {
   char text[256];
@@ -60,7 +60,7 @@ double peak_memory_MB() {
   return static_cast<double>(usage.ru_maxrss) / 1024.0;
 }
 
-/// 1 K at the block's nodes, 0 elsewhere.
+/// Rise of 1 K at the block's nodes, 0 elsewhere.
 std::vector<double> one_warm(const Structure& structure, Index block) {
   std::vector<double> rise_K(structure.mesh.nodes_m.size(), 0.0);
   for (std::size_t node = 0; node < rise_K.size(); ++node) {
@@ -69,7 +69,7 @@ std::vector<double> one_warm(const Structure& structure, Index block) {
   return rise_K;
 }
 
-/// The displacements of each block 1 K warm and all else as it was.
+/// Displacements with each block in turn 1 K warmer.
 std::vector<BlockShape> block_shapes(const Structure& structure, const Statics& statics,
                                      const cli::ProgressLines& progress) {
   std::vector<BlockShape> shapes;
@@ -81,7 +81,7 @@ std::vector<BlockShape> block_shapes(const Structure& structure, const Statics& 
   return shapes;
 }
 
-/// Moments of a run's selected rows: the blocks' shapes, each times its rise since the first row.
+/// Adds moments of a run's selected rows: the blocks' shapes times their rise since the first row.
 void add_run(const RunFile& run, const ThermalModel& model, const Structure& structure,
              const std::vector<BlockShape>& shapes, SurfacePicture& picture) {
   const std::string name = std::filesystem::path(run.name).stem().string();
@@ -215,13 +215,13 @@ namespace {
 
 using Rows = std::vector<std::vector<double>>;
 
-/// A coefficient; what rounding leaves of 0 is 0.
+/// Formats a coefficient; rounding errors of 0 become 0.
 std::string coefficient(double value) {
   constexpr double rounding = 1e-6;
   return std::fabs(value) < rounding ? "0" : line("%.4g", value);
 }
 
-/// Blocks down, rows of the matrix across.
+/// Table with one line per block and one column per row of the matrix.
 std::string table_text(const std::vector<std::string>& inputs,
                        const std::vector<std::string>& names, const Rows& rows) {
   std::string text = line("%-24s", "per K");
@@ -236,7 +236,7 @@ std::string table_text(const std::vector<std::string>& inputs,
   return text + "\n";
 }
 
-/// Greatest over least singular value, and how many count.
+/// Condition number; if `all`, also the singular values.
 std::string conditioning(const Rows& rows, bool all) {
   Eigen::MatrixXd matrix(static_cast<Eigen::Index>(rows.size()),
                          static_cast<Eigen::Index>(rows.front().size()));

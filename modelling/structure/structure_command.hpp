@@ -1,4 +1,4 @@
-/// `thermocomp structure`.
+/// The command `thermocomp structure`.
 #pragma once
 
 #include <functional>
@@ -9,7 +9,7 @@ class App;
 
 namespace thermocomp::structure {
 
-/// @param action  set when the command line asks for this command; returns the exit status
+/// @param action  set if the command line selects this command; returns the exit status
 void add_structure_command(CLI::App& app, std::function<int()>& action);
 
 }  // namespace thermocomp::structure

@@ -116,7 +116,7 @@ class Builder {
     return part.mesh.extension() == ".inp" ? read_inp(part.mesh) : read_msh(part.mesh);
   }
 
-  // ---------------------------------------------------------------- what holds
+  // ---------------------------------------------------------------- supports
 
   void hold(const SupportSpec& support, Reduction& reduction) {
     for (const Index node : finder_->nodes_in(support.on)) {
@@ -140,7 +140,7 @@ class Builder {
     }
   }
 
-  /// Shares `total` out over couplings that are as strong as their area.
+  /// Distributes `total` over couplings by their area.
   static void append_shared(std::vector<Coupling> shares, const Vec3& total,
                             std::vector<Coupling>& couplings) {
     double area_m2 = 0.0;
@@ -228,7 +228,7 @@ class Builder {
   const StructureSpec& spec_;
   const Progress& progress_;
   Mesh mesh_;
-  std::optional<RegionFinder> finder_;  ///< from when the mesh is there
+  std::optional<RegionFinder> finder_;  ///< set after the mesh is read
   std::vector<Problem> problems_;
 };
 

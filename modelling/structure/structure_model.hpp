@@ -1,4 +1,4 @@
-/// A structure file with its meshes: nodes in blocks, what holds them, and what is asked for.
+/// Structure file with its meshes: blocks of nodes, supports and outputs.
 #pragma once
 
 #include <functional>
@@ -13,7 +13,7 @@
 
 namespace thermocomp::structure {
 
-/// Told what begins, in long work.
+/// Called with the next step of long work.
 using Progress = std::function<void(std::string_view)>;
 
 struct Structure {
@@ -23,26 +23,25 @@ struct Structure {
   std::vector<Coupling> springs;  ///< to the ground and between parts
   std::vector<std::string> block_names;
   std::vector<Index> block_of_node;
-  /// The outputs in their order, then for each guideway and each of its outputs one row per
-  /// position.
+  /// The outputs in order, then one row per position for each output of each guideway.
   std::vector<Functional> rows;
 };
 
-/// Reads the meshes and binds everything the file says to them.
-/// @throws ConfigurationError with all problems of a kind at once: meshes that cannot be read,
-///         inverted elements; regions without nodes or faces, blocks without nodes, nodes without
-///         a block, points outside their part; bodies that nothing holds
+/// Reads the meshes and applies the file's sections to them.
+/// @throws ConfigurationError with all problems of a kind at once: unreadable meshes, inverted
+///         elements; regions without nodes or faces, blocks without nodes, nodes without a block,
+///         points outside their part; unsupported bodies
 [[nodiscard]] Structure build_structure(const StructureSpec& spec, const Progress& progress);
 
-/// Block temperatures to displacements: each block's columns of the sensitivity added up.
+/// Model from block temperatures to displacements: sensitivities summed over each block's nodes.
 /// @param sensitivities_m_per_K  shape (rows)(nodes), see Statics::sensitivities()
 /// Source: JP6507619B2, {delta_part} = [P1_part]{T_block}.
 [[nodiscard]] ThermalModel block_model(
     const StructureSpec& spec, const Structure& structure,
     const std::vector<std::vector<double>>& sensitivities_m_per_K);
 
-/// What a person wants to know of the result: size, what each block contributes, conditioning.
-/// @param all  rows along the guideways, nodes of each block and singular values too
+/// Report of size, contribution of each block, conditioning.
+/// @param all  also rows along the guideways, nodes of each block and singular values
 [[nodiscard]] std::string structure_report(const Structure& structure, const Statics& statics,
                                            const ThermalModel& model, bool all = false);
 

@@ -7,7 +7,7 @@
 namespace thermocomp::structure {
 namespace {
 
-/// For each node the elements and the couplings it takes part in.
+/// Elements and couplings of each node.
 class Neighbourhood {
  public:
   Neighbourhood(const Mesh& mesh, std::span<const Coupling> couplings)
@@ -19,7 +19,7 @@ class Neighbourhood {
     each([&](Index node, Index user) { users_[next[node]++] = user; });
   }
 
-  /// Nodes that share an element or a coupling with `node`, with repetitions.
+  /// Nodes that share an element or a coupling with `node`; may repeat.
   template <class Action>
   void each_neighbour(Index node, const Action& action) const {
     const auto elements = static_cast<Index>(mesh_.elements.size());
@@ -79,13 +79,13 @@ SparseSymmetric empty_matrix(const Mesh& mesh, std::span<const Coupling> couplin
                                        neighbours);
 }
 
-/// Adds a 3 x 3 block at nodes (a, b), a >= b; the rows of a node follow each other in the pattern.
+/// Adds a 3 x 3 block at nodes (a, b), a >= b; a node's rows are consecutive in the pattern.
 void add_block(SparseSymmetric& matrix, Index a, Index b, const std::array<Vec3, 3>& block) {
   for (Index column = 0; column < 3; ++column) {
     const Index full = 3 * b + column;
     const auto first = matrix.row.begin() + matrix.column_start[full];
     const auto last = matrix.row.begin() + matrix.column_start[full + 1];
-    const Index top = a == b ? column : 0;  // above the diagonal nothing is stored
+    const Index top = a == b ? column : 0;  // the upper triangle is not stored
     const auto place = std::lower_bound(first, last, 3 * a + top);
     THERMOCOMP_ENSURE(place != last && *place == 3 * a + top);
     auto at = static_cast<std::size_t>(place - matrix.row.begin());

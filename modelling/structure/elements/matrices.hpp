@@ -1,4 +1,4 @@
-/// Element matrices added up over a mesh: stiffness, thermal load, conduction, capacity.
+/// Assembles element matrices over a mesh: stiffness, thermal load, conduction, capacity.
 #pragma once
 
 #include <array>
@@ -21,14 +21,14 @@ struct Material {
   double heat_capacity_J_per_kg_K{0.0};
 };
 
-/// One point at which something is coupled: energy = sum_c strength_c (sum_i weight_i u_ic)^2 / 2.
-/// Springs to the ground and between faces, convection, contact conductance.
+/// Coupling at one point: energy = sum_c strength_c (sum_i weight_i u_ic)^2 / 2. Used for springs
+/// to the ground and between faces, convection, contact conductance.
 struct Coupling {
   static constexpr std::size_t nodes_max = 16;  ///< two faces
   std::array<Index, nodes_max> nodes{};
   std::array<double, nodes_max> weight{};
   std::size_t count{0};
-  Vec3 strength{};  ///< N/m in x, y, z; for heat W/K in the first
+  Vec3 strength{};  ///< N/m in x, y, z; for heat, W/K in the first
 
   void add(std::span<const Index> face_nodes, std::span<const double> values, double sign);
 };
@@ -39,8 +39,8 @@ struct Coupling {
                                                std::span<const Material> material_of_part,
                                                std::span<const Coupling> couplings);
 
-/// f = F theta with theta the rise of every node, interpolated by the element's own shape
-/// functions (quadratic in tet10 and hex20) and integrated exactly in straight elements.
+/// f = F theta; theta is the rise of every node, interpolated by the element's shape functions
+/// (quadratic in tet10 and hex20) and integrated exactly in straight elements.
 /// @param rise_K  shape (nodes). @return shape (3 nodes) [N]
 [[nodiscard]] std::vector<double> thermal_load(const Mesh& mesh,
                                                std::span<const Material> material_of_part,
@@ -50,7 +50,7 @@ struct Coupling {
 [[nodiscard]] std::vector<double> thermal_load_transposed(
     const Mesh& mesh, std::span<const Material> material_of_part, std::span<const double> v);
 
-/// One unknown per node: conduction plus couplings [W/K], and capacity [J/K], in equal patterns.
+/// One unknown per node: conduction plus couplings [W/K] and capacity [J/K], with equal patterns.
 struct HeatMatrices {
   SparseSymmetric conduction;
   SparseSymmetric capacity;
@@ -59,7 +59,7 @@ struct HeatMatrices {
                                          std::span<const Material> material_of_part,
                                          std::span<const Coupling> couplings);
 
-/// Volume that each node stands for, its shape function integrated [m^3]; shape (nodes).
+/// Integral of each node's shape function [m^3]; shape (nodes).
 [[nodiscard]] std::vector<double> nodal_volumes(const Mesh& mesh);
 
 }  // namespace thermocomp::structure

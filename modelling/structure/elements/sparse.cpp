@@ -66,7 +66,7 @@ constexpr Module module{"thermocomp-cholmod.so", "factorises matrices",
                         "thermocomp_cholmod_functions", "CHOLMOD (Debian 12: libcholmod3)"};
 
 const CholmodFunctions& cholmod() {
-  // One that failed is tried again.
+  // Retried if loading failed.
   static const auto& functions = *static_cast<const CholmodFunctions*>(functions_of(module));
   return functions;
 }

@@ -1,4 +1,4 @@
-// What a structure file may have besides: heat conduction with its load cases, sensor placement.
+// Optional sections of a structure file: heat conduction with load cases, sensor placement.
 #include <algorithm>
 #include <cmath>
 #include <set>

@@ -54,7 +54,7 @@ class Reader {
     return {values[0] / um, values[1] / um, values[2] / um};
   }
 
-  /// "x", "-z", or a vector of three numbers; made to length 1.
+  /// "x", "-z", or a vector of three numbers, which is normalised.
   static Vec3 read_direction(const TomlTable& table, std::string_view key) {
     if (table.is_text(key)) {
       const Names<int> names{{"x", 1}, {"y", 2}, {"z", 3}, {"-x", -1}, {"-y", -2}, {"-z", -3}};
@@ -86,7 +86,7 @@ class Reader {
     spec_.materials.push_back(material);
   }
 
-  /// Only heat conduction asks for them; 0 where they are left out.
+  /// Needed only for heat conduction; 0 if absent.
   static void read_thermal_constants(const TomlTable& table, Material& material) {
     const auto constant = [&](std::string_view key, double most) {
       return table.has(key) ? table.number(key, Range::above(0, most)) : 0.0;
@@ -166,7 +166,7 @@ class Reader {
     }
   }
 
-  // ---------------------------------------------------------------- what holds
+  // ---------------------------------------------------------------- supports
 
   void read_support(const TomlTable& table) {
     SupportSpec support{read_region(table, "on", spec_.parts), {}};
@@ -206,7 +206,7 @@ class Reader {
   // ---------------------------------------------------------------- blocks
 
   void add_block_name(const TomlTable& table, std::string_view key, const std::string& name) {
-    if (name.empty()) return;  // a problem already
+    if (name.empty()) return;  // already reported
     if (!is_column_name(name)) table.problem(key, name, column_name_rule);
     if (!is_temperature(name)) table.problem(key, name, "must be a temperature (*_degC, *_K)");
     if (!block_names_.insert(name).second) table.problem(key, name, "is used twice");
@@ -226,7 +226,7 @@ class Reader {
     spec_.blocks.push_back(std::move(block));
   }
 
-  /// Planes that cut a part: names in order, along x first, then y, then z.
+  /// Blocks cut from a part by planes: names in the order of x, then y, then z.
   void read_division(const TomlTable& table) {
     const Index part = read_index(table, "part", names_of(spec_.parts), "part");
     std::array<std::vector<double>, 3> cuts;

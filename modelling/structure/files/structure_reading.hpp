@@ -1,4 +1,4 @@
-/// Small things that the readers of the structure file's sections share.
+/// Helpers shared by the readers of the structure file's sections.
 #pragma once
 
 #include <algorithm>
@@ -13,7 +13,7 @@
 namespace thermocomp::structure {
 
 constexpr double mm = 1e-3;
-constexpr double far_mm = 1e6;  ///< no machine is a kilometre long
+constexpr double far_mm = 1e6;  ///< upper bound of lengths: 1 km
 constexpr std::array<const char*, 3> range_keys{"x_mm", "y_mm", "z_mm"};
 
 [[nodiscard]] inline Range length_range() {
@@ -23,13 +23,13 @@ constexpr std::array<const char*, 3> range_keys{"x_mm", "y_mm", "z_mm"};
 [[nodiscard]] Origin origin_of(const TomlTable& table, std::string_view key,
                                std::string value = {});
 
-/// Three numbers, in mm in the file.
+/// Reads three numbers in mm.
 [[nodiscard]] Vec3 read_point_m(const TomlTable& table, std::string_view key);
 
-/// `name`; a problem where `names` has it already.
+/// Reads `name`; a duplicate in `names` is a problem.
 [[nodiscard]] std::string read_unique_name(const TomlTable& table, std::set<std::string>& names);
 
-/// The index among `known` of what `key` names; a problem and 0 where there is none.
+/// Index in `known` of the name in `key`; if unknown, reports a problem and returns 0.
 [[nodiscard]] Index read_index(const TomlTable& table, std::string_view key,
                                const std::vector<std::string>& known, std::string_view what);
 
@@ -44,10 +44,11 @@ template <class Items>
 [[nodiscard]] Region read_region(const TomlTable& parent, std::string_view key,
                                  const std::vector<PartSpec>& parts);
 
-/// [room], [coolant], [[convection]], [[heat]], [[load_case]]; after materials, parts and joints.
+/// Reads [room], [coolant], [[convection]], [[heat]], [[load_case]]; requires materials, parts and
+/// joints.
 void read_heat_sections(const TomlTable& root, StructureSpec& spec);
 
-/// [placement] with its [[placement.pattern]]; after blocks.
+/// Reads [placement] with its [[placement.pattern]]; requires blocks.
 void read_placement_section(const TomlTable& root, StructureSpec& spec);
 
 }  // namespace thermocomp::structure

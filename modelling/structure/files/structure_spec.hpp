@@ -1,5 +1,5 @@
-/// The structure file, what a user writes about a machine's structure, as plain structures. Only
-/// what can be judged without the meshes is judged here; structure_model.hpp does the rest.
+/// Contents of the structure file. Checks that need no mesh are made here, the others in
+/// structure_model.hpp.
 #pragma once
 
 #include <array>
@@ -15,27 +15,27 @@
 
 namespace thermocomp::structure {
 
-/// Where something stands in the file, for problems that show only with the mesh at hand.
+/// Place in the file, for problems found only with the mesh.
 struct Origin {
   int line{0};
   std::string key;    ///< "support[1].on"
-  std::string value;  ///< as it may be shown
+  std::string value;  ///< as shown in the message
 };
 
-/// Nodes or faces: everything that meets all given conditions.
+/// Nodes or faces that meet all given conditions.
 struct Region {
   std::optional<std::string> part;
-  std::optional<std::string> group;  ///< a name of the mesh file
-  Box within_m;                      ///< infinite where no range is given
+  std::optional<std::string> group;  ///< name in the mesh file
+  Box within_m;                      ///< infinite if not given
   Origin origin;
 };
 
 struct PartSpec {
   std::string name;
   Index material{0};
-  /// A mesh file, or boxes.
+  /// Mesh file; empty: boxes.
   std::filesystem::path mesh;
-  std::optional<std::string> group;  ///< of the mesh file, the part's elements; none: all
+  std::optional<std::string> group;  ///< group of the mesh file with the part's elements; none: all
   double length_unit_m{1e-3};
   Vec3 size_m{};  ///< of elements, for boxes and geometry
   Shape shape{Shape::tet10};
@@ -58,20 +58,20 @@ struct JointSpec {
   Region from;
   Region to;
   bool bonded{true};
-  Vec3 stiffness_N_per_m{};  ///< of the whole joint, where it is not bonded
-  double gap_m{0.0};         ///< greatest distance between the faces
-  /// Heat through the faces; none: a bonded joint conducts perfectly, one by springs not at all.
+  Vec3 stiffness_N_per_m{};  ///< of the whole joint, unless bonded
+  double gap_m{0.0};         ///< largest distance between the faces
+  /// Contact conductance; none: infinite in a bonded joint, zero in a spring joint.
   std::optional<double> conductance_W_per_m2_K;
 };
 
-/// Nodes whose temperature is one input of the model.
+/// Nodes that form one input of the model.
 struct BlockSpec {
   std::string name;  ///< "column_upper_degC"
   Region on;
-  bool rest{false};  ///< everything that no other block takes
+  bool rest{false};  ///< all nodes outside the other blocks
 };
 
-/// The mean over one point, or the tilt between two.
+/// A displacement at one point, or the tilt between two.
 struct PlaceSpec {
   Index part{0};
   std::vector<Vec3> at_m;  ///< one point, or from and to
@@ -82,11 +82,11 @@ struct PlaceSpec {
 
 struct OutputSpec {
   std::string name;
-  Vec3 direction{};  ///< of length 1
+  Vec3 direction{};  ///< unit vector
   std::vector<PlaceSpec> places;
 };
 
-/// A thermocouple, for a simulated machine.
+/// Thermocouple of a simulated machine.
 struct SensorSpec {
   std::string name;
   PlaceSpec place;
@@ -97,19 +97,19 @@ struct GuidewayRows {
   std::string axis;
   std::vector<double> positions_mm;
   std::vector<PlaceSpec> places;  ///< one per position
-  /// Where the meshes have the axis: rows then say what other positions differ by.
+  /// Position of the axis in the meshes: rows then contain the difference from it.
   std::optional<PlaceSpec> drawn;
   std::map<std::string, Vec3> outputs;  ///< name -> direction
 };
 
-/// Heat between faces and the air or the coolant.
+/// Convection between faces and the air or the coolant.
 struct ConvectionSpec {
   Region on;
   double coefficient_W_per_m2_K{0.0};
   bool to_coolant{false};
 };
 
-/// heat = heat_W (|signal| / at)^exponent into faces or, with `inside`, the volume.
+/// heat = heat_W (|signal| / at)^exponent into faces, or with `inside` into the volume.
 struct HeatSpec {
   std::string name;
   Region on;
@@ -120,26 +120,26 @@ struct HeatSpec {
   double exponent{1.0};
 };
 
-/// One thermal analysis, from everything at the temperature of the room.
+/// One thermal analysis, starting at room temperature.
 struct LoadCaseSpec {
   std::string name;
   bool steady{false};
   double duration_s{0.0};
   double step_s{0.0};
-  std::vector<double> at_s;               ///< moments that count, increasing
+  std::vector<double> at_s;               ///< evaluated times, increasing
   std::map<std::string, double> signals;  ///< others are 0
-  double room_change_K{0.0};              ///< evenly over the duration
+  double room_change_K{0.0};              ///< linear over the duration
   bool coolant_on{false};
-  bool left_out{false};  ///< judges a placement and takes no part in it
+  bool left_out{false};  ///< used to validate a placement, not to find it
 };
 
-/// By how much a pattern changes the rise of its blocks where the file does not say.
+/// Default changes of a pattern's rises.
 inline const std::vector<double> usual_percents{10.0, -10.0, 5.0, -5.0};
 
-/// Blocks that are made warmer or cooler together where sensors are placed.
+/// Blocks whose rises are varied together for the placement of sensors.
 struct PatternSpec {
   std::string name;
-  std::vector<Index> blocks;     ///< places among StructureSpec::blocks
+  std::vector<Index> blocks;     ///< indices into StructureSpec::blocks
   std::vector<double> percents;  ///< of the rise
 };
 
@@ -159,13 +159,13 @@ struct StructureSpec {
   std::vector<HeatSpec> heats;
   std::vector<LoadCaseSpec> load_cases;
   std::vector<SensorSpec> sensors;
-  bool sensors_on_surface{true};      ///< a sensor is screwed on, not cast in
+  bool sensors_on_surface{true};      ///< sensors only on the surface
   std::vector<PatternSpec> patterns;  ///< none: derived from the structure
 };
 
 /// @throws ConfigurationError with every problem of the file
 [[nodiscard]] StructureSpec load_structure(const std::filesystem::path& path);
-/// @param path  stands for the file in problems; mesh files are sought beside it
+/// @param path  file name for problems; mesh files are relative to it
 [[nodiscard]] StructureSpec parse_structure(const std::string& text,
                                             const std::filesystem::path& path);
 

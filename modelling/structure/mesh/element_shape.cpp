@@ -8,7 +8,7 @@ namespace {
 
 // ---------------------------------------------------------------- shape functions
 
-/// Corner and middle functions of a simplex from its barycentric coordinates.
+/// Shape functions of a simplex at corners and mid-sides, from barycentric coordinates.
 void simplex_values(const ShapeInfo& info, std::span<const double> bary,
                     std::span<const Vec3> bary_slope, ShapeValues& out) {
   if (info.nodes == info.corners) {
@@ -41,7 +41,7 @@ Factor bubble(double x) {
   return {1.0 - x * x, -2.0 * x};
 }
 
-/// Trilinear, or of the serendipity family, in the shape's dimensions.
+/// Shape functions of a brick or quadrilateral: linear or serendipity.
 void brick_values(const ShapeInfo& info, const Vec3& local, ShapeValues& out) {
   const std::size_t dim = info.dimension;
   const double corner_scale = dim == 3 ? 0.125 : 0.25;
@@ -117,7 +117,7 @@ Points gauss(std::size_t dimension, std::size_t count) {
   return points;
 }
 
-/// Every place of a tetrahedron with barycentric coordinates (a, a, a, 1 - 3a) in some order.
+/// Adds all permutations of the barycentric coordinates (a, a, a, 1 - 3a).
 void add_vertex_orbit(Points& points, double a, double weight) {
   const double b = 1.0 - 3.0 * a;
   for (const Vec3& local : {Vec3{a, a, a}, Vec3{b, a, a}, Vec3{a, b, a}, Vec3{a, a, b}}) {
@@ -125,7 +125,7 @@ void add_vertex_orbit(Points& points, double a, double weight) {
   }
 }
 
-/// The same with (a, a, 1/2 - a, 1/2 - a).
+/// Adds all permutations of (a, a, 1/2 - a, 1/2 - a).
 void add_edge_orbit(Points& points, double a, double weight) {
   const double b = 0.5 - a;
   for (const Vec3& local :
@@ -191,7 +191,7 @@ const Edges& hex_edges() {
   return edges;
 }
 
-/// Faces by their corners; with the middles of their edges where the shape has middles.
+/// Adds faces given by their corners, with mid-side nodes if the shape has them.
 void add_faces(ShapeInfo& info, Shape face_shape,
                const std::vector<std::vector<std::uint8_t>>& by) {
   for (const std::vector<std::uint8_t>& corners : by) {
@@ -298,7 +298,8 @@ Vec3 clamped_local(Shape shape, Vec3 local) {
     for (std::size_t d = 0; d < info.dimension; ++d) local[d] = std::clamp(local[d], -1.0, 1.0);
     return local;
   }
-  // Onto the simplex: cut what is negative and share the excess of the sum, until neither is left.
+  // Projection onto the simplex: clips negative coordinates and distributes the excess of the sum,
+  // until neither is left.
   for (std::size_t pass = 0; pass < info.dimension; ++pass) {
     double sum = 0.0;
     double positive = 0.0;

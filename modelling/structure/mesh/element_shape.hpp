@@ -1,8 +1,8 @@
-/// Isoparametric shapes: shape functions, their slopes, quadrature rules and faces.
+/// Isoparametric elements: shape functions with derivatives, quadrature rules and faces.
 ///
-/// Order of nodes: corners, then the middles of edges, as in Abaqus, CalculiX and VTK. Local
-/// coordinates: hexahedra and quadrilaterals in [-1, 1], tetrahedra and triangles r, s, t >= 0 with
-/// r + s + t <= 1.
+/// Order of nodes: corners, then mid-sides, as in Abaqus, CalculiX and VTK. Local coordinates:
+/// hexahedra and quadrilaterals in [-1, 1]; tetrahedra and triangles r, s, t >= 0 with r + s + t <=
+/// 1.
 #pragma once
 
 #include <array>
@@ -14,7 +14,7 @@
 namespace thermocomp::structure {
 
 using Vec3 = std::array<double, 3>;
-using Index = std::uint32_t;  ///< of a node, an element, a degree of freedom
+using Index = std::uint32_t;  ///< of a node, element or degree of freedom
 
 enum class Shape : std::uint8_t { tet4, tet10, hex8, hex20, tri3, tri6, quad4, quad8 };
 
@@ -34,7 +34,7 @@ using Rule = std::vector<RulePoint>;
 
 struct ShapeFace {
   Shape shape{};
-  std::vector<std::uint8_t> nodes;  ///< of the element; normal outwards
+  std::vector<std::uint8_t> nodes;  ///< of the element; outward normal
 };
 
 struct ShapeInfo {
@@ -43,25 +43,26 @@ struct ShapeInfo {
   std::size_t nodes{0};
   std::size_t corners{0};
   std::vector<Vec3> node_locals;
-  std::vector<std::array<std::uint8_t, 2>> edges;  ///< corners beside the middle nodes
-  std::vector<ShapeFace> faces;                    ///< none for a face
-  /// Exact for products of two slopes (and what is used for a stiffness) in a straight element.
+  std::vector<std::array<std::uint8_t, 2>> edges;  ///< corners of each mid-side node
+  std::vector<ShapeFace> faces;                    ///< empty for a face
+  /// Exact for products of two derivatives in a straight element; used for the stiffness.
   Rule slope_rule;
-  /// Exact for products of a shape function with a slope or with a shape function there.
+  /// Exact for products of a shape function with a derivative or a shape function in a straight
+  /// element.
   Rule product_rule;
 };
 
 [[nodiscard]] const ShapeInfo& shape_info(Shape shape);
 [[nodiscard]] ShapeValues shape_values(Shape shape, const Vec3& local);
-/// The nearest point of the reference element.
+/// Nearest point of the reference element.
 [[nodiscard]] Vec3 clamped_local(Shape shape, Vec3 local);
 
-/// Gradients by x, y, z and the volume (weight times determinant) at one point of an element.
+/// Gradients in x, y, z and volume (weight times determinant) at one point of an element.
 struct Gradients {
   std::array<Vec3, shape_nodes_max> gradient{};
-  double volume{0.0};  ///< not above zero: the element is inverted there
+  double volume{0.0};  ///< zero or negative: inverted here
 };
-/// @param corners  coordinates of the element's nodes [m], shape (nodes)
+/// @param nodes_m  coordinates of the element's nodes [m], shape (nodes)
 [[nodiscard]] Gradients gradients_at(std::span<const Vec3> nodes_m, const RulePoint& point);
 
 /// Normal times area (weight included) of a face at one point [m^2].

@@ -20,7 +20,7 @@ constexpr Module module{"thermocomp-gmsh.so", "reads .msh and STEP files",
                         "thermocomp_gmsh_functions", "Gmsh's library (Debian 12: libgmsh4.8)"};
 
 const GmshFunctions& gmsh() {
-  // One that failed is tried again.
+  // Retried if loading failed.
   static const auto& functions = *static_cast<const GmshFunctions*>(functions_of(module));
   return functions;
 }
@@ -98,7 +98,7 @@ std::string upper(std::string text) {
   return text;
 }
 
-/// Fields between commas; one comma at the end of a line adds none.
+/// Splits at commas; ignores one comma at the end of the line.
 std::vector<std::string> fields_of(std::string_view line) {
   std::vector<std::string> fields;
   while (!line.empty()) {
@@ -112,7 +112,7 @@ std::vector<std::string> fields_of(std::string_view line) {
 
 struct Keyword {
   std::string name;                               ///< "ELEMENT"
-  std::map<std::string, std::string> parameters;  ///< names in capitals, values as written
+  std::map<std::string, std::string> parameters;  ///< names in upper case, values as written
 };
 
 Keyword keyword_of(const std::string& line) {
@@ -205,7 +205,7 @@ class InpReader {
     }
   }
 
-  /// Names are the same in small and capital letters; kept as first written.
+  /// Names are case-insensitive and kept as first written.
   std::string known_name(const std::string& name) {
     return name.empty() ? name : names_.try_emplace(upper(name), name).first->second;
   }
@@ -370,7 +370,7 @@ class InpReader {
   Keyword keyword_;
   std::string set_;
   Shape shape_{Shape::tet4};
-  std::vector<Index> pending_;  ///< number and nodes of an element that goes on in the next line
+  std::vector<Index> pending_;  ///< number and nodes of an element continued on the next line
   FileMesh mesh_;
   std::unordered_map<Index, Index> node_of_;
   std::unordered_map<Index, Index> volume_of_;

@@ -1,4 +1,4 @@
-/// A mesh as a file holds it, before parts take what is theirs.
+/// Mesh of a file, before its elements are assigned to parts.
 #pragma once
 
 #include <filesystem>
@@ -12,7 +12,7 @@
 
 namespace thermocomp::structure {
 
-/// A mesh file that cannot be read, or holds what we cannot use; says what, and where.
+/// A mesh file that cannot be read or has unsupported contents; the message gives the place.
 class MeshError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -21,7 +21,7 @@ class MeshError : public std::runtime_error {
 struct FileMesh {
   struct Volume {
     Shape shape{};
-    Index number{0};           ///< as the file counts
+    Index number{0};           ///< number in the file
     std::vector<Index> nodes;  ///< indices into `nodes`
   };
   std::vector<Vec3> nodes;  ///< in the file's unit
@@ -30,31 +30,30 @@ struct FileMesh {
   std::map<std::string, Group> groups;                      ///< every name; nodes and faces
 };
 
-/// Abaqus and CalculiX: *NODE, *ELEMENT of types C3D4, C3D10, C3D8, C3D20 (with their variants),
-/// *NSET, *ELSET, *SURFACE; other keywords are passed over.
+/// Reads Abaqus and CalculiX files: *NODE, *ELEMENT of types C3D4, C3D10, C3D8, C3D20 (with their
+/// variants), *NSET, *ELSET, *SURFACE; ignores other keywords.
 /// @throws MeshError with file and line
 [[nodiscard]] FileMesh read_inp(const std::filesystem::path& path);
 
-/// A .msh file of any version that Gmsh reads; groups are its physical groups.
+/// Reads a .msh file of any version that Gmsh reads, with its physical groups.
 /// @throws MeshError
 [[nodiscard]] FileMesh read_msh(const std::filesystem::path& path);
 
-/// Geometry (STEP), meshed by Gmsh; coordinates in m. Edges of quadratic elements are straight.
+/// Meshes a STEP geometry with Gmsh; coordinates in m. Edges of quadratic elements are straight.
 /// @throws MeshError
 [[nodiscard]] FileMesh mesh_step(const std::filesystem::path& path, double size_m, Shape shape);
 
-/// Appends the elements of `group` (none: all) as `part`. Parts that come from one file share its
-/// nodes: `first_node` is where they stand in the mesh, see add_nodes().
-/// @throws MeshError where there is no such group; names those that there are
+/// Appends the elements of `group` (none: all) as `part`. Parts from one file share its nodes,
+/// which begin at `first_node` (see add_nodes()).
+/// @throws MeshError with the existing groups if there is no such group
 void add_part(Mesh& mesh, Index part, const FileMesh& file, const std::optional<std::string>& group,
               Index first_node);
 /// Appends the file's nodes. @return the index of the first
 Index add_nodes(Mesh& mesh, const FileMesh& file, double unit_m);
 
-/// What thermocomp-gmsh.so offers to the program that loads it: the functions above, for a file
-/// that is there. Only that module is linked with Gmsh: its eighty libraries cost more than all
-/// else at a start, and few commands read a mesh. Program and module come from one build; what is
-/// thrown on one side is caught on the other.
+/// Functions of thermocomp-gmsh.so, for existing files. Only this module links Gmsh: its eighty
+/// libraries take most of a start's time, and few commands read a mesh. Program and module come
+/// from one build, so exceptions can cross between them.
 struct GmshFunctions {
   FileMesh (*read_msh)(const std::filesystem::path& path);
   FileMesh (*mesh_step)(const std::filesystem::path& path, double size_m, Shape shape);
@@ -62,5 +61,5 @@ struct GmshFunctions {
 
 }  // namespace thermocomp::structure
 
-/// The one name that is looked up.
+/// The only symbol that is looked up.
 extern "C" const thermocomp::structure::GmshFunctions thermocomp_gmsh_functions;

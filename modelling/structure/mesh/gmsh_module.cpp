@@ -1,4 +1,4 @@
-// thermocomp-gmsh.so: meshes by Gmsh. Uses nothing of the program that loads it but headers.
+// thermocomp-gmsh.so: meshes by Gmsh. Uses only headers of the program that loads it.
 #include <algorithm>
 #include <cstdio>
 #include <gmsh.h>
@@ -11,7 +11,7 @@
 namespace thermocomp::structure {
 namespace {
 
-/// Gmsh counts the middles of edges in an order of its own: for each of ours the one of theirs.
+/// Gmsh's index of each of our mid-side nodes.
 constexpr std::array<std::size_t, 6> tet10_middles{0, 1, 2, 3, 5, 4};
 constexpr std::array<std::size_t, 12> hex20_middles{0, 3, 5, 1, 8, 10, 11, 9, 2, 4, 6, 7};
 
@@ -38,7 +38,7 @@ std::optional<Shape> shape_of_type(int gmsh_type) {
   }
 }
 
-/// OpenCASCADE reports to standard output, where the model may go; to standard error with it.
+/// Redirects OpenCASCADE's messages to standard error, since the model may go to standard output.
 class ReportsToStderr {
  public:
   ReportsToStderr() : stdout_(::dup(STDOUT_FILENO)) {
@@ -58,7 +58,7 @@ class ReportsToStderr {
   int stdout_;
 };
 
-/// Gmsh is one for a whole program: open from here to the end of the object.
+/// Session of Gmsh, which has global state; closed by the destructor.
 class GmshSession {
  public:
   explicit GmshSession(const std::filesystem::path& path) : path_(path) {
@@ -70,13 +70,13 @@ class GmshSession {
   ~GmshSession() {
     try {
       gmsh::finalize();
-    } catch (...) {  // what was read is at hand; there is nobody to tell
+    } catch (...) {  // the mesh is complete, so the error does not matter
     }
   }
   GmshSession(const GmshSession&) = delete;
   GmshSession& operator=(const GmshSession&) = delete;
 
-  /// Runs something of Gmsh; what it throws (of any type) becomes a MeshError.
+  /// Runs a function of Gmsh; converts exceptions of any type to MeshError.
   template <class Action>
   void run(const Action& action) const {
     try {
@@ -136,7 +136,7 @@ class GmshReader {
     return found->second;
   }
 
-  /// The elements of one entity: action(shape, tag, nodes in our order).
+  /// Calls action(shape, tag, nodes in our order) for the elements of one entity.
   template <class Action>
   void each_element(int dimension, int entity, const Action& action) const {
     std::vector<int> types;

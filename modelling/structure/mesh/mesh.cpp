@@ -13,7 +13,7 @@ namespace {
 
 constexpr double coincidence_of_size = 1e-7;
 
-/// Corner nodes of a face in increasing order; triangles end in `no_part`.
+/// Corner nodes of a face in increasing order; a triangle ends with `no_part`.
 using FaceKey = std::array<Index, 4>;
 
 FaceKey key_of(const Face& face) {
@@ -197,7 +197,7 @@ namespace {
 
 constexpr double same_plane_of_size = 1e-9;
 
-/// Coordinates of the grid's planes along one axis, the boxes' faces among them.
+/// Grid planes along one axis, including the boxes' faces.
 std::vector<double> planes(const std::vector<BoxShape>& boxes, std::size_t axis, double size_m) {
   std::vector<double> faces;
   for (const BoxShape& shape : boxes) {
@@ -217,7 +217,7 @@ std::vector<double> planes(const std::vector<BoxShape>& boxes, std::size_t axis,
   return result;
 }
 
-/// The nodes of one part's grid: at planes (even index) and half-way between them (odd).
+/// Nodes of one part's grid: on planes (even index) and half-way between them (odd).
 class GridNodes {
  public:
   GridNodes(Mesh& mesh, const std::array<std::vector<double>, 3>& planes_m)
@@ -250,7 +250,7 @@ class GridNodes {
 
 using Place = GridNodes::Place;
 
-/// An element from its corners in half steps; the middles of its edges are between them.
+/// Adds an element from its corners in half steps, with the mid-side nodes between them.
 void add_from_corners(Mesh& mesh, GridNodes& nodes, Index part, Shape shape,
                       const std::vector<Place>& corners, Index number) {
   const ShapeInfo& info = shape_info(shape);
@@ -267,7 +267,7 @@ void add_from_corners(Mesh& mesh, GridNodes& nodes, Index part, Shape shape,
   mesh.add_element(shape, part, all, number);
 }
 
-/// Six tetrahedra along one diagonal of a cell; neighbouring cells meet in equal triangles.
+/// Six tetrahedra around one diagonal of a cell; neighbouring cells share their triangles.
 std::vector<std::vector<Place>> tetrahedra_of(const Place& low) {
   std::vector<std::vector<Place>> result;
   std::array<std::size_t, 3> order{0, 1, 2};
@@ -280,7 +280,7 @@ std::vector<std::vector<Place>> tetrahedra_of(const Place& low) {
     }
     if (!even) std::swap(corners[1], corners[2]);
     result.push_back(corners);
-    // std::next_permutation runs through 012 021 102 120 201 210: signs + - - + + -.
+    // Order of std::next_permutation: 012 021 102 120 201 210, with signs + - - + + -.
     const std::size_t done = result.size();
     even = done == 3 || done == 4;
   } while (std::next_permutation(order.begin(), order.end()));

@@ -1,4 +1,4 @@
-/// Nodes, elements, parts and named groups of a structure; parts made of boxes.
+/// Mesh of a structure: nodes, elements, parts and named groups; parts made of boxes.
 #pragma once
 
 #include <map>
@@ -12,18 +12,18 @@ namespace thermocomp::structure {
 struct Element {
   Shape shape{};
   Index part{0};
-  Index first{0};   ///< of its nodes in Mesh::connectivity
-  Index number{0};  ///< as the mesh file counts it, for messages
+  Index first{0};   ///< index of its nodes in Mesh::connectivity
+  Index number{0};  ///< number in the mesh file, for messages
 };
 
-/// A face of the surface, or one that a mesh file names in a group.
+/// A face of the surface or of a group of the mesh file.
 struct Face {
   Shape shape{};
   Index part{0};
   std::array<Index, 8> nodes{};
 };
 
-/// A name of the mesh file for some nodes and, where they were given as a surface, faces.
+/// Named nodes of the mesh file and, if given as a surface, faces.
 struct Group {
   std::vector<Index> nodes;  ///< increasing
   std::vector<Face> faces;
@@ -34,7 +34,7 @@ struct Mesh {
   std::vector<Element> elements;
   std::vector<Index> connectivity;
   std::vector<std::string> part_names;
-  /// One map per part: groups are known by the mesh that the part came from.
+  /// By part: groups of the mesh that the part came from.
   std::vector<std::map<std::string, Group>> groups;
 
   [[nodiscard]] std::span<const Index> nodes_of(const Element& element) const {
@@ -43,7 +43,7 @@ struct Mesh {
   void add_element(Shape shape, Index part, std::span<const Index> nodes, Index number);
 };
 
-/// The nodes' coordinates, shape (nodes of the shape).
+/// Coordinates of nodes, shape (nodes of the shape).
 using NodeCoordinates = std::array<Vec3, shape_nodes_max>;
 [[nodiscard]] NodeCoordinates coordinates_of(const Mesh& mesh, std::span<const Index> nodes);
 
@@ -51,25 +51,25 @@ using NodeCoordinates = std::array<Vec3, shape_nodes_max>;
   return {face.nodes.data(), shape_info(face.shape).nodes};
 }
 
-/// Faces that belong to one element alone, in the order of the elements.
+/// Faces of one element only, in the order of the elements.
 [[nodiscard]] std::vector<Face> surface_of(const Mesh& mesh);
 
-/// For each node the first part that has it; `no_part` where no element has it.
+/// First part of each node; `no_part` if no element has it.
 inline constexpr Index no_part = 0xffffffff;
 [[nodiscard]] std::vector<Index> parts_of_nodes(const Mesh& mesh);
 
-/// Whether a node belongs to the part, also where parts share nodes. Shape (nodes).
+/// Nodes of the part, including shared ones. Shape (nodes).
 [[nodiscard]] std::vector<bool> nodes_of_part(const Mesh& mesh, Index part);
 
-/// For each node the connected body it belongs to (over elements that share nodes), counted from
-/// 0; `no_part` where no element has it.
+/// Connected body of each node (over elements that share nodes), from 0; `no_part` if no element
+/// has it.
 [[nodiscard]] std::vector<Index> bodies_of_nodes(const Mesh& mesh);
 
-/// One line for every element that is inverted or flat somewhere, `count_max` at most: element,
+/// One line for every element that is inverted or flat at some point, `count_max` at most: element,
 /// part and place.
 [[nodiscard]] std::vector<std::string> inverted_elements(const Mesh& mesh, std::size_t count_max);
 
-/// Drops nodes that no element uses and renumbers the rest; groups lose those nodes too.
+/// Removes nodes without an element, also from groups, and renumbers the others.
 void drop_unused_nodes(Mesh& mesh);
 
 struct Box {
@@ -79,23 +79,23 @@ struct Box {
 };
 [[nodiscard]] Box bounds_of(std::span<const Vec3> points_m);
 
-/// The distance below which two points of the model count as one [m].
+/// Distance below which two points coincide [m].
 [[nodiscard]] double coincidence_m(const Mesh& mesh);
 
 struct BoxShape {
   Box box;
-  bool cut{false};  ///< takes away what the boxes before it added
+  bool cut{false};  ///< removes material of earlier boxes
 };
 
-/// Appends a part. Every face of a box is a plane of the grid through the whole part, so walls,
-/// ribs and openings meet in common nodes. A tetrahedral mesh has six elements per cell.
-/// @param boxes   in order: where boxes overlap the last one decides
-/// @param size_m  an element's greatest edges along x, y, z
-/// @return the number of elements; 0 where the boxes leave nothing
+/// Appends a part. Every face of a box is a plane of the part's grid, so walls, ribs and openings
+/// meet in common nodes. A tetrahedral mesh has six elements per cell.
+/// @param boxes   in order; where boxes overlap the last one decides
+/// @param size_m  largest edges of an element along x, y, z
+/// @return the number of elements; 0 if the boxes leave no material
 std::size_t add_boxes(Mesh& mesh, Index part, const std::vector<BoxShape>& boxes,
                       const Vec3& size_m, Shape shape);
 
-/// How many cells add_boxes() would make, without making them (before holes are cut).
+/// Number of cells that add_boxes() would make, before holes are cut.
 [[nodiscard]] double cells_of_boxes(const std::vector<BoxShape>& boxes, const Vec3& size_m);
 
 }  // namespace thermocomp::structure

@@ -1,19 +1,19 @@
-/// Modules of this package: shared objects whose libraries only some commands need.
+/// Loads this package's modules: shared objects whose libraries only some commands need.
 #pragma once
 
 namespace thermocomp::structure {
 
-/// A module, and what is said where it is missing.
+/// A module, with texts for the message if it is missing.
 struct Module {
-  const char* name;       ///< of the file
+  const char* name;       ///< file name
   const char* does;       ///< "reads ..."
-  const char* functions;  ///< the one name in it that is looked up
-  const char* needs;      ///< the library that it is linked with, and its package
+  const char* functions;  ///< symbol that is looked up
+  const char* needs;      ///< library that it links, and its package
 };
 
-/// Loads the module for good: its libraries are not made to be unloaded. In a build tree it lies
-/// beside the program, installed in lib/thermocomp.
-/// @throws std::runtime_error, not an error of a file: nothing is wrong with what was to be read
+/// Loads the module permanently, since its libraries do not support unloading. Found beside the
+/// program in a build tree, in lib/thermocomp when installed.
+/// @throws std::runtime_error, since the input file is not at fault
 [[nodiscard]] const void* functions_of(const Module& module);
 
 }  // namespace thermocomp::structure

@@ -1,5 +1,5 @@
-// thermocomp-cholmod.so: Cholesky factors by CHOLMOD. Uses nothing of the program that loads it but
-// headers.
+// thermocomp-cholmod.so: Cholesky factors by CHOLMOD. Uses only headers of the program that loads
+// it.
 #include <cstdlib>
 #include <cstring>
 #include <dlfcn.h>
@@ -12,10 +12,10 @@
 namespace thermocomp::structure {
 namespace {
 
-/// CHOLMOD asks for four threads and OpenBLAS for one a processor, whatever else runs. Where others
-/// want the processors too, these threads' waiting for each other takes several times as long as
-/// the work. Both are asked to take what is free; found at run time, since the libraries behind
-/// CHOLMOD are the system's choice.
+/// CHOLMOD uses four threads and OpenBLAS one per processor. On a busy computer their waiting for
+/// each other takes several times as long as the work. OpenMP therefore adapts its threads, and
+/// OpenBLAS uses one if the load exceeds the processors. Both are looked up at run time, since the
+/// system chooses CHOLMOD's libraries.
 void leave_processors_to_others() {
   using SetNumber = void (*)(int);
   const auto set = [](const char* name, int number) {
@@ -59,7 +59,7 @@ class CholmodFactor : public CholeskyFactor {
   CholmodFactor& operator=(const CholmodFactor&) = delete;
 
   void factorise(const SparseSymmetric& matrix) {
-    // CHOLMOD reads the arrays only; int and Index have the same representation below 2^31.
+    // CHOLMOD only reads the arrays; int and Index have the same representation below 2^31.
     cholmod_sparse view{};
     view.nrow = view.ncol = matrix.size();
     view.nzmax = matrix.row.size();

@@ -8,7 +8,7 @@ namespace thermocomp::structure {
 namespace {
 
 const double gamma_fraction = 2.0 - std::sqrt(2.0);
-/// Of a step: how much of the rate at its end both stages weigh in.
+/// Weight of the end's rate in both stages, per step.
 const double stage_weight = gamma_fraction / 2.0;
 
 std::vector<double> product(const SparseSymmetric& matrix, std::span<const double> x) {
@@ -52,7 +52,7 @@ TransientConduction::TransientConduction(const Conduction& conduction, double st
   THERMOCOMP_ENSURE(step_s > 0.0);
 }
 
-/// C T + w L T = stored + w q, with T split into free and given.
+/// Solves C T + w L T = stored + w q, with T split into free and given values.
 void TransientConduction::solve_stage(std::span<const double> stored, const HeatInput& input,
                                       double weight_s) {
   const Reduction& reduction = conduction_.reduction_;
@@ -91,7 +91,7 @@ void TransientConduction::step(const InputAt& input_at) {
   for (std::size_t i = 0; i < nodes; ++i) {
     mixed[i] = scale * (temps_degC_[i] - back * begin_degC[i]);
   }
-  // The step's end by multiplication: a thousand additions of a tenth are not a hundred.
+  // Multiplied, since a sum of steps would accumulate rounding.
   time_s_ = static_cast<double>(++steps_) * step_s_;
   input_at(time_s_, middle_s, input);
   solve_stage(product(conduction_.full_.capacity, mixed), input, weight_s);

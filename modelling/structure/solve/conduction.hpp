@@ -11,10 +11,10 @@
 
 namespace thermocomp::structure {
 
-/// What drives the temperature at one moment; shapes (nodes).
+/// Heat inputs at one time; shapes (nodes).
 struct HeatInput {
-  std::vector<double> load_W;     ///< sources, and convection's coefficient times room temperature
-  std::vector<double> held_degC;  ///< counts where the reduction holds a node
+  std::vector<double> load_W;     ///< sources, and convection coefficient times room temperature
+  std::vector<double> held_degC;  ///< used for nodes held by the reduction
 };
 
 class Conduction {
@@ -24,9 +24,9 @@ class Conduction {
              const Reduction& reduction, std::span<const Coupling> couplings);
 
   [[nodiscard]] std::size_t nodes() const noexcept { return reduction_.full_size(); }
-  /// L T = q. @throws FactorisationError where nothing fixes the level of the temperature
+  /// Solves L T = q. @throws FactorisationError if the level of the temperature is undetermined
   [[nodiscard]] std::vector<double> steady_degC(const HeatInput& input) const;
-  /// Heat held at `temps_degC` [J], above 0 degC.
+  /// Stored heat at `temps_degC` relative to 0 degC [J].
   [[nodiscard]] double energy_J(std::span<const double> temps_degC) const;
 
  private:
@@ -35,18 +35,19 @@ class Conduction {
   HeatMatrices full_;
 };
 
-/// Steps in time by TR-BDF2: a trapezoidal stage to t + gamma dt, gamma = 2 - sqrt(2), then the
-/// backward difference formula through t, t + gamma dt and t + dt. Second order; damps whatever is
-/// faster than the step (L-stable), so a source switched on leaves no ringing; both stages share
-/// one factor. Held temperatures may vary in time: what their change stores is accounted for.
+/// Time integration by TR-BDF2: a trapezoidal stage to t + gamma dt, gamma = 2 - sqrt(2), then the
+/// backward difference formula through t, t + gamma dt and t + dt. Second order and L-stable, so a
+/// source that switches on causes no ringing; both stages share one factor. The heat stored by
+/// varying held temperatures is included.
 /// Source: R. E. Bank et al., Transient simulation of silicon devices and circuits, 1985.
 class TransientConduction {
  public:
   /// @param initial_degC  shape (nodes)
   TransientConduction(const Conduction& conduction, double step_s,
                       std::span<const double> initial_degC);
-  /// One step further. `input_at(time_s, step_middle_s, input)` fills the input of a moment; what
-  /// jumps in time takes its value at the step's middle, so that jumps between steps are exact.
+  /// Advances one step. `input_at(time_s, step_middle_s, input)` fills in the input at a time;
+  /// discontinuous inputs take their value at the step's middle, so that jumps between steps are
+  /// exact.
   using InputAt = std::function<void(double, double, HeatInput&)>;
   void step(const InputAt& input_at);
 

@@ -1,5 +1,5 @@
-/// What solves K u = f for statics; systems too large for a factorisation are solved by the program
-/// thermocomp-petsc under mpirun.
+/// Solvers of K u = f for statics; the program thermocomp-petsc under mpirun solves systems too
+/// large for a factorisation.
 #pragma once
 
 #include <filesystem>
@@ -19,7 +19,7 @@ class LinearSolver {
   LinearSolver(const LinearSolver&) = delete;
   LinearSolver& operator=(const LinearSolver&) = delete;
 
-  /// Solves A x = b in place for right sides one after the other, shape (right sides x size).
+  /// Solves A x = b in place for several right sides, shape (right sides x size).
   /// @throws FactorisationError
   virtual void solve(std::span<double> right_sides) const = 0;
   /// One or two lines for the report.
@@ -27,7 +27,7 @@ class LinearSolver {
 };
 
 enum class Backend {
-  cholmod,  ///< one factorisation, on this machine's memory
+  cholmod,  ///< one factorisation in this computer's memory
   petsc     ///< conjugate gradients with algebraic multigrid, on one or more MPI ranks
 };
 struct SolverChoice {
@@ -35,13 +35,12 @@ struct SolverChoice {
   int ranks{2};
 };
 
-/// The system waits in a file of a folder of its own (below TMPDIR), so that this process need not
-/// hold the matrix; each solve() starts the program once for all its right sides.
+/// Keeps the system in a file in its own folder (below TMPDIR), so that this process need not hold
+/// the matrix; each solve() starts the program once for all right sides.
 class PetscSolver : public LinearSolver {
  public:
-  /// @param matrix  of the free unknowns; no longer needed afterwards
-  /// @throws FactorisationError where the program or mpirun is missing, or the file cannot be
-  /// written
+  /// @param matrix  of the free unknowns; not used afterwards
+  /// @throws FactorisationError if the program or mpirun is missing, or the file cannot be written
   PetscSolver(const SparseSymmetric& matrix, const Mesh& mesh, const Reduction& reduction,
               int ranks);
   ~PetscSolver() override;
@@ -54,7 +53,7 @@ class PetscSolver : public LinearSolver {
   std::filesystem::path folder_;
   int ranks_;
   Index size_;
-  mutable std::string said_;  ///< by the program: iterations and residuals
+  mutable std::string said_;  ///< output of the program: iterations and residuals
 };
 
 }  // namespace thermocomp::structure

@@ -27,7 +27,8 @@ std::array<Vec3, 3> tangents_of(std::span<const Vec3> at, const ShapeValues& val
   return tangents;
 }
 
-/// Step in local coordinates towards a point `miss` away. On a face: within its tangents.
+/// Newton step in local coordinates towards a point at distance `miss`; for a face, in its tangent
+/// plane.
 Vec3 local_step(std::array<Vec3, 3> tangents, const Vec3& miss, std::size_t dimension) {
   if (dimension == 2) tangents[2] = cross(tangents[0], tangents[1]);
   const std::array<Vec3, 3> dual{cross(tangents[1], tangents[2]), cross(tangents[2], tangents[0]),
@@ -38,7 +39,7 @@ Vec3 local_step(std::array<Vec3, 3> tangents, const Vec3& miss, std::size_t dime
   return step;
 }
 
-/// The nearest point of one element or face: Newton's method, held inside the element.
+/// Nearest point of one element or face by Newton's method within the element.
 PointOnMesh nearest_in(const Mesh& mesh, Shape shape, std::span<const Index> nodes,
                        const Vec3& point_m) {
   const ShapeInfo& info = shape_info(shape);
@@ -69,7 +70,7 @@ Box box_of(const Mesh& mesh, std::span<const Index> nodes) {
   return bounds_of({at.data(), nodes.size()});
 }
 
-/// A curved side may stand out of the box of its nodes.
+/// A curved side may extend beyond the box of its nodes.
 bool is_near(const Box& box, const Vec3& point_m, double tolerance_m) {
   const double slack = tolerance_m + 0.1 * box.diagonal_m();
   for (std::size_t d = 0; d < 3; ++d) {
@@ -78,7 +79,6 @@ bool is_near(const Box& box, const Vec3& point_m, double tolerance_m) {
   return true;
 }
 
-/// Keeps the nearer one.
 void keep_nearer(std::optional<PointOnMesh>& best, PointOnMesh candidate, double tolerance_m) {
   if (!(candidate.distance_m <= tolerance_m)) return;
   if (!best || candidate.distance_m < best->distance_m) best = std::move(candidate);

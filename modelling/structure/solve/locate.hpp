@@ -1,4 +1,4 @@
-/// Where a point lies: in an element, or on one of some faces.
+/// Locates points in elements or on faces.
 #pragma once
 
 #include <optional>
@@ -12,11 +12,11 @@ namespace thermocomp::structure {
 /// A point as a weighted sum of nodes (shape functions).
 struct PointOnMesh {
   std::vector<Weighted> nodes;
-  double distance_m{0.0};  ///< from the point asked for
+  double distance_m{0.0};  ///< from the requested point
 };
 
-/// The nearest point of a part.
-/// @return none where the part is further away than `tolerance_m`
+/// Nearest point of a part.
+/// @return nullopt if the part is further away than `tolerance_m`
 [[nodiscard]] std::optional<PointOnMesh> locate_in_part(const Mesh& mesh, Index part,
                                                         const Vec3& point_m, double tolerance_m);
 
@@ -28,7 +28,7 @@ class FaceSearch {
 
  private:
   const Mesh& mesh_;
-  std::vector<Face> faces_;  ///< in order of the low end of their box along `axis_`
+  std::vector<Face> faces_;  ///< sorted by the low end of their box along `axis_`
   std::vector<Box> boxes_;
   std::size_t axis_{0};
   double extent_m_{0.0};  ///< of the longest box along `axis_`

@@ -1,5 +1,5 @@
-/// The file between thermocomp-modelling and thermocomp-petsc: both run on one machine and come
-/// from one build, so plain arrays in the machine's own representation, one after the other.
+/// File from thermocomp-modelling to thermocomp-petsc: consecutive arrays in native representation,
+/// since both run on one computer and come from one build.
 ///
 ///     SystemHeader
 ///     uint64 column_start[size + 1]   lower triangle by columns, rows increasing

@@ -1,6 +1,6 @@
-// thermocomp-petsc FOLDER: solves the system that thermocomp-modelling left there, under mpirun.
-// Conjugate gradients, preconditioned by smoothed aggregation with the rigid motions. Every rank
-// maps the file and takes its rows. Exit status 0: all right sides converged.
+// thermocomp-petsc FOLDER: solves the system in thermocomp-modelling's file under mpirun, by
+// conjugate gradients with smoothed aggregation and rigid body modes. Every rank maps the file and
+// takes its rows. Exit status 0: all right sides converged.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -22,13 +22,13 @@ namespace {
 
 using thermocomp::structure::SystemHeader;
 
-/// SOR as smoother breaks down on these matrices; Jacobi under Chebyshev does not.
+/// The smoother is Jacobi under Chebyshev, since SOR breaks down on these matrices.
 constexpr const char* options =
     "-ksp_type cg -ksp_rtol 1e-8 -ksp_max_it 2000 -ksp_norm_type unpreconditioned -pc_type gamg "
     "-pc_gamg_threshold 0.02 -mg_levels_ksp_type chebyshev -mg_levels_pc_type jacobi "
     "-mg_levels_ksp_max_it 3";
 
-/// A file's bytes, read only.
+/// Read-only memory map of a file.
 class MappedFile {
  public:
   explicit MappedFile(const std::string& path) {
@@ -82,8 +82,8 @@ System system_in(MappedFile& file) {
   return system;
 }
 
-/// Rows of this rank over all nodes' components, so that blocks of three stay whole; what is held
-/// or follows others has a row of its own with nothing but a diagonal.
+/// Rows of this rank over all nodes' components, so that blocks of three stay complete; held or
+/// tied unknowns have a row with only a diagonal.
 struct LocalRows {
   PetscInt first{0};
   PetscInt end{0};
@@ -94,7 +94,8 @@ struct LocalRows {
   [[nodiscard]] bool has(PetscInt row) const { return row >= first && row < end; }
 };
 
-/// action(row, column, value) for every entry of this rank's rows, columns increasing in a row.
+/// Calls action(row, column, value) for every entry of this rank's rows, columns increasing in a
+/// row.
 template <class Action>
 void each_entry(const System& system, const LocalRows& rows, const Action& action) {
   for (std::size_t free = 0; free < system.header.size; ++free) {
@@ -171,7 +172,7 @@ PetscErrorCode make_matrix(const System& system, const LocalRows& rows, Mat& mat
   PetscFunctionReturn(0);
 }
 
-/// Unknowns of this rank: places first..end of the full numbering.
+/// Unknowns of this rank: places begin..end of the full numbering.
 struct LocalUnknowns {
   std::size_t begin{0};
   std::size_t end{0};
@@ -185,7 +186,7 @@ LocalUnknowns unknowns_of(const System& system, const LocalRows& rows) {
   return {at(rows.first), at(rows.end)};
 }
 
-/// Solves one right side; the solution replaces it in `out`, a file open for writing.
+/// Solves one right side and writes the solution over it in the file `out`.
 PetscErrorCode solve_one(KSP solver, const System& system, const LocalRows& rows,
                          std::span<const double> right_side, std::size_t index, int out,
                          bool& good) {
@@ -275,7 +276,7 @@ int main(int argc, char** argv) {
   }
   if (PetscInitialize(&argc, &argv, nullptr, nullptr) != 0) return 2;
   bool good = false;
-  // What the environment's PETSC_OPTIONS say comes later and wins.
+  // PETSC_OPTIONS from the environment come later and take precedence.
   const char* more = std::getenv("PETSC_OPTIONS");
   const bool failed = PetscOptionsInsertString(nullptr, options) != 0 ||
                       (more != nullptr && PetscOptionsInsertString(nullptr, more) != 0) ||

@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* program_name = "thermocomp-petsc";
 
-/// Beside this program, then along PATH.
+/// Searches beside this program, then in PATH.
 fs::path find_program(const std::string& name) {
   std::error_code error;
   std::vector<fs::path> folders{fs::read_symlink("/proc/self/exe", error).parent_path()};
@@ -48,7 +48,7 @@ std::string text_of(const fs::path& path) {
   return text.str();
 }
 
-/// Runs a program and waits. @return its exit status; -1 where it was ended by a signal
+/// Runs a program to its end. @return its exit status; -1 if ended by a signal
 int run(const std::vector<std::string>& words, const fs::path& log) {
   std::vector<char*> arguments;
   arguments.reserve(words.size() + 1);
@@ -57,12 +57,12 @@ int run(const std::vector<std::string>& words, const fs::path& log) {
   const pid_t child = ::fork();
   if (child < 0) throw FactorisationError("cannot start a program: no process left");
   if (child == 0) {
-    // Open MPI refuses to run as root without being told twice; here nothing is gained by it.
+    // Open MPI refuses to run as root without both variables.
     ::setenv("OMPI_ALLOW_RUN_AS_ROOT", "1", 0);
     ::setenv("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1", 0);
     ::setenv("OMP_NUM_THREADS", "1", 0);
     ::setenv("OPENBLAS_NUM_THREADS", "1", 0);
-    ::setenv("OMPI_MCA_mpi_yield_when_idle", "1", 0);  // others want the processors too
+    ::setenv("OMPI_MCA_mpi_yield_when_idle", "1", 0);  // leaves the processors to other programs
     const int out = ::open(log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
     if (out < 0 || ::dup2(out, 1) < 0 || ::dup2(out, 2) < 0) ::_exit(127);
     ::execv(arguments[0], arguments.data());

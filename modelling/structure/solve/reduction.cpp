@@ -14,7 +14,7 @@ struct Entry {
   double value;
 };
 
-/// Sorts by row and adds up what has the same one.
+/// Sorts by row and sums entries of the same row.
 void append_column(std::vector<Entry>& entries, SparseSymmetric& matrix) {
   std::sort(entries.begin(), entries.end(),
             [](const Entry& a, const Entry& b) { return a.row < b.row; });
@@ -108,8 +108,8 @@ std::vector<double> Reduction::given(std::span<const double> values) const {
 
 SparseSymmetric Reduction::reduced(const SparseSymmetric& full) const {
   THERMOCOMP_ENSURE(full.size() == full_size());
-  // Entries of a free column come from several full columns, so they are gathered first:
-  // counted, placed, then each column sorted and added up.
+  // A free column collects entries of several full columns: they are counted, placed, then sorted
+  // and summed by column.
   const auto each_entry = [&](const auto& action) {
     for (Index column = 0; column < full.size(); ++column) {
       for (Index k = full.column_start[column]; k < full.column_start[column + 1]; ++k) {
@@ -117,9 +117,9 @@ SparseSymmetric Reduction::reduced(const SparseSymmetric& full) const {
         for (const Term& a : terms(row)) {
           for (const Term& b : terms(column)) {
             double amount = a.weight * b.weight * full.value[k];
-            // An entry below the diagonal stands for two; both may fall on one free diagonal.
+            // An off-diagonal entry represents two, which may both map to one free diagonal.
             if (row != column && a.free == b.free) amount *= 2.0;
-            if (row == column && a.free < b.free) continue;  // comes the other way round too
+            if (row == column && a.free < b.free) continue;  // the transposed pair follows
             action(std::max(a.free, b.free), std::min(a.free, b.free), amount);
           }
         }

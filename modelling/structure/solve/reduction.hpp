@@ -1,4 +1,4 @@
-/// Which unknowns are free: u = T q + g, with q the free ones and g what is given.
+/// Free, held and tied unknowns: u = T q + g, with free unknowns q and given values g.
 #pragma once
 
 #include <span>
@@ -8,24 +8,23 @@
 
 namespace thermocomp::structure {
 
-/// A node that follows others: u = sum of weight times u of node.
+/// Term of a tied node: u = sum of weight times u of node.
 struct Weighted {
   Index node{0};
   double weight{0.0};
 };
 
-/// Unknowns of the full model are counted node by node: node * components + component.
+/// Unknowns of the full model are numbered node * components + component.
 class Reduction {
  public:
   Reduction(Index nodes, Index components);
 
-  /// The unknown has a given value (0, or see set_given()); it wins over a tie.
+  /// Gives the unknown a value (0, or see given()); takes precedence over a tie.
   void hold(Index node, Index component);
-  /// The node follows `masters` in all components. Masters that follow others themselves are
-  /// replaced by those. @return false, and nothing done, where the node follows already or would
-  /// follow itself
+  /// Ties the node to `masters` in all components. Masters that are tied themselves are replaced by
+  /// theirs. @return false, without a change: the node is already tied or would depend on itself
   bool tie(Index node, std::span<const Weighted> masters);
-  /// Numbers the free unknowns. Nothing may be held or tied after it.
+  /// Numbers the free unknowns. Call after all hold() and tie().
   void finish();
 
   [[nodiscard]] Index full_size() const { return static_cast<Index>(held_.size()); }
@@ -34,10 +33,9 @@ class Reduction {
     return held_[node * components_ + component];
   }
   [[nodiscard]] const std::vector<Weighted>& masters_of(Index node) const { return ties_[node]; }
-  /// For each free unknown its place in the full model, increasing.
+  /// Place of each free unknown in the full model, increasing.
   [[nodiscard]] std::vector<Index> places_of_free() const;
-  /// g with the values of the held unknowns and of what follows them, from values for all
-  /// unknowns (only those of held ones count). Shapes (full_size).
+  /// g from values for all unknowns, of which only those of held ones are used. Shapes (full_size).
   [[nodiscard]] std::vector<double> given(std::span<const double> values) const;
 
   /// T^T A T, shape (free_size).
@@ -59,7 +57,7 @@ class Reduction {
 
   Index components_;
   std::vector<bool> held_;
-  std::vector<std::vector<Weighted>> ties_;  ///< empty: the node follows none
+  std::vector<std::vector<Weighted>> ties_;  ///< empty: not tied
   std::vector<Term> terms_;
   std::vector<Index> term_start_;
   Index free_size_{0};

@@ -143,8 +143,8 @@ namespace {
 constexpr double held_of_largest = 1e-9;
 constexpr Index rigid_motions = 6;
 
-/// Rigid motions of every body: three translations and three turns about its middle, the turns
-/// scaled by its size so that all six are alike in magnitude.
+/// Rigid motions of every body: three translations and three rotations about its centre, scaled by
+/// its size to similar magnitudes.
 class RigidMotions {
  public:
   explicit RigidMotions(const Mesh& mesh) : mesh_(mesh), body_of_node_(bodies_of_nodes(mesh)) {
@@ -189,7 +189,7 @@ class RigidMotions {
   std::vector<double> scale_per_m_;
 };
 
-/// Sum of row row^T over everything that holds: nothing is resisted in its null space.
+/// Sum of row row^T over all constraints; its null space contains the free motions.
 Eigen::MatrixXd resistance(const RigidMotions& motions, Index nodes, const Reduction& reduction,
                            std::span<const Coupling> couplings) {
   const auto size = static_cast<Eigen::Index>(motions.bodies() * rigid_motions);

@@ -12,7 +12,7 @@
 
 namespace thermocomp::structure {
 
-/// A linear function of the displacement: the sum of weight . u over nodes.
+/// Linear function of the displacement: sum of weight . u over nodes.
 struct Functional {
   struct Entry {
     Index node{0};
@@ -29,17 +29,17 @@ struct Functional {
 /// Source: JP6507619B2, delta = K^-1 F T; the adjoint form S = (K^-1 E)^T F is ours.
 class Statics {
  public:
-  /// @pre mesh, materials and reduction outlive this
+  /// @pre mesh, materials and reduction must outlive this
   /// @throws FactorisationError
   Statics(const Mesh& mesh, std::span<const Material> material_of_part, const Reduction& reduction,
           std::span<const Coupling> couplings, const SolverChoice& choice = {});
 
   /// Displacements [m], shape (3 nodes), from the rise of every node [K], shape (nodes).
   [[nodiscard]] std::vector<double> displacement_m(std::span<const double> rise_K) const;
-  /// The same from forces [N], shape (3 nodes).
+  /// Likewise from forces [N], shape (3 nodes).
   [[nodiscard]] std::vector<double> displacement_under_m(std::span<const double> force_N) const;
-  /// The adjoint: for each output its derivative by the temperature of every node [m/K], shape
-  /// (outputs)(nodes). One solve per output, whatever the number of nodes and blocks.
+  /// Adjoint solution: derivative of each output by the temperature of every node [m/K], shape
+  /// (outputs)(nodes). One solve per output, independent of the numbers of nodes and blocks.
   [[nodiscard]] std::vector<std::vector<double>> sensitivities(
       std::span<const Functional> outputs) const;
 
@@ -52,16 +52,15 @@ class Statics {
   std::unique_ptr<LinearSolver> solver_;
 };
 
-/// Stress at nodes [Pa] as xx, yy, zz, xy, yz, zx: each element's own at its node, the mean over
-/// the elements of one part that meet there. Shape (nodes).
+/// Stress at nodes [Pa] as xx, yy, zz, xy, yz, zx: mean of the values of all elements of one part
+/// at the node. Shape (nodes).
 using Stress = std::array<double, 6>;
 [[nodiscard]] std::vector<Stress> nodal_stresses_Pa(const Mesh& mesh,
                                                     std::span<const Material> material_of_part,
                                                     std::span<const double> displacement_m,
                                                     std::span<const double> rise_K);
 
-/// What can move without being held or sprung, one line per body: supports, ties and couplings are
-/// tried on the bodies' rigid motions. Empty: everything is held.
+/// Rigid motions that no support, tie or coupling resists, one line per body. Empty: none.
 [[nodiscard]] std::vector<std::string> free_motions(const Mesh& mesh, const Reduction& reduction,
                                                     std::span<const Coupling> couplings);
 

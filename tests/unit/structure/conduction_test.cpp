@@ -18,8 +18,8 @@ HeatInput no_input(const Mesh& mesh) {
           std::vector<double>(mesh.nodes_m.size(), 0.0)};
 }
 
-/// NAFEMS T3: a bar of 0.1 m, one end at 0 degC, the other at 100 sin(pi t / 40); at 0.08 m and
-/// 32 s 36.60 degC.
+/// NAFEMS T3: bar of 0.1 m, one end at 0 degC, the other at 100 sin(pi t / 40); reference 36.60
+/// degC at 0.08 m and 32 s.
 double nafems_t3(Shape shape, double element_m, double step_s) {
   const Mesh mesh = box_mesh({0.1, element_m, element_m}, {element_m, element_m, element_m}, shape);
   const std::vector<Material> materials{{"bar", 0, 0, 0, 35.0, 7200.0, 440.5}};
@@ -44,8 +44,8 @@ double nafems_t3(Shape shape, double element_m, double step_s) {
   return transient.temps_degC()[node_at(mesh, {0.08, 0, 0})];
 }
 
-/// NAFEMS T4: a plate of 0.6 x 1.0 m with convection; at (0.6, 0.2) 18.3 degC, by the series
-/// 18.2538.
+/// NAFEMS T4: plate of 0.6 x 1.0 m with convection; reference 18.3 degC at (0.6, 0.2), by the
+/// series 18.2538.
 double nafems_t4(Shape shape, double element_m) {
   const Mesh mesh = box_mesh({0.6, 1.0, element_m}, {element_m, element_m, element_m}, shape);
   const std::vector<Material> materials{{"plate", 0, 0, 0, 52.0, 7850.0, 460.0}};
@@ -67,8 +67,9 @@ double nafems_t4(Shape shape, double element_m) {
 
 }  // namespace
 
-TEST_CASE("patch test: a linear temperature prescribed around distorted elements is found inside",
-          "[structure][conduction]") {
+TEST_CASE(
+    "patch test: distorted elements reproduce a linear temperature prescribed on the boundary",
+    "[structure][conduction]") {
   const std::vector<Material> materials{steel()};
   for (const Shape shape : volume_shapes) {
     INFO(shape_info(shape).name);
@@ -96,7 +97,7 @@ TEST_CASE("patch test: a linear temperature prescribed around distorted elements
 }
 
 TEST_CASE("NAFEMS T4: temperature of a plate with convection", "[structure][conduction]") {
-  // Six by ten, twelve by twenty, 24 by 40 elements: as another program found on these meshes.
+  // Values of another program on these meshes of 6 x 10, 12 x 20 and 24 x 40 elements.
   CHECK(near(nafems_t4(Shape::hex20, 0.1), 18.794, 1e-3));
   CHECK(near(nafems_t4(Shape::hex20, 0.05), 18.272, 1e-3));
   CHECK(near(nafems_t4(Shape::hex20, 0.025), 18.254, 1e-3));
@@ -106,7 +107,7 @@ TEST_CASE("NAFEMS T4: temperature of a plate with convection", "[structure][cond
 }
 
 TEST_CASE("steady conduction converges with the order of the elements", "[structure][conduction]") {
-  // sin(pi x) sinh(pi y) / sinh(pi) is harmonic; prescribed on the surface, looked at inside.
+  // sin(pi x) sinh(pi y) / sinh(pi) is harmonic; prescribed on the surface, compared inside.
   const std::vector<Material> materials{steel()};
   const auto field = [](const Vec3& p) {
     return std::sin(M_PI * p[0]) * std::sinh(M_PI * p[1]) / std::sinh(M_PI);
@@ -152,7 +153,7 @@ TEST_CASE("NAFEMS T3: temperature in a bar with a varying end, second order in t
   CHECK(std::log2(fine / finer) > 1.8);
 }
 
-TEST_CASE("an insulated body keeps exactly the heat that goes into it", "[structure][conduction]") {
+TEST_CASE("an insulated body stores exactly the heat supplied", "[structure][conduction]") {
   const std::vector<Material> materials{steel()};
   for (const Shape shape : volume_shapes) {
     INFO(shape_info(shape).name);
@@ -174,7 +175,7 @@ TEST_CASE("an insulated body keeps exactly the heat that goes into it", "[struct
   }
 }
 
-TEST_CASE("a step far longer than the body's time constants leaves no ringing",
+TEST_CASE("a step far longer than the body's time constants causes no ringing",
           "[structure][conduction]") {
   const std::vector<Material> materials{steel()};
   const Mesh mesh = box_mesh({0.1, 0.1, 0.1}, {0.05, 0.05, 0.05}, Shape::hex20);
@@ -187,8 +188,7 @@ TEST_CASE("a step far longer than the body's time constants leaves no ringing",
   for (const double temp : transient.temps_degC()) REQUIRE(std::fabs(temp) < 0.01);
 }
 
-TEST_CASE("without anything that sets its level a steady temperature is refused",
-          "[structure][conduction]") {
+TEST_CASE("a steady temperature with an undetermined level is refused", "[structure][conduction]") {
   const std::vector<Material> materials{steel()};
   const Mesh mesh = box_mesh({0.1, 0.1, 0.1}, {0.05, 0.05, 0.05}, Shape::hex8);
   const Reduction reduction = nothing_held(mesh);

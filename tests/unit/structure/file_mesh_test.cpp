@@ -12,7 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A file of its own name, gone at the end.
+/// A uniquely named file; the destructor removes it.
 class TemporaryFile {
  public:
   explicit TemporaryFile(const std::string& ending, const std::string& text = {})
@@ -43,7 +43,7 @@ double volume_of(const Mesh& mesh) {
   return std::accumulate(volumes.begin(), volumes.end(), 0.0);
 }
 
-/// A box of 0.2 x 0.3 x 0.4 m meshed by Gmsh, written as .msh; its skin is the group "skin".
+/// Writes a box of 0.2 x 0.3 x 0.4 m meshed by Gmsh as .msh; its surface is the group "skin".
 void write_msh(const fs::path& path, bool hexahedra, int order) {
   gmsh::initialize(0, nullptr, false);
   gmsh::option::setNumber("General.Terminal", 0);
@@ -97,7 +97,7 @@ first, S1
 
 }  // namespace
 
-TEST_CASE("meshes of Gmsh come with the same volume, skin and a right stiffness",
+TEST_CASE("meshes of Gmsh have the same volume and surface, and the correct stiffness",
           "[structure][files]") {
   for (const bool hexahedra : {false, true}) {
     for (const int order : {1, 2}) {
@@ -114,7 +114,7 @@ TEST_CASE("meshes of Gmsh come with the same volume, skin and a right stiffness"
         area_m2 += c.strength[0];
       }
       CHECK(near(area_m2, 2 * (0.2 * 0.3 + 0.3 * 0.4 + 0.4 * 0.2), 1e-12));
-      // A wrong order of the middle nodes would spoil the middles' places.
+      // Detects a wrong order of the mid-side nodes.
       for (const Element& element : mesh.elements) {
         const ShapeInfo& info = shape_info(element.shape);
         const auto nodes = mesh.nodes_of(element);
@@ -128,7 +128,7 @@ TEST_CASE("meshes of Gmsh come with the same volume, skin and a right stiffness"
   }
 }
 
-TEST_CASE("a geometry is meshed on the way, in metres", "[structure][files]") {
+TEST_CASE("a geometry is meshed when read, in metres", "[structure][files]") {
   const TemporaryFile file("box.step");
   gmsh::initialize(0, nullptr, false);
   gmsh::option::setNumber("General.Terminal", 0);
@@ -143,7 +143,7 @@ TEST_CASE("a geometry is meshed on the way, in metres", "[structure][files]") {
   }
 }
 
-TEST_CASE("files that are no mesh, or of elements we do not have, are refused by name",
+TEST_CASE("files without a mesh or with unsupported elements are refused by name",
           "[structure][files]") {
   const TemporaryFile broken("broken.msh", "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\nfoo\n");
   CHECK(refusal([&] { static_cast<void>(read_msh(broken.path())); }).find("broken.msh") !=
@@ -174,7 +174,7 @@ TEST_CASE("an .inp file gives nodes, elements, sets and surfaces", "[structure][
         }).find("there are: First, both, second") != std::string::npos);
 }
 
-TEST_CASE("what is wrong in an .inp file is reported with its line", "[structure][files]") {
+TEST_CASE("errors in an .inp file are reported with their line", "[structure][files]") {
   struct Case {
     std::string text;
     std::string told;
@@ -200,7 +200,7 @@ TEST_CASE("what is wrong in an .inp file is reported with its line", "[structure
   }
 }
 
-TEST_CASE("quadratic elements of an .inp file go on over several lines", "[structure][files]") {
+TEST_CASE("quadratic elements of an .inp file may span several lines", "[structure][files]") {
   std::string text = "*NODE\n";
   const ShapeInfo& info = shape_info(Shape::hex20);
   for (std::size_t i = 0; i < 20; ++i) {

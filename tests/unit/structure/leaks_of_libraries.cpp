@@ -1,5 +1,5 @@
-// What the leak sanitizer is to leave alone: OpenCASCADE, which reads STEP files behind Gmsh, keeps
-// some tables until the process ends.
+// Suppression for the leak sanitizer: OpenCASCADE, which reads STEP files for Gmsh, keeps some
+// tables until the process ends.
 
 // NOLINTBEGIN(bugprone-reserved-identifier,readability-identifier-naming): the sanitizer's names
 extern "C" const char* __lsan_default_suppressions() {

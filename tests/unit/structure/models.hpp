@@ -21,7 +21,7 @@ inline Material steel() {
   return {"steel", 200e9, 0.3, 1.2e-5, 50.0, 7800.0, 460.0};
 }
 
-/// One part of one box from the origin.
+/// Mesh with one part, a box from the origin.
 inline Mesh box_mesh(const Vec3& size_m, const Vec3& element_m, Shape shape) {
   Mesh mesh;
   mesh.part_names = {"box"};
@@ -30,7 +30,7 @@ inline Mesh box_mesh(const Vec3& size_m, const Vec3& element_m, Shape shape) {
   return mesh;
 }
 
-/// Moves every node by a function of its place, middles of edges to between the moved corners.
+/// Moves every corner by a function of its place, and mid-side nodes to between the moved corners.
 inline void distort(Mesh& mesh, const std::function<Vec3(const Vec3&)>& shift) {
   std::vector<Vec3> moved = mesh.nodes_m;
   for (Vec3& node : moved) node = node + shift(node);
@@ -60,7 +60,7 @@ inline Index node_at(const Mesh& mesh, const Vec3& place_m) {
   return found[0];
 }
 
-/// Convection or a spring bed on faces: couplings to the ground, strength a square metre.
+/// Couplings of faces to the ground (convection or spring bed), strength per square metre.
 inline std::vector<Coupling> ground_couplings(const Mesh& mesh, const std::vector<Face>& faces,
                                               const Vec3& strength_per_m2) {
   std::vector<Coupling> couplings;

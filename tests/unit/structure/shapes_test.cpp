@@ -52,7 +52,7 @@ TEST_CASE("shape functions add up to one and their slopes are their derivatives"
   }
 }
 
-TEST_CASE("the quadrature of a tetrahedron is exact up to the degree it is used for",
+TEST_CASE("the quadrature of a tetrahedron is exact up to the required degree",
           "[structure][shape]") {
   for (const auto& [rule, degree] : {std::pair{&shape_info(Shape::tet10).slope_rule, 2},
                                      std::pair{&shape_info(Shape::tet10).product_rule, 5},
@@ -72,7 +72,7 @@ TEST_CASE("the quadrature of a tetrahedron is exact up to the degree it is used 
   }
 }
 
-TEST_CASE("faces look outwards and close the element", "[structure][shape]") {
+TEST_CASE("face normals point outwards and the faces close the element", "[structure][shape]") {
   for (const Shape shape : volume_shapes) {
     INFO(shape_info(shape).name);
     const Mesh mesh = box_mesh({1, 2, 3}, {0.5, 1, 1.5}, shape);
@@ -95,7 +95,7 @@ TEST_CASE("faces look outwards and close the element", "[structure][shape]") {
   }
 }
 
-TEST_CASE("an element whose nodes stand the wrong way round is named", "[structure][mesh]") {
+TEST_CASE("an inverted element is named", "[structure][mesh]") {
   for (const Shape shape : volume_shapes) {
     INFO(shape_info(shape).name);
     Mesh mesh = box_mesh({1, 1, 1}, {1, 1, 1}, shape);

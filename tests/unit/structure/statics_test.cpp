@@ -6,7 +6,7 @@ using namespace thermocomp::test;
 
 namespace {
 
-/// Held without any restraint of expansion: three nodes of a corner, in six directions.
+/// Statically determinate support at three nodes of a corner, in six directions.
 Reduction held_at_a_corner(const Mesh& mesh, const Vec3& size_m) {
   Reduction reduction(static_cast<Index>(mesh.nodes_m.size()), 3);
   const Index origin = node_at(mesh, {0, 0, 0});
@@ -23,7 +23,7 @@ Vec3 at(const std::vector<double>& u, Index node) {
   return {u[3 * std::size_t{node}], u[3 * std::size_t{node} + 1], u[3 * std::size_t{node} + 2]};
 }
 
-/// Any smooth shift that is zero on the box' surface planes.
+/// A smooth shift that is zero on the box' surface.
 Vec3 inner_shift(const Vec3& p, const Vec3& size_m) {
   double bump = 0.3;
   for (std::size_t d = 0; d < 3; ++d) bump *= std::sin(M_PI * p[d] / size_m[d]);
@@ -50,8 +50,9 @@ TEST_CASE("a free body expands by alpha T L, exactly", "[structure][statics]") {
   }
 }
 
-TEST_CASE("patch test: a linear displacement prescribed around distorted elements is found inside",
-          "[structure][statics]") {
+TEST_CASE(
+    "patch test: distorted elements reproduce a linear displacement prescribed on the boundary",
+    "[structure][statics]") {
   const Vec3 size_m{1, 1, 1};
   const std::vector<Material> materials{steel()};
   const auto field = [](const Vec3& p) {
@@ -93,7 +94,7 @@ TEST_CASE("patch test: a linear displacement prescribed around distorted element
   }
 }
 
-TEST_CASE("patch test: a bar under a uniform stress stretches by it in all elements",
+TEST_CASE("patch test: a bar under uniform stress has uniform strain in all elements",
           "[structure][statics]") {
   const Vec3 size_m{0.4, 0.3, 0.6};
   const double stress_Pa = 1e6;
@@ -131,7 +132,7 @@ TEST_CASE("patch test: a bar under a uniform stress stretches by it in all eleme
   }
 }
 
-TEST_CASE("a bar held at both ends is pressed by E alpha T", "[structure][statics]") {
+TEST_CASE("a bar held at both ends has the compressive stress E alpha T", "[structure][statics]") {
   Material material = steel();
   material.poisson_ratio = 0.0;
   const std::vector<Material> materials{material};
@@ -156,8 +157,9 @@ TEST_CASE("a bar held at both ends is pressed by E alpha T", "[structure][static
   }
 }
 
-TEST_CASE("bimetal strip: the cantilever bends as the beam does", "[structure][statics]") {
-  // l = 10, two layers of 0.05, alpha 1e-5 and 2e-5, 100 K, nu = 0: ends at 0.015 and 0.75.
+TEST_CASE("bimetal strip: the cantilever bends as in beam theory", "[structure][statics]") {
+  // l = 10, two layers of 0.05, alpha 1e-5 and 2e-5, 100 K, nu = 0: end displacements 0.015 and
+  // 0.75.
   Mesh mesh;
   mesh.part_names = {"lower", "upper"};
   add_boxes(mesh, 0, {{{{0, 0, 0}, {10, 0.1, 0.1}}, false}}, {0.5, 0.1, 0.05}, Shape::hex20);
@@ -183,7 +185,7 @@ TEST_CASE("bimetal strip: the cantilever bends as the beam does", "[structure][s
   const auto u = statics.displacement_m(std::vector<double>(nodes, 100.0));
   const Vec3 end = at(u, node_at(mesh, {10, 0, 0.05}));
   CHECK(near(end[0], 0.015, 1e-8));
-  CHECK(near(end[2], -0.75, 1e-5));  // the beam knows nothing of the strip's free end
+  CHECK(near(end[2], -0.75, 1e-5));  // beam theory ignores the strip's free end
 }
 
 TEST_CASE("a warm disc in a thin plate: 50 MPa of hoop stress just outside",
@@ -193,7 +195,7 @@ TEST_CASE("a warm disc in a thin plate: 50 MPa of hoop stress just outside",
   constexpr double b_mm = 60.0;
   Mesh mesh;
   mesh.part_names = {"plate", "disc"};
-  // Boxes in log(r) and angle, over a quarter; the pin-hole in the middle is of no consequence.
+  // Boxes in log(r) and angle over a quarter; the central hole is negligible.
   const double inner = std::log(2e-3);
   const double outer = std::log(b_mm);
   std::vector<BoxShape> rings;
@@ -225,7 +227,8 @@ TEST_CASE("a warm disc in a thin plate: 50 MPa of hoop stress just outside",
   const Statics statics(mesh, materials, reduction, {});
   const std::vector<double> one(nodes, 1.0);
   const auto stress = nodal_stresses_Pa(mesh, materials, statics.displacement_m(one), one);
-  // Three rings further out: in those beside the edge the disc's thickness grows into the plate.
+  // Evaluated three rings further out; near the edge the disc's changed thickness affects the
+  // plate.
   const double r_mm = std::exp(0.15);
   const Stress& edge = stress[node_at(mesh, {1e-3 * r_mm, 0, 0})];
   const double near_MPa = 50.0 / (r_mm * r_mm);
@@ -237,8 +240,8 @@ TEST_CASE("a warm disc in a thin plate: 50 MPa of hoop stress just outside",
 
 namespace {
 
-/// A point of the section of NAFEMS LE11 from two parameters: 0..1 from the inner to the outer
-/// side, 0..3 up through the spherical shell, the taper and the cylinder.
+/// Point of the section of NAFEMS LE11: 0..1 from the inner to the outer side, 0..3 up through the
+/// spherical shell, the taper and the cylinder.
 Vec3 le11_section(double across, double up) {
   const double half = std::sqrt(0.5);
   const double outer_turn = std::asin(0.7 / 1.4);  // the outer arc ends at z = 0.7
@@ -270,7 +273,7 @@ double le11_stress_MPa(Shape shape, double elements) {
   for (Vec3& p : mesh.nodes_m) {
     const Vec3 section = le11_section(p[0], p[1]);
     p = {section[0] * std::cos(p[2]), section[0] * std::sin(p[2]), section[1]};
-    // Up, around and across are left-handed where across, up and around are right-handed.
+    // (up, around, across) is left-handed; (across, up, around) is right-handed.
     p[1] = -p[1];
     rise_K.push_back(std::hypot(p[0], p[1]) + p[2]);
   }
@@ -306,7 +309,7 @@ TEST_CASE("NAFEMS LE11: -105 MPa at the inner edge, nearer on finer meshes",
   const double first_order = std::log((coarse + 105.0) / (middle + 105.0)) / std::log(2.0);
   const double second_order = std::log((middle + 105.0) / (fine + 105.0)) / std::log(1.5);
   CAPTURE(first_order, second_order);
-  CHECK(first_order > 1.4);  // the point lies on an edge: less than a smooth stress would give
+  CHECK(first_order > 1.4);  // the point is on an edge: lower order than for a smooth stress
   CHECK(second_order > 1.8);
   CHECK(near(tet_fine, -105.0, 7.0));
   CHECK(std::fabs(tet_fine + 105.0) < std::fabs(tet_coarse + 105.0));
@@ -318,12 +321,12 @@ TEST_CASE("a body on springs sinks by the force over their stiffness", "[structu
   const auto bottom = faces_where(mesh, [](const Vec3& p) { return p[2] == 0.0; });
   const double area_m2 = 0.2 * 0.3;
   const auto springs = ground_couplings(
-      mesh, bottom, {1e6 / area_m2, 2e6 / area_m2, 4e6 / area_m2});  // N/m in all: 1, 2, 4 million
+      mesh, bottom, {1e6 / area_m2, 2e6 / area_m2, 4e6 / area_m2});  // total N/m: 1, 2, 4 million
   Reduction reduction(static_cast<Index>(mesh.nodes_m.size()), 3);
   reduction.finish();
   CHECK(free_motions(mesh, reduction, springs).empty());
   const Statics statics(mesh, materials, reduction, springs);
-  // A body force, so that it moves without turning against the springs but for shear.
+  // A body force moves it almost without rotation on the springs.
   const auto volumes_m3 = nodal_volumes(mesh);
   std::vector<double> force_N(3 * volumes_m3.size(), 0.0);
   for (std::size_t i = 0; i < volumes_m3.size(); ++i) {
@@ -341,7 +344,7 @@ TEST_CASE("a body on springs sinks by the force over their stiffness", "[structu
   CHECK(near(mean, -100.0 / 4e6, 1e-12));
 }
 
-TEST_CASE("adjoint and direct way give the same sensitivity", "[structure][statics]") {
+TEST_CASE("adjoint and direct solution give the same sensitivity", "[structure][statics]") {
   const std::vector<Material> materials{steel()};
   for (const Shape shape : volume_shapes) {
     INFO(shape_info(shape).name);
@@ -372,7 +375,7 @@ TEST_CASE("adjoint and direct way give the same sensitivity", "[structure][stati
   }
 }
 
-TEST_CASE("a body that nothing holds is named, with the motion", "[structure][statics]") {
+TEST_CASE("an unsupported body is named, with its free motion", "[structure][statics]") {
   Mesh mesh = box_mesh({0.2, 0.3, 0.1}, {0.1, 0.1, 0.1}, Shape::tet10);
   mesh.part_names[0] = "table";
   const auto nodes = static_cast<Index>(mesh.nodes_m.size());
@@ -390,8 +393,8 @@ TEST_CASE("a body that nothing holds is named, with the motion", "[structure][st
         std::vector<std::string>{"part table is not held against moving along x"});
 }
 
-TEST_CASE("hexahedra and tetrahedra agree, nearer on finer meshes", "[structure][statics]") {
-  // A column warm on one side leans; the top's lean in hex20, tet10 and their difference.
+TEST_CASE("hexahedra and tetrahedra agree, better on finer meshes", "[structure][statics]") {
+  // A column that is warm on one side leans; compares its top along x in hex20 and tet10.
   const std::vector<Material> materials{steel()};
   const auto lean = [&](Shape shape, double size_m) {
     const Mesh mesh = box_mesh({0.2, 0.2, 0.6}, {size_m, size_m, size_m}, shape);
@@ -413,16 +416,15 @@ TEST_CASE("hexahedra and tetrahedra agree, nearer on finer meshes", "[structure]
   CHECK(fine < 5e-4 * std::fabs(hex));
 }
 
-TEST_CASE("a node that follows others moves as they do, also along a chain",
-          "[structure][reduction]") {
+TEST_CASE("a tied node moves with its masters, also along a chain", "[structure][reduction]") {
   Reduction reduction(5, 1);
   const std::array<Weighted, 2> half{Weighted{0, 0.5}, Weighted{1, 0.5}};
   CHECK(reduction.tie(2, half));
   const std::array<Weighted, 1> third{Weighted{2, 1.0}};
   CHECK(reduction.tie(3, third));
   const std::array<Weighted, 1> back{Weighted{3, 1.0}};
-  CHECK_FALSE(reduction.tie(0, back));  // would follow itself
-  CHECK_FALSE(reduction.tie(2, back));  // follows already
+  CHECK_FALSE(reduction.tie(0, back));  // would depend on itself
+  CHECK_FALSE(reduction.tie(2, back));  // already tied
   reduction.hold(1, 0);
   reduction.finish();
   CHECK(reduction.free_size() == 2);

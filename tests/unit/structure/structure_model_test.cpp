@@ -22,7 +22,7 @@ poisson_ratio = 0.25
 expansion_um_per_m_K = 10
 )";
 
-/// A part of one box.
+/// TOML of a part of one box.
 std::string box_part(const std::string& name, const std::string& from, const std::string& to,
                      const std::string& element = "hex20") {
   return "[[part]]\nname = \"" + name + "\"\nmaterial = \"iron\"\nelement = \"" + element +
@@ -69,7 +69,7 @@ bool mentions(const std::vector<std::string>& lines, const std::string& text) {
 
 }  // namespace
 
-TEST_CASE("a free column grows by alpha L a kelvin, and its blocks share that",
+TEST_CASE("a free column expands by alpha L per kelvin, the sum of its blocks",
           "[structure][model]") {
   const std::string slides =
       "[[support]]\non = { z_mm = [0, 0] }\ndirections = [\"z\"]\n"
@@ -90,7 +90,7 @@ TEST_CASE("a free column grows by alpha L a kelvin, and its blocks share that",
   }
 }
 
-TEST_CASE("a part of two bonded halves is as one part", "[structure][model]") {
+TEST_CASE("two bonded halves behave as one part", "[structure][model]") {
   const std::string halves = box_part("lower", "[0, 0, 0]", "[100, 100, 200]") +
                              box_part("column", "[0, 0, 200]", "[100, 100, 400]");
   const std::string joint =
@@ -108,13 +108,13 @@ TEST_CASE("a part of two bonded halves is as one part", "[structure][model]") {
   for (std::size_t i = 0; i < 2; ++i) {
     for (std::size_t j = 0; j < 2; ++j) CHECK(near(whole[i][j], bonded[i][j], 1e-9));
   }
-  // A very stiff spring joint comes near to it.
+  // A very stiff spring joint gives nearly the same.
   std::string stiff = joint;
   stiff += "kind = \"spring\"\nstiffness_N_per_um = [1e7, 1e7, 1e7]\n";
   const auto sprung =
       matrix_of(material + halves + stiff + foot + blocks + lean).model.matrix_um_per_K;
   CHECK(near(whole[1][0], sprung[1][0], 1e-2 * std::fabs(whole[1][0])));
-  // Meshes that do not match: free expansion is exact all the same.
+  // With non-matching meshes free expansion is still exact.
   const std::string coarse =
       box_part("lower", "[0, 0, 0]", "[100, 100, 200]") +
       "[[part]]\nname = \"column\"\nmaterial = \"iron\"\nelement = \"tet10\"\n"
@@ -127,7 +127,7 @@ TEST_CASE("a part of two bonded halves is as one part", "[structure][model]") {
   CHECK(near(free.model.matrix_um_per_K[0][0], 4.0, 1e-9));
 }
 
-TEST_CASE("a guideway has a row a position, and what carries the work counts the other way",
+TEST_CASE("a guideway has one row per position, with opposite sign on the work side",
           "[structure][model]") {
   const auto guideway = [](const std::string& carries) {
     return "[[guideway]]\nname = \"rail\"\naxis = \"z_mm\"\npart = \"column\"\n"
@@ -143,14 +143,14 @@ TEST_CASE("a guideway has a row a position, and what carries the work counts the
   CHECK(up[0][0] < up[1][0]);
   CHECK(up[1][0] < up[2][0]);
   for (std::size_t i = 0; i < 3; ++i) CHECK(near(up[i][0], -down[i][0], 1e-12));
-  // Between two positions the rail is as at a point of its own there.
+  // Between two positions the row equals that of a point there.
   CHECK(tool.model.guideways[0].positions_mm == std::vector<double>{0, 100, 200});
   const ThermalModel again = parse_model(write_model(tool.model), "model.toml");
   CHECK(again.matrix_um_per_K == tool.model.matrix_um_per_K);
   CHECK(again.guideways[0].rows_um_per_K == tool.model.guideways[0].rows_um_per_K);
 }
 
-TEST_CASE("where the meshes have the axis a guideway adds nothing, elsewhere what it differs by",
+TEST_CASE("a guideway adds nothing at the meshes' axis position, elsewhere the difference",
           "[structure][model]") {
   const std::string rail =
       "[[guideway]]\nname = \"rail\"\naxis = \"z_mm\"\npart = \"column\"\n"
@@ -165,7 +165,7 @@ TEST_CASE("where the meshes have the axis a guideway adds nothing, elsewhere wha
   for (std::size_t i = 0; i < 3; ++i) CHECK(near(drawn[i][0], whole[i][0] - whole[1][0], 1e-9));
 }
 
-TEST_CASE("tool and work: what moves both moves neither", "[structure][model]") {
+TEST_CASE("tool and work: a common displacement cancels", "[structure][model]") {
   const std::string both =
       "[[output]]\nname = \"z_um\"\ndirection = \"z\"\n"
       "tool = { part = \"column\", at_mm = [50, 50, 400] }\n"
@@ -180,10 +180,10 @@ TEST_CASE("tool and work: what moves both moves neither", "[structure][model]") 
   for (const double value : rows[0]) CHECK(near(value, 0.0, 1e-12));
   CHECK(rows[1][0] > 0.1);                     // warm on the left: leans to the right
   CHECK(near(rows[1][0], -rows[1][1], 1e-9));  // and the other way round
-  CHECK(near(rows[1][2], 0.0, 1e-9));          // what is even does not lean
+  CHECK(near(rows[1][2], 0.0, 1e-9));          // a uniform rise does not tilt
 }
 
-TEST_CASE("a column on springs stands as on a support where they are stiff", "[structure][model]") {
+TEST_CASE("a column on stiff springs behaves as on a fixed support", "[structure][model]") {
   const std::string springs =
       "[[spring]]\non = { z_mm = [0, 0] }\nstiffness_N_per_um = [1e6, 1e6, 1e6]\n";
   const double sprung =
@@ -193,7 +193,7 @@ TEST_CASE("a column on springs stands as on a support where they are stiff", "[s
   CHECK(near(sprung, held, 0.02 * held));
 }
 
-TEST_CASE("what is wrong with a structure is named, with its place", "[structure][bad_input]") {
+TEST_CASE("problems of a structure are named with their place", "[structure][bad_input]") {
   const auto with = [](const std::string& more) {
     return material + column + foot + all_warm + top + more;
   };
@@ -261,7 +261,7 @@ TEST_CASE("all problems of a kind are reported at once", "[structure][bad_input]
   CHECK(mentions(lines, "output[y_um].tool"));
 }
 
-TEST_CASE("the picture has a panel for the blocks and one a shape, the VTU file all arrays",
+TEST_CASE("the picture has a panel for the blocks and one per shape, the VTU file all arrays",
           "[structure][picture]") {
   const Result result = matrix_of(material + column + foot + all_warm + top);
   const Structure& s = result.structure;
@@ -278,7 +278,7 @@ TEST_CASE("the picture has a panel for the blocks and one a shape, the VTU file 
   CHECK(vtu.find("a&lt;b_degC_um_per_K") != std::string::npos);
 }
 
-TEST_CASE("the commented example is a structure that can be computed", "[structure][model]") {
+TEST_CASE("the commented example can be computed", "[structure][model]") {
   const StructureSpec spec =
       load_structure(std::filesystem::path(THERMOCOMP_EXAMPLES) / "structure.toml");
   const Structure s = build_structure(spec, [](std::string_view) {});
@@ -290,13 +290,13 @@ TEST_CASE("the commented example is a structure that can be computed", "[structu
   CHECK(report.find(" a_urad") != std::string::npos);
   CHECK(report.find("condition number of all rows: ") != std::string::npos);
   CHECK(std::count(report.begin(), report.end(), '\n') <= 15);
-  CHECK(report.find("e-1") == std::string::npos);  // what rounding leaves of 0
+  CHECK(report.find("e-1") == std::string::npos);  // no rounding errors of 0
   CHECK(report.find("on guideway") == std::string::npos);
   const std::string all = structure_report(s, statics, model, true);
   CHECK(all.find("y_um on guideway") != std::string::npos);
 }
 
-TEST_CASE("an inverted element and a number that is none are named by the mesh's own numbers",
+TEST_CASE("inverted elements and invalid numbers are reported with the mesh file's numbers",
           "[structure][bad_input]") {
   std::string pattern = (std::filesystem::temp_directory_path() / "thermocomp_XXXXXX").string();
   REQUIRE(::mkdtemp(pattern.data()) != nullptr);
