@@ -14,7 +14,7 @@ namespace thermocomp::placement {
 
 namespace {
 
-/// The field rebuilt from the modes.
+/// Method that reconstructs the field from modes.
 constexpr const char* rebuilt_field = "qr_reconstruction";
 
 using Estimator = std::function<std::vector<Numbers>(const std::vector<Field>&)>;
@@ -41,7 +41,7 @@ MethodResult judge_sensors(const PlacementProblem& problem, std::string name,
   });
 }
 
-/// The median, figure by figure, of many random placements.
+/// Median of each figure over many random placements.
 MethodResult random_median(const PlacementProblem& problem) {
   std::vector<MethodResult> draws;
   for (int i = 0; i < random_draws; ++i) {
@@ -136,7 +136,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// printf into a string.
+/// Formats like printf.
 template <class... Values>
 std::string line(const char* format, Values... values) {
   char text[512];
@@ -148,7 +148,7 @@ std::string line(const char* format, Values... values) {
   return text;
 }
 
-/// To a micrometre; what lies below is rounding of the mesh.
+/// Rounded to a micrometre, since smaller digits are rounding of the mesh.
 double mm_of(double value_m) {
   return std::round(value_m * 1e6) / 1e3;
 }
@@ -182,7 +182,7 @@ std::string sensors_text(const PlacementProblem& problem, const MethodResult& re
   return text;
 }
 
-/// Over the load cases that were left out, else over those used.
+/// Errors in the load cases left out, else in those used.
 ErrorFigures figures(const PlacementProblem& problem, const MethodResult& result) {
   return problem.left_out.empty() ? result.used : result.left_out;
 }

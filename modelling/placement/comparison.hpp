@@ -1,4 +1,4 @@
-/// All methods of placing sensors beside each other.
+/// Comparison of all methods of sensor placement.
 #pragma once
 
 #include <string>
@@ -11,7 +11,7 @@ namespace thermocomp::placement {
 
 struct MethodResult {
   std::string name;            ///< "greedy"
-  std::vector<Index> sensors;  ///< one node per block; empty for a method of another kind
+  std::vector<Index> sensors;  ///< one node per block; empty for a method without blocks
   ErrorFigures used;
   ErrorFigures left_out;
   std::vector<ErrorFigures> by_case;  ///< shape (load cases)
@@ -20,34 +20,34 @@ struct MethodResult {
 struct Comparison {
   MethodResult uncompensated;
   std::vector<MethodResult> methods;
-  std::vector<TendencyPlacement> ways;  ///< one per way, in the order of all_ways
-  std::size_t best_way{0};              ///< least RMS over the used load cases
+  std::vector<TendencyPlacement> ways;  ///< in the order of all_ways
+  std::size_t best_way{0};              ///< smallest RMS over the used load cases
   GreedyPlacement greedy;
 
   [[nodiscard]] const MethodResult& method(std::string_view name) const;
-  /// Of the methods with one sensor in each block the one with the least RMS over the load cases
-  /// that are left out, or over those used where none is.
+  /// The method with one sensor per block and the smallest RMS over the load cases left out, or
+  /// over those used if none is.
   [[nodiscard]] const MethodResult& best(const PlacementProblem& problem) const;
 };
 
 inline constexpr int random_draws = 100;
 
-/// @param options  for the method of tendency patterns
-/// @param progress  told which method begins
+/// @param options  of the method of tendency patterns
+/// @param progress  called with the name of each method
 [[nodiscard]] Comparison compare_placements(const PlacementProblem& problem,
                                             const TendencyOptions& options,
                                             const structure::Progress& progress);
 
-/// "They leave 2.35 um RMS ...": of the best sensors.
+/// "They leave 2.35 um RMS ...", for the best sensors.
 [[nodiscard]] std::string remaining_text(const PlacementProblem& problem,
                                          const Comparison& comparison);
-/// For a person: the best sensors, and what they leave.
+/// Text with the best sensors and their remaining error.
 [[nodiscard]] std::string recommendation_text(const PlacementProblem& problem,
                                               const Comparison& comparison);
-/// For a person: every method, and how the patterns went.
+/// Text with every method and the course of the patterns.
 [[nodiscard]] std::string comparison_text(const PlacementProblem& problem,
                                           const Comparison& comparison);
-/// For a program; docs/placement.md describes it.
+/// JSON as described in docs/placement.md.
 [[nodiscard]] std::string comparison_json(const PlacementProblem& problem,
                                           const Comparison& comparison);
 

@@ -24,7 +24,7 @@ struct Options {
   TendencyOptions tendency;
 };
 
-/// Every field of the load cases with its displacement, and the sensors that are recommended.
+/// Writes every field of the load cases with its displacement, and the recommended sensors.
 void write_pictures(const Options& options, const structure::StructureSpec& spec,
                     const structure::Structure& structure, const structure::Statics& statics,
                     const PlacementProblem& problem, const Comparison& comparison) {

@@ -1,4 +1,4 @@
-/// `thermocomp place`: where the sensors go.
+/// The command `thermocomp place`: placement of sensors.
 #pragma once
 
 #include <functional>

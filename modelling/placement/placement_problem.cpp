@@ -12,8 +12,8 @@ namespace {
 using structure::Structure;
 using structure::StructureSpec;
 
-/// The sensitivity's rows by curves: a guideway's rows have those of its output added, as the
-/// daemon does.
+/// Adds the sensitivity rows by curves; a guideway's rows include those of its output, as in the
+/// daemon.
 void add_curves(const StructureSpec& spec, const std::vector<Numbers>& sensitivities,
                 PlacementProblem& problem) {
   const auto add_row = [&](const std::vector<const Numbers*>& parts, double weight) {
@@ -55,7 +55,7 @@ Vec3 mean_of(const std::vector<Vec3>& points_m) {
   return points_m.empty() ? sum : (1.0 / static_cast<double>(points_m.size())) * sum;
 }
 
-/// The middle of what is held or stands on springs.
+/// Centre of the supports and springs.
 Vec3 support_middle_m(const Structure& structure) {
   std::vector<Vec3> held_m;
   for (Index node = 0; node < structure.mesh.nodes_m.size(); ++node) {
@@ -73,7 +73,7 @@ Vec3 support_middle_m(const Structure& structure) {
   return mean_of(held_m);
 }
 
-/// No sensor goes where faces touch, on a foot or in a joint.
+/// Excludes nodes at supports and joints, where faces touch.
 void leave_out_joints(const Structure& structure, std::vector<bool>& possible) {
   for (const structure::Coupling& spring : structure.springs) {
     for (std::size_t i = 0; i < spring.count; ++i) possible[spring.nodes[i]] = false;

@@ -1,5 +1,5 @@
-/// What a placement of sensors is judged on: sensitivities of the outputs, temperature fields of
-/// the load cases, and where in each block a sensor can stand.
+/// Data for judging a sensor placement: sensitivities of the outputs, temperature fields of the
+/// load cases, and possible places in each block.
 #pragma once
 
 #include <string>
@@ -19,11 +19,11 @@ using structure::operator-;
 using structure::operator*;
 using Numbers = std::vector<double>;
 
-/// An output, or one that a guideway carries: its displacement at positions along the axis.
+/// Displacement of an output; on a guideway, at positions along the axis.
 struct Curve {
   std::string name;
   std::size_t first_row{0};
-  std::vector<double> at;  ///< -1..1 along the guideway; {0} where there is none
+  std::vector<double> at;  ///< -1..1 along the guideway; {0} without one
 };
 
 struct Field {
@@ -36,16 +36,16 @@ struct Field {
 struct BlockOfSensors {
   std::string name;
   std::vector<Index> nodes;
-  std::vector<Index> candidates;  ///< where a sensor can stand
-  double from_support_m{0.0};     ///< from the block's middle to the middle of what is held
+  std::vector<Index> candidates;  ///< possible nodes of a sensor
+  double from_support_m{0.0};     ///< distance of the block's centre from that of the supports
 };
 
-/// Blocks whose rise is changed together in the method of tendency patterns.
+/// Blocks whose rises are changed together in the method of tendency patterns.
 struct Pattern {
   std::string name;
   std::vector<bool> blocks;    ///< shape (blocks)
-  Numbers percents;            ///< r, each tried
-  bool shrinks_as_one{false};  ///< all blocks get one smaller r at a bound; else cut each
+  Numbers percents;            ///< values of r to try
+  bool shrinks_as_one{false};  ///< at a bound all blocks get a smaller r; else each is clamped
 };
 
 struct LoadCase {
@@ -55,20 +55,20 @@ struct LoadCase {
 
 struct PlacementProblem {
   std::vector<BlockOfSensors> blocks;
-  std::vector<Pattern> patterns;  ///< of the structure file; none: derived ones
+  std::vector<Pattern> patterns;  ///< of the structure file; empty: derived
   std::vector<LoadCase> load_cases;
   std::vector<Vec3> nodes_m;
   std::vector<Curve> curves;
-  Numbers row_weight;                    ///< a curve's rows together weigh 1; shape (rows)
+  Numbers row_weight;                    ///< sum 1 over each curve's rows; shape (rows)
   std::vector<Numbers> sensitivity_um;   ///< S, shape (rows)(nodes) [um/K]
   std::vector<Numbers> block_matrix_um;  ///< P1, shape (rows)(blocks) [um/K]
-  std::vector<Field> used;               ///< of the load cases that the placement serves
+  std::vector<Field> used;               ///< of the load cases used for the placement
   std::vector<Field> left_out;
 
   [[nodiscard]] std::size_t rows() const noexcept { return row_weight.size(); }
 };
 
-/// @throws ConfigurationError: no load case to use, blocks without a place for a sensor
+/// @throws ConfigurationError: no load case to use, blocks without a possible place
 [[nodiscard]] PlacementProblem make_problem(const structure::StructureSpec& spec,
                                             const structure::Structure& structure,
                                             const structure::Statics& statics,
@@ -77,10 +77,10 @@ struct PlacementProblem {
 /// P1 theta. @param rise_K  shape (blocks). @return shape (rows) [um]
 [[nodiscard]] Numbers block_displacement_um(const PlacementProblem& problem, const Numbers& rise_K);
 
-/// sqrt of the weighted mean of squares over rows; the same for a curve and a single output.
+/// Root of the weighted mean square over rows; a curve has the weight of a single output.
 [[nodiscard]] double rms_um(const PlacementProblem& problem, const Numbers& rows_um);
 
-/// The mean of a block's nodes in a field.
+/// Mean of each block's nodes in a field.
 [[nodiscard]] Numbers block_means_K(const PlacementProblem& problem, const Numbers& rise_K);
 
 /// Error of the estimated displacement over fields.

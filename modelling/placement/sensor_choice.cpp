@@ -12,10 +12,10 @@ namespace thermocomp::placement {
 namespace {
 
 constexpr double far = std::numeric_limits<double>::infinity();
-constexpr double gains_by = 1e-9;  ///< of the trace; less is rounding
+constexpr double gains_by = 1e-9;  ///< share of the trace; less is rounding
 constexpr int sweeps_max = 50;
 
-/// The trace and what each block contributes to it, as blocks change.
+/// Trace of the error covariance, updated when a block changes.
 class ErrorTrace {
  public:
   explicit ErrorTrace(const PlacementProblem& problem) : problem_(problem) {
@@ -51,11 +51,11 @@ class ErrorTrace {
 
   struct Best {
     Index node{0};
-    double change{far};  ///< of the trace
+    double change{far};  ///< change of the trace
   };
-  /// The best node of a block, all others as they are.
+  /// Best node of a block with all others unchanged.
   [[nodiscard]] Best best_node(std::size_t block) const {
-    // The trace changes by sum_f 2 x_f g_f + x_f^2 |P_b|^2 with x the change of the block.
+    // The trace changes by sum_f 2 x_f g_f + x_f^2 |P_b|^2; x is the block's change.
     Numbers slope(errors_um_.size(), 0.0);
     for (std::size_t f = 0; f < errors_um_.size(); ++f) {
       for (std::size_t i = 0; i < problem_.rows(); ++i) {
@@ -86,7 +86,7 @@ class ErrorTrace {
 
  private:
   const PlacementProblem& problem_;
-  Numbers power_;                  ///< |P_b|^2 by weights, shape (blocks)
+  Numbers power_;                  ///< weighted |P_b|^2, shape (blocks)
   std::vector<Numbers> blocks_K_;  ///< shape (fields)(blocks)
   std::vector<Numbers> errors_um_;
 };
@@ -151,7 +151,7 @@ std::vector<Index> place_at_random(const PlacementProblem& problem, std::uint64_
   std::mt19937_64 random(seed);
   std::vector<Index> sensors;
   for (const BlockOfSensors& block : problem.blocks) {
-    // Not uniform_int_distribution, whose numbers hang on the library.
+    // Not uniform_int_distribution, whose numbers depend on the library.
     sensors.push_back(block.candidates[random() % block.candidates.size()]);
   }
   return sensors;
@@ -159,9 +159,9 @@ std::vector<Index> place_at_random(const PlacementProblem& problem, std::uint64_
 
 namespace {
 
-constexpr double mode_least = 1e-8;  ///< of the greatest singular value
+constexpr double mode_least = 1e-8;  ///< share of the largest singular value
 
-/// Modes of the used fields: shape (nodes, modes), orthonormal; at most one a block.
+/// Modes of the used fields: shape (nodes, modes), orthonormal; at most one per block.
 Eigen::MatrixXd modes_of(const PlacementProblem& problem) {
   const auto nodes = static_cast<Eigen::Index>(problem.nodes_m.size());
   const auto count = static_cast<Eigen::Index>(problem.used.size());
@@ -180,7 +180,8 @@ Eigen::MatrixXd modes_of(const PlacementProblem& problem) {
   return svd.matrixU().leftCols(modes);
 }
 
-/// Pivots among nodes for which `free` is true; `taken(node)` says what a choice takes away.
+/// Pivots among nodes for which `free` is true; `taken(node)` lists the nodes that a choice
+/// excludes.
 template <class Taken>
 std::vector<Index> pivots_of(const Eigen::MatrixXd& modes, std::vector<bool> free,
                              const Taken& taken) {

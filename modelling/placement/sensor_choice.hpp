@@ -1,4 +1,4 @@
-/// Other ways to choose one node per block, to compare with and to choose from.
+/// Other methods of choosing one node per block: reference, candidates and start values.
 #pragma once
 
 #include <cstdint>
@@ -8,34 +8,33 @@
 
 namespace thermocomp::placement {
 
-/// The candidate nearest to the middle of the block's nodes.
+/// The candidate nearest to the centre of the block's nodes.
 [[nodiscard]] Index centroid_node(const PlacementProblem& problem, const BlockOfSensors& block);
 [[nodiscard]] std::vector<Index> place_at_centroids(const PlacementProblem& problem);
 
 struct GreedyStep {
   std::string block;
   Index node{0};
-  double error_um{0.0};  ///< RMS over the used fields after it
+  double error_um{0.0};  ///< RMS over the used fields after this step
 };
 struct GreedyPlacement {
   std::vector<GreedyStep> steps;
   std::vector<Index> sensors;
 };
 
-/// Minimises the trace of the outputs' error covariance (about zero) over the used fields,
-/// sum_f |P1 theta_sensors,f - delta1,f|^2 by weights. At first every block has its mean; then one
-/// sensor after the other is put where the trace falls most; then each is moved again until none
-/// gains.
+/// Minimises the trace of the outputs' error covariance (about zero) over the used fields, weighted
+/// sum_f |P1 theta_sensors,f - delta1,f|^2. Every block starts with its mean; one sensor after
+/// another is placed where the trace falls most; then sensors are moved until none improves it.
 [[nodiscard]] GreedyPlacement place_greedily(const PlacementProblem& problem);
 
-/// QR with column pivoting of the fields' modes: each pivot is the node with the greatest part not
-/// yet explained by the nodes chosen. One node per block; blocks beyond the number of modes get
+/// QR with column pivoting of the fields' modes: each pivot is the node with the largest part not
+/// yet explained by the chosen ones. One node per block; blocks beyond the number of modes use
 /// their centroid.
 /// Source: K. Manohar et al., Data-driven sparse sensor placement for reconstruction, 2018.
 [[nodiscard]] std::vector<Index> place_by_qr(const PlacementProblem& problem);
 
-/// The same without regard to blocks, and with that publication's own estimate: the field is
-/// rebuilt from the modes by the readings. @return estimates for fields, shape (fields)(rows) [um]
+/// Likewise without blocks and with that publication's estimate: the modes are fitted to the
+/// readings. @return estimates for fields, shape (fields)(rows) [um]
 struct Reconstruction {
   std::vector<Index> sensors;
   std::vector<Numbers> modes_at_sensors;  ///< shape (sensors)(modes)
@@ -46,7 +45,7 @@ struct Reconstruction {
                                                 const std::vector<Field>& fields,
                                                 const Reconstruction& reconstruction);
 
-/// One candidate per block at random; reproducible.
+/// One random candidate per block, reproducible by the seed.
 [[nodiscard]] std::vector<Index> place_at_random(const PlacementProblem& problem,
                                                  std::uint64_t seed);
 

@@ -47,8 +47,8 @@ Numbers curve_coefficients(const std::vector<Curve>& curves, const Numbers& rows
 namespace {
 
 constexpr double nothing_um = 1e-9;
-constexpr double improves_by = 1e-3;  ///< a round that gains less is none
-constexpr double same_share = 0.05;   ///< coefficients that differ by less count as equal
+constexpr double improves_by = 1e-3;  ///< required relative gain of a round
+constexpr double same_share = 0.05;   ///< smaller differences of coefficients count as equal
 constexpr double far = std::numeric_limits<double>::infinity();
 
 Numbers start_of(const PlacementProblem& problem, const Field& field, Start start) {
@@ -82,7 +82,7 @@ double size_of(const Numbers& values) {
   return std::sqrt(std::inner_product(values.begin(), values.end(), values.begin(), 0.0));
 }
 
-/// Places of coefficients, the largest of `needed` first.
+/// Indices of coefficients, sorted by the magnitude of `needed`.
 std::vector<std::size_t> largest_first(const Numbers& needed) {
   std::vector<std::size_t> order(needed.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -92,7 +92,7 @@ std::vector<std::size_t> largest_first(const Numbers& needed) {
   return order;
 }
 
-/// How far a tendency is from what is needed; less is nearer. Compared from the first number on.
+/// Distance of a tendency from the needed shape, compared lexicographically.
 Numbers distance(Way way, const PlacementProblem& problem, const Numbers& needed_um,
                  const Numbers& tendency_um) {
   if (way == Way::difference) {
@@ -113,7 +113,7 @@ Numbers distance(Way way, const PlacementProblem& problem, const Numbers& needed
     }
     return {squares};
   }
-  // Either sign: scaled so that the largest coefficients have the same one.
+  // Scaled with the sign that makes the largest coefficients agree.
   const double scale = std::copysign(size_of(needed) / size_of(tendency), needed[order[0]] * lead);
   Numbers differences;
   for (const std::size_t i : order) {
@@ -130,7 +130,7 @@ struct Candidate {
   Numbers distance;
 };
 
-/// Steps 5 to 7, the nearest in shape first.
+/// Steps 5 to 7; the nearest in shape comes first.
 std::vector<Candidate> candidates_of(const PlacementProblem& problem,
                                      const std::vector<Pattern>& patterns,
                                      const BlockBounds& bounds, const Numbers& blocks_K,

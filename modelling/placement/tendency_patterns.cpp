@@ -31,7 +31,7 @@ void add_halves(const Numbers& values, const std::string& low, const std::string
   patterns.push_back(std::move(above));
 }
 
-/// The greatest share of r, 0 to 1, with which no block of the pattern leaves its bounds.
+/// Largest share of r, 0 to 1, that keeps all blocks of the pattern within their bounds.
 double share_inside(const Pattern& pattern, double percent, const BlockBounds& bounds,
                     const Numbers& blocks_K) {
   double share = 1.0;
@@ -106,7 +106,7 @@ ChangedBlocks change_blocks(const Pattern& pattern, double percent, const BlockB
   for (std::size_t b = 0; b < blocks_K.size(); ++b) {
     if (pattern.blocks[b]) changed.blocks_K[b] *= 1.0 + share * percent * per_cent;
   }
-  keep_inside(bounds, changed.blocks_K);  // of what shrinks as one only the last bit
+  keep_inside(bounds, changed.blocks_K);  // only rounding for a pattern that shrinks as one
   return changed;
 }
 

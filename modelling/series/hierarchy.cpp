@@ -12,8 +12,8 @@ namespace thermocomp::series {
 namespace {
 
 constexpr int steps_max = 300;
-constexpr double change_min = 1e-4;  ///< of S and m, relative
-/// A direction counts where the rows say of it at least so much as the series does.
+constexpr double change_min = 1e-4;  ///< relative change of S and m at convergence
+/// A direction counts as determined if the rows have at least this share of the series' precision.
 constexpr double determined_share = 0.05;
 
 Eigen::MatrixXd root_of(const Eigen::MatrixXd& covariance) {
@@ -27,13 +27,13 @@ Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& covariance) {
   return covariance.llt().solve(Eigen::MatrixXd::Identity(covariance.rows(), covariance.cols()));
 }
 
-/// Integral of the squares of what coefficients leave, in the mean over their covariance.
+/// Integral of the squared remainder, expected over the coefficients' covariance.
 double left_of(const Evidence& evidence, const Coefficients& b) {
   return evidence.yy - 2.0 * b.mean.dot(evidence.xy) + b.mean.dot(evidence.xx * b.mean) +
          (evidence.xx * b.covariance).trace();
 }
 
-/// Covariance of m: each machine says m + N(0, S + its own error).
+/// Covariance of m: each machine measures m + N(0, S + its own error).
 Eigen::MatrixXd covariance_of_mean(std::span<const Evidence> machines, const Population& now,
                                    const Assumed& assumed) {
   const Eigen::Index count = now.mean.size();
@@ -44,7 +44,7 @@ Eigen::MatrixXd covariance_of_mean(std::span<const Evidence> machines, const Pop
     const Eigen::MatrixXd b = root.transpose() * each.xx * root / now.density();
     precision += one - inverse_of(one + b);  // B (1 + B)^-1
   }
-  // In the coordinates of the root: precision + L' D^-1 L.
+  // In coordinates of the root: precision + L' D^-1 L.
   if (assumed.mean_sd.size() > 0)
     precision += root.transpose() * assumed.mean_sd.cwiseAbs2().cwiseInverse().asDiagonal() * root;
   else
@@ -118,7 +118,7 @@ Population population_of(std::span<const Evidence> machines, const Assumed& assu
   now.noise_time_s = noise_time_s;
   now.mean = Eigen::VectorXd::Zero(assumed.scatter_sd.size());
   now.covariance = assumed.scatter_sd.cwiseAbs2().asDiagonal();
-  if (assumed.mean_sd.size() > 0)  // far enough to see all
+  if (assumed.mean_sd.size() > 0)  // wide enough for all
     now.covariance += Eigen::MatrixXd(assumed.mean_sd.cwiseAbs2().asDiagonal());
   double yy = 0.0;
   double time_s = 0.0;
@@ -151,8 +151,8 @@ Departure departure_of(const Evidence& evidence, double density, const Eigen::Ve
                        const Eigen::MatrixXd& covariance, double machines,
                        std::span<const Group> groups) {
   const Eigen::MatrixXd root = root_of(covariance);
-  // In units of the series' scatter the rows have the precision B; their score has the variance
-  // B + B^2.
+  // In units of the series' scatter the rows have the precision B; their score has the variance B +
+  // B^2.
   const Eigen::MatrixXd b = root.transpose() * evidence.xx * root / density;
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(b);
   std::vector<Eigen::Index> kept;

@@ -13,10 +13,10 @@
 namespace thermocomp::series {
 namespace {
 
-constexpr double usual_share = 0.1;  ///< a column that moves less is not believed more for it
+constexpr double usual_share = 0.1;  ///< smallest size of a temperature relative to the usual one
 constexpr std::size_t left_out_max = 12;
 constexpr double deviations_max = 5.0;
-/// The remainder of a machine may differ so much for nothing: sisters are few.
+/// Smallest deviation of remainders, since sisters are few.
 constexpr double least_deviation = 0.15;
 constexpr double floor_K = 0.5;
 constexpr double signal_floor = 0.05;
@@ -25,7 +25,7 @@ std::string_view stem_of(const std::string& name) {
   return std::string_view(name).substr(0, name.size() - unit_of(name).suffix.size());
 }
 
-/// @throws when a name of one stands in the other with another unit
+/// @throws std::runtime_error if a name exists in both with different units
 void refuse_other_units(const std::vector<std::string>& names,
                         const std::vector<std::string>& known, const std::string& machine) {
   for (const std::string& name : names)
@@ -55,7 +55,7 @@ void widen(Subject& subject, const Subject& by) {
   subject.moved = subject.moved || by.moved;
 }
 
-/// All columns that any machine has; temperatures first, as a bank has them.
+/// All columns of any machine; temperatures first, as in a bank.
 Columns columns_of_all(const std::vector<Statistics>& machines) {
   Columns all{{}, machines.front().columns.taus_s};
   for (const Statistics& machine : machines) {
@@ -84,7 +84,7 @@ Columns columns_of_all(const std::vector<Statistics>& machines) {
   return all;
 }
 
-/// Mean of x x' of the rows of those that have both columns.
+/// Mean of x x' over the machines that have both columns.
 Eigen::MatrixXd moment_of(const std::vector<Statistics>& machines, const Columns& all) {
   Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(all.size(), all.size());
   Eigen::MatrixXd time_s = sum;
@@ -97,8 +97,8 @@ Eigen::MatrixXd moment_of(const std::vector<Statistics>& machines, const Columns
   return sum.array() / time_s.array().max(1e-12);
 }
 
-/// RMS of the columns; one that hardly moves counts as one that moves a tenth of the usual of its
-/// kind.
+/// RMS of the columns with a lower bound: a tenth of the usual RMS (in quadrature) for
+/// temperatures, 0.1 % of the largest value for signals.
 Eigen::VectorXd sizes_of(const Eigen::MatrixXd& moment, const Columns& columns) {
   Eigen::VectorXd size = moment.diagonal().cwiseMax(0.0).cwiseSqrt();
   double usual_K = 0.0;
@@ -139,8 +139,8 @@ double median_of(std::vector<double> values) {
   return values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
 }
 
-/// Degrees of freedom of S: machines, and the two that were assumed. The covariance of a machine's
-/// own past comes from its rows and a stated drift instead, however few its sisters are.
+/// Degrees of freedom of S: the machines plus two assumed ones. Infinite for a machine's own past,
+/// whose covariance comes from its rows and a stated drift.
 double freedom_of(const Series& series) {
   if (!series.past_of.empty()) return std::numeric_limits<double>::infinity();
   return static_cast<double>(series.machines.size()) + 2.0;
@@ -154,8 +154,8 @@ std::size_t output_of(const Statistics& machine, const std::string& output) {
   return static_cast<std::size_t>(at - machine.outputs.begin());
 }
 
-/// What sisters leave of each machine when it is left out, over what their S says of it: mean of
-/// squares, at least 1. S from few machines is the likeliest one, which is too narrow.
+/// Mean square remainder of each machine left out, by its sisters' mean, over the value expected
+/// from their S; at least 1. S from few machines is the most likely one, which is too small.
 double widening_of(const std::vector<Evidence>& machines, const Assumed& assumed,
                    double noise_time_s) {
   if (machines.size() < 3) return 1.0;
@@ -207,7 +207,7 @@ OutputSeries output_series(const std::vector<Statistics>& machines, const std::s
   return series;
 }
 
-/// Features as ModelDomain has them, over the ranges of the machine and of its sisters.
+/// Features of ModelDomain over the ranges of the machine and its sisters.
 void fill_domain(const Columns& columns, MadeFrom& made_from) {
   const auto subject = [&](const std::string& name) {
     return columns.subjects[static_cast<std::size_t>(columns.find(name, 1.0))];
@@ -231,7 +231,7 @@ void fill_domain(const Columns& columns, MadeFrom& made_from) {
     }
   made_from.covariance.assign(sd.size(), std::vector<double>(sd.size(), 0.0));
   for (std::size_t i = 0; i < sd.size(); ++i) made_from.covariance[i][i] = sd[i] * sd[i];
-  made_from.distance_max = 2.0;  // all features at an end of their range
+  made_from.distance_max = 2.0;  // all features at a limit of their range
 }
 
 MadeFrom made_from_of(const Series& series, const Statistics& machine, const Columns& columns,
@@ -442,7 +442,7 @@ Series series_of_model(const ThermalModel& model, const std::string& file, doubl
   std::stable_partition(series.columns.subjects.begin(), series.columns.subjects.end(),
                         [](const Subject& each) { return is_temperature(each.name); });
   const std::size_t subjects = series.columns.subjects.size();
-  // A file of a model has no moments: each column as if it went over its range evenly.
+  // A model file has no moments: assumes a uniform distribution over each column's range.
   series.moment = Eigen::MatrixXd::Zero(series.columns.size(), series.columns.size());
   for (Eigen::Index i = 0; i < series.moment.rows(); ++i) {
     const Subject& each = series.columns.subjects[static_cast<std::size_t>(i) % subjects];

@@ -1,4 +1,4 @@
-/// The model of a type: what its machines have in common and how they scatter.
+/// Model of a type: common mean of its machines, and their scatter.
 #pragma once
 
 #include <filesystem>
@@ -12,88 +12,88 @@
 
 namespace thermocomp::series {
 
-/// Of one output.
+/// Series of one output.
 struct OutputSeries {
-  Eigen::VectorXd mean;        ///< m [um per unit], one a column
-  Eigen::MatrixXd covariance;  ///< of a further machine: S and that of m
+  Eigen::VectorXd mean;        ///< m [um per unit], by column
+  Eigen::MatrixXd covariance;  ///< of a further machine: S plus that of m
   double remainder_um{0.0};
   double noise_time_s{0.0};
-  double displacement_um{0.0};        ///< RMS of what moved
-  std::vector<double> remainders_um;  ///< RMS that each machine's posterior leaves, in order
+  double displacement_um{0.0};        ///< RMS displacement
+  std::vector<double> remainders_um;  ///< RMS remainder of each machine's posterior
 
   [[nodiscard]] double density() const { return 2.0 * noise_time_s * remainder_um * remainder_um; }
 };
 
 struct Series {
   std::vector<std::string> machines;
-  std::string past_of;  ///< the one machine whose own past it is; empty: of a type
+  std::string past_of;  ///< machine of an own past; empty: series of a type
   double hours{0.0};
   Columns columns;
   Eigen::MatrixXd moment;  ///< mean of x x' over all rows
   std::map<std::string, OutputSeries> outputs;
 };
 
-/// The scatter that is assumed beside that of the machines, counting as two of them: predictions of
-/// sisters differ by this share of the displacement.
+/// Assumed scatter, equivalent to two machines: predictions of sisters differ by this share of the
+/// displacement.
 inline constexpr double scatter_default = 0.15;
 
-/// @param scatter  nullopt: scatter_default, and one machine alone is refused
-/// @throws std::runtime_error when machines do not fit together, or there is one only
+/// @param scatter  nullopt: scatter_default, and a single machine is refused
+/// @throws std::runtime_error if machines do not fit together, or there is only one
 [[nodiscard]] Series series_of(const std::vector<Statistics>& machines,
                                std::optional<double> scatter);
 
-/// The same series after `years`: each output's prediction may have moved by `drift` of its
-/// displacement a year, independently in each column.
+/// The series after `years`: each output's prediction may have drifted by `drift` of its
+/// displacement a year, independently by column.
 [[nodiscard]] Series drifted(Series series, double drift, double years);
-/// Last year's model as a prior: its matrix and banks are m; S is what it left and the drift, as
-/// shares of the displacement.
-/// @throws std::runtime_error when it has a term that is no bank, or no [made_from]
+/// Last year's model as a prior: m from its matrix and banks, S from its remainder and the drift,
+/// as shares of the displacement.
+/// @throws std::runtime_error if it has a term other than a bank, or no [made_from]
 [[nodiscard]] Series series_of_model(const ThermalModel& model, const std::string& file,
                                      double drift, double years);
 
-/// Of a machine.
+/// A machine's adapted model.
 struct Adapted {
-  ThermalModel model;  ///< with [made_from]; its stated error from V and the remainder
+  ThermalModel model;  ///< with [made_from]; stated error from V and the remainder
   std::map<std::string, Coefficients> coefficients;  ///< over all columns of the series
 };
-/// @throws std::runtime_error when machine and series do not fit together
+/// @throws std::runtime_error if machine and series do not fit together
 [[nodiscard]] Adapted adapted(const Series& series, const Statistics& machine,
                               const std::string& prior_name);
 
-/// The machine's own past as the prior of its next runs: m = b, S = V and `drift`, a share of each
+/// A machine's own past as the prior of its next runs: m = b, S = V plus `drift`, a share of each
 /// output's displacement.
-/// @throws std::runtime_error when machine and series do not fit together
+/// @throws std::runtime_error if machine and series do not fit together
 [[nodiscard]] Series own_series(const Series& prior, const Statistics& machine,
                                 const std::string& prior_name, double drift);
 
-/// What the prior and the rows came to, for a person or a program.
+/// Result of prior and rows, as text or JSON.
 [[nodiscard]] std::string adapted_text(const Series& series, const Statistics& machine,
                                        const Adapted& adapted, bool json);
 
-/// How far a machine is from its sisters, in one output.
+/// Departure of a machine from its sisters in one output.
 struct Comparison {
   std::string output;
   Departure departure;
-  double remainder_um{0.0};  ///< that its posterior leaves
-  double median_um{0.0};     ///< of the sisters
+  double remainder_um{0.0};  ///< remainder of its posterior
+  double median_um{0.0};     ///< of the sisters' remainders
   double deviations{0.0};    ///< in 1.4826 median absolute deviations of the sisters' logarithms
-  double false_alarm{0.0};   ///< probability below which it departs
+  double false_alarm{0.0};   ///< probability threshold of a departure
 };
 [[nodiscard]] std::vector<Comparison> compared(const Series& series, const Statistics& machine);
 
-/// One false alarm a year where a machine is compared each night; its outputs share it.
+/// One false alarm a year with one comparison each night, shared by the outputs.
 inline constexpr double false_alarms_a_night = 1.0 / 365.0;
 [[nodiscard]] bool departs(const Comparison& comparison);
 [[nodiscard]] std::string comparison_text(const std::vector<Comparison>& comparisons);
-/// Member "departure" of the answer of `inspect`.
+/// Member "departure" of `inspect`'s JSON.
 [[nodiscard]] std::string comparison_json(const std::vector<Comparison>& comparisons);
 
 [[nodiscard]] std::string write_series(const Series& series);
 /// @throws ConfigurationError
 [[nodiscard]] Series load_series(const std::filesystem::path& file);
 
-/// A series file, or last year's model.
-/// @param years  negative: 0 of a series, 1 of a model
+/// Loads a series file or last year's model.
+/// @param years  negative: 0 for a series, 1 for a model
 [[nodiscard]] Series load_prior(const std::filesystem::path& file, double drift, double years);
 
 }  // namespace thermocomp::series

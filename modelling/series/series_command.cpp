@@ -30,7 +30,7 @@ struct Options {
   std::string result;
 };
 
-/// The CSV files of a folder, in order of their names.
+/// CSV files of a folder, sorted by name.
 std::vector<std::string> runs_in(const std::filesystem::path& folder) {
   std::vector<std::string> runs;
   for (const auto& entry : std::filesystem::directory_iterator(folder))

@@ -1,4 +1,4 @@
-/// `thermocomp series`: the model of a type from the runs of its machines.
+/// The command `thermocomp series`: model of a type from runs of its machines.
 #pragma once
 
 #include <functional>

@@ -1,4 +1,4 @@
-// Files of a series and of the statistics of one machine.
+// Files of a series and of a machine's statistics.
 #include <algorithm>
 #include <cmath>
 #include <set>
@@ -121,7 +121,7 @@ TomlTable root_of(const TomlDocument& document, const char* kind) {
   return root;
 }
 
-/// Largest magnitude that is no rounding beside the diagonal.
+/// The matrix is symmetric, up to rounding, and positive definite.
 bool is_covariance(const Eigen::MatrixXd& matrix) {
   const Eigen::VectorXd size = matrix.diagonal().cwiseMax(0.0).cwiseSqrt();
   if (!(size.array() > 0).all()) return false;

@@ -14,7 +14,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::size_t parts_named = 3;
 
-/// Share of the prior's variance of a prediction that the rows have taken away.
+/// Share of the prior variance of a prediction removed by the rows.
 double learned_of(const OutputSeries& output, const Eigen::MatrixXd& moment,
                   const Coefficients& b) {
   return 1.0 - (b.covariance * moment).trace() / (output.covariance * moment).trace();

@@ -16,8 +16,9 @@ namespace {
 
 constexpr double row_s_max = 3600.0;
 constexpr double constant_s = 1800.0;
-constexpr double penalty = 1e-4;       ///< of the fit that shows the remainder, of a mean square
-constexpr double ridge_of_map = 1e-3;  ///< of a column's mean square
+constexpr double penalty =
+    1e-4;  ///< of the fit that gives the remainder, relative to a mean square
+constexpr double ridge_of_map = 1e-3;  ///< relative to a column's mean square
 
 [[noreturn]] void refuse(const std::string& file, const std::string& key, const std::string& rule) {
   throw ConfigurationError({Problem{file, 0, key, "", rule}});
@@ -34,7 +35,7 @@ std::vector<std::string> common_outputs(const std::vector<RunFile>& runs) {
   return outputs;
 }
 
-/// Columns that the files have, whether or not they move in them.
+/// Columns of the files, including constant ones.
 std::vector<Subject> subjects_of(const std::vector<RunFile>& runs) {
   std::vector<Subject> temperatures;
   std::vector<Subject> signals;
@@ -57,7 +58,7 @@ std::vector<Subject> subjects_of(const std::vector<RunFile>& runs) {
         subject.rise_high = std::max(subject.rise_high, values[i] - reference);
       }
     }
-    if (subject.low > subject.high) continue;  // no value at all
+    if (subject.low > subject.high) continue;  // no values
     (is_temperature(column) ? temperatures : signals).push_back(subject);
     if (is_temperature(column) || column.ends_with("_on")) continue;
     subject.power = 2.0;
@@ -67,7 +68,7 @@ std::vector<Subject> subjects_of(const std::vector<RunFile>& runs) {
   return temperatures;
 }
 
-/// The columns that move in the runs.
+/// Columns that change in the runs.
 identification::BankColumns moving(const identification::MeasuredTests& tests, const Columns& all) {
   identification::BankColumns bank;
   const auto is_in = [](const std::vector<std::string>& names, const std::string& name) {
@@ -91,7 +92,7 @@ std::vector<Eigen::Index> places_in(const identification::BankColumns& bank, con
   return places;
 }
 
-/// Time in which the remainder's correlation has fallen to 1/e; at least half a step.
+/// Time for the remainder's correlation to fall to 1/e; at least half a step.
 double noise_time_of(const std::vector<Eigen::VectorXd>& left, double step_s) {
   const auto mean_product = [&](Eigen::Index lag) {
     double product = 0.0;
@@ -117,7 +118,7 @@ struct RunRows {
   Eigen::VectorXd seconds;
 };
 
-/// Adds the run's integrals, its constant taken out.
+/// Adds the run's integrals with its constant removed.
 void add(const RunRows& rows, const std::vector<Eigen::Index>& at, Statistics& statistics) {
   const Eigen::MatrixXd weighted = rows.seconds.asDiagonal() * rows.x;
   const double time_s = rows.seconds.sum();

@@ -1,4 +1,4 @@
-// The demonstration's files are what the tools make of its structure.
+// Compares the demonstration's files with the tools' output for its structure.
 #include <cmath>
 #include <filesystem>
 
@@ -21,7 +21,7 @@ Machine demo_machine() {
   return {std::move(spec), std::move(built), std::move(heat)};
 }
 
-/// A plant of the body under constant signals, the room and the coolant at 20 degC.
+/// A plant of the body with constant signals, room and coolant at 20 degC.
 Plant plant_of(const ReducedBody& body, const structure::LoadCaseSpec& load, double head_mm) {
   PlantConfig config;
   config.body = body;
@@ -49,7 +49,7 @@ Plant plant_of(const ReducedBody& body, const structure::LoadCaseSpec& load, dou
   return Plant(config, 1);
 }
 
-/// Of x (0) and y (1), which the guideway carries, in the order of the structure's rows.
+/// Row of x (0) or y (1) at the guideway's upper end, in the order of the structure's rows.
 const structure::Functional& upper_end(const Machine& machine, std::size_t output) {
   const auto& guideway = machine.spec.guideways.at(0);
   const std::size_t positions = guideway.positions_mm.size();
@@ -84,9 +84,9 @@ TEST_CASE("the demonstration's matrix is that of its structure", "[demo]") {
               Approx(rows[at][block]).margin(0.6e-4));
 }
 
-TEST_CASE("the demonstration's body moves as the full finite-element model does", "[demo]") {
+TEST_CASE("the demonstration's body moves like the full finite-element model", "[demo]") {
   Machine machine = demo_machine();
-  // Coolant and room at one temperature, so that only the heats move it; wet and dry.
+  // Coolant and room have one temperature, so only the heats act; dry and flooded.
   const ReducedBody shipped = load_body(demo / "plant.toml");
   const structure::Statics statics = statics_of(machine);
   const ReducedBody computed =
@@ -102,8 +102,7 @@ TEST_CASE("the demonstration's body moves as the full finite-element model does"
     const auto& load = machine.spec.load_cases[field.load_case];
     const auto displacement_m = statics.displacement_m(field.rise_K);
     for (const ReducedBody& body : {shipped, computed}) {
-      // At the guideway's upper end, the last of its rows: between two it is straight, and the full
-      // model is not.
+      // At the guideway's upper end, its last row: between rows the full model is not linear.
       for (const double head_mm : {500.0}) {
         Plant plant = plant_of(body, load, head_mm);
         plant.advance_to(field.time_s);

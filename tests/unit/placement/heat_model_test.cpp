@@ -1,4 +1,4 @@
-// The heat of a structure file: load cases against what must come out, and what is refused.
+// Tests of heat conduction of a structure file: load cases with known results, and refusals.
 #include <cmath>
 #include <numeric>
 
@@ -13,7 +13,7 @@ std::string steady(const std::string& more) {
   return "[[load_case]]\nname = \"steady\"\nsteady = true\n" + more;
 }
 
-/// The file's problems, the mesh at hand or not.
+/// Problems of the file, found with or without the mesh.
 std::string problems_of(const std::string& text) {
   try {
     static_cast<void>(problem_of(machine_of(text)));
@@ -29,14 +29,14 @@ TEST_CASE("in the steady state all heat leaves by convection", "[placement][heat
   const Machine machine =
       machine_of(column + cooled + heater + steady("signals = { heater_on = 1 }\n"));
   const auto field = fields_of(machine).at(0).rise_K;
-  // h times the integral of the rise over the surface: room_W_per_K holds h times each node's area.
+  // h times the integral of the rise over the surface: room_W_per_K is h times each node's area.
   const auto& share = machine.heat.room_W_per_K;
   CHECK(std::inner_product(field.begin(), field.end(), share.begin(), 0.0) == Approx(40.0));
   CHECK(std::accumulate(share.begin(), share.end(), 0.0) ==
         Approx(10.0 * (2 * 0.1 * 0.1 + 4 * 0.1 * 0.4)));
 }
 
-TEST_CASE("a load case that lasts ends in the steady one", "[placement][heat]") {
+TEST_CASE("a long load case ends in the steady state", "[placement][heat]") {
   const Machine machine =
       machine_of(column + cooled + heater +
                  "[[load_case]]\nname = \"long\"\nduration_s = 200000\nstep_s = 1000\n"
@@ -49,7 +49,7 @@ TEST_CASE("a load case that lasts ends in the steady one", "[placement][heat]") 
   }
 }
 
-TEST_CASE("moments between two steps lie between their fields", "[placement][heat]") {
+TEST_CASE("fields between two steps are interpolated", "[placement][heat]") {
   const auto text = [](const std::string& at_s) {
     return column + cooled + heater +
            "[[load_case]]\nname = \"a\"\nduration_s = 600\nstep_s = 100\nat_s = " + at_s +
@@ -62,8 +62,7 @@ TEST_CASE("moments between two steps lie between their fields", "[placement][hea
   }
 }
 
-TEST_CASE("a room that stays warmer warms everything by that; coolant holds it down",
-          "[placement][heat]") {
+TEST_CASE("a warmer room warms everything equally; coolant reduces it", "[placement][heat]") {
   const std::string coolant =
       "[coolant]\ntemp_degC = 17\n[[convection]]\non = { part = \"column\" }\n"
       "coefficient_W_per_m2_K = 20\nto = \"coolant\"\n";
@@ -124,7 +123,7 @@ on = { part = "upper", z_mm = [200, 200] }
 heat_W = 10
 )" + steady("");
   };
-  // 10 W through 0.01 m^2: 1 K at the convection, 2 K a 100 mm of iron, 10 K at the joint.
+  // 10 W through 0.01 m^2: 1 K at the convection, 2 K per 100 mm of iron, 10 K at the joint.
   const auto top_K = [](const Machine& machine) {
     const auto field = fields_of(machine).at(0).rise_K;
     return *std::max_element(field.begin(), field.end());
@@ -135,7 +134,7 @@ heat_W = 10
         std::string::npos);
 }
 
-TEST_CASE("what is wrong with heat and load cases is named", "[placement][bad_input]") {
+TEST_CASE("problems of heat and load cases are named", "[placement][bad_input]") {
   struct Case {
     std::string text, told;
   };

@@ -1,4 +1,4 @@
-/// A small column with a heater on one side, for the tests of heat and placement.
+/// A small column with a heater on one side.
 #pragma once
 
 #include <string>

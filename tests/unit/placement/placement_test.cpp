@@ -1,4 +1,4 @@
-// The method of tendency patterns and what it is compared with.
+// Tests of the method of tendency patterns and of the other methods.
 #include <algorithm>
 #include <cmath>
 #include <set>
@@ -40,8 +40,7 @@ TEST_CASE("a quadratic through its own points is found exactly", "[placement]") 
   CHECK(line[1] == Approx(2.0));
 }
 
-TEST_CASE("the displacement that placements are judged by is that of the full field",
-          "[placement]") {
+TEST_CASE("placements are judged by the displacement of the full field", "[placement]") {
   const Machine machine = machine_of(column + cooled + heater + cases);
   const PlacementProblem problem = problem_of(machine);
   const structure::Statics statics = statics_of(machine);
@@ -57,7 +56,7 @@ TEST_CASE("the displacement that placements are judged by is that of the full fi
   }
 }
 
-TEST_CASE("a field that is uniform in each block needs no round", "[placement][tendency]") {
+TEST_CASE("a field that is uniform in each block needs no rounds", "[placement][tendency]") {
   const Machine machine = machine_of(column + cooled + heater + cases);
   PlacementProblem problem = problem_of(machine);
   Field& field = problem.used.front();
@@ -72,7 +71,7 @@ TEST_CASE("a field that is uniform in each block needs no round", "[placement][t
   }
 }
 
-TEST_CASE("every round makes the error smaller, inside what the blocks can read, and says its end",
+TEST_CASE("every round reduces the error within the blocks' readings and states how it ends",
           "[placement][tendency]") {
   const PlacementProblem problem = problem_of(machine_of(column + cooled + heater + cases));
   for (const Way way : all_ways) {
@@ -104,7 +103,8 @@ TEST_CASE("every round makes the error smaller, inside what the blocks can read,
   }
 }
 
-TEST_CASE("placements beat the mean of the block where they were made for it", "[placement]") {
+TEST_CASE("placements beat the mean of the block in the fields that they were made for",
+          "[placement]") {
   const PlacementProblem problem =
       problem_of(machine_of(column + cooled + heater + cases + left_out));
   REQUIRE(problem.used.size() == 4);
@@ -133,7 +133,7 @@ TEST_CASE("placements beat the mean of the block where they were made for it", "
         Approx(comparison.method("greedy").used.rms_um).epsilon(1e-6));
 }
 
-TEST_CASE("a load case that is left out has no say in where sensors go", "[placement]") {
+TEST_CASE("a load case that is left out does not affect the placement", "[placement]") {
   const auto text = [](const std::string& change) {
     std::string other = left_out;
     other.replace(other.find("-2"), 2, change);
@@ -150,7 +150,7 @@ TEST_CASE("a load case that is left out has no say in where sensors go", "[place
   CHECK(a.uncompensated.left_out.rms_um != Approx(b.uncompensated.left_out.rms_um));
 }
 
-TEST_CASE("sensors stand on the free surface, or anywhere where that is asked for", "[placement]") {
+TEST_CASE("sensors are on the free surface, or anywhere if requested", "[placement]") {
   const std::string text = column + cooled + heater + cases;
   const auto inner_candidates = [](const PlacementProblem& problem) {
     std::size_t inner = 0;
@@ -171,7 +171,7 @@ TEST_CASE("sensors stand on the free surface, or anywhere where that is asked fo
   CHECK(inner_candidates(problem_of(machine_of(text + "[placement]\non_surface = false\n"))) > 0);
 }
 
-TEST_CASE("the same seed gives the same random placement, another another", "[placement]") {
+TEST_CASE("the random placement depends on the seed only", "[placement]") {
   const PlacementProblem problem = problem_of(machine_of(column + cooled + heater + cases));
   CHECK(place_at_random(problem, 7) == place_at_random(problem, 7));
   CHECK(place_at_random(problem, 7) != place_at_random(problem, 8));
@@ -197,7 +197,7 @@ TEST_CASE("the report for programs has sensors, errors before and after, and the
   CHECK(text.find("left out") != std::string::npos);
 }
 
-TEST_CASE("the start at the median is the mean of the two in the middle", "[placement]") {
+TEST_CASE("the median of an even number is the mean of the two middle values", "[placement]") {
   CHECK(median_of({4.0, 1.0, 9.0, 2.0}) == 3.0);  // not 4
   CHECK(median_of({4.0, 1.0, 9.0}) == 4.0);
 }

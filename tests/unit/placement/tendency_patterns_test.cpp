@@ -1,4 +1,4 @@
-// Patterns of the structure file: which blocks, by how much, and how r is made smaller.
+// Tests of patterns of the structure file: their blocks, r, and its reduction.
 #include "machines.hpp"
 #include "modelling/placement/tendency_method.hpp"
 
@@ -24,7 +24,7 @@ Pattern pattern(std::vector<bool> blocks, bool shrinks_as_one) {
 
 }  // namespace
 
-TEST_CASE("patterns of the file take the place of the derived ones", "[placement][tendency]") {
+TEST_CASE("patterns of the file replace the derived ones", "[placement][tendency]") {
   const std::string text = column + cooled + heater + cases;
   const PlacementProblem derived = problem_of(machine_of(text));
   CHECK(derived.patterns.empty());
@@ -56,8 +56,7 @@ TEST_CASE("a pattern inside the bounds changes its blocks by r and no others",
   CHECK(changed.blocks_K[2] == Approx(-2.2));
 }
 
-TEST_CASE("a block that would leave its bounds makes r smaller for the whole pattern",
-          "[placement][tendency]") {
+TEST_CASE("a block at its bound reduces r for the whole pattern", "[placement][tendency]") {
   const Numbers blocks_K{4, 5, -2};
   const BlockBounds narrow{{0, 0, -2.05}, {4.3, 9, 0}};  // 7.5 % of the first, 2.5 % of the last
   const auto changed = change_blocks(pattern({true, true, true}, true), 10, narrow, blocks_K);
@@ -70,7 +69,7 @@ TEST_CASE("a block that would leave its bounds makes r smaller for the whole pat
   CHECK(without.blocks_K[1] == Approx(5.375));
 }
 
-TEST_CASE("downwards the other bounds count", "[placement][tendency]") {
+TEST_CASE("a negative r is limited by the lower bounds", "[placement][tendency]") {
   const BlockBounds narrow{{3.8, 0, -9}, {9, 9, -1.96}};
   const auto changed = change_blocks(pattern({true, false, true}, true), -10, narrow, {4, 5, -2});
   CHECK(changed.name == "some -2 % (of 10 %)");
@@ -78,12 +77,12 @@ TEST_CASE("downwards the other bounds count", "[placement][tendency]") {
   CHECK(changed.blocks_K[2] == Approx(-1.96));
 }
 
-TEST_CASE("a block at its bound leaves nothing of the pattern", "[placement][tendency]") {
+TEST_CASE("a block already at its bound cancels the pattern", "[placement][tendency]") {
   const BlockBounds at_bound{{0, 0}, {4, 9}};
   CHECK(change_blocks(pattern({true, true}, true), 10, at_bound, {4, 5}).blocks_K == Numbers{4, 5});
 }
 
-TEST_CASE("of a derived pattern each block stops at its own bound", "[placement][tendency]") {
+TEST_CASE("in a derived pattern each block stops at its own bound", "[placement][tendency]") {
   const BlockBounds narrow{{0, 0}, {4.1, 9}};
   const auto changed = change_blocks(pattern({true, true}, false), 10, narrow, {4, 5});
   CHECK(changed.name == "some +10 %");
@@ -91,8 +90,7 @@ TEST_CASE("of a derived pattern each block stops at its own bound", "[placement]
   CHECK(changed.blocks_K[1] == Approx(5.5));
 }
 
-TEST_CASE("what is wrong with a pattern is named, with its line and value",
-          "[placement][bad_input]") {
+TEST_CASE("problems of a pattern are named with line and value", "[placement][bad_input]") {
   struct Case {
     std::string text, told;
   };

@@ -39,7 +39,7 @@ Eigen::VectorXd normal(std::mt19937& random, Eigen::Index count) {
   return values;
 }
 
-/// Rows of a machine with coefficients b and noise of deviation 1, a second each.
+/// Rows of a machine with coefficients b and noise of standard deviation 1, one per second.
 Evidence rows_of(std::mt19937& random, const Eigen::VectorXd& b, int rows) {
   Evidence evidence{Eigen::MatrixXd::Zero(b.size(), b.size()), Eigen::VectorXd::Zero(b.size()), 0,
                     static_cast<double>(rows)};
@@ -53,7 +53,7 @@ Evidence rows_of(std::mt19937& random, const Eigen::VectorXd& b, int rows) {
   return evidence;
 }
 
-TEST_CASE("two steps of EM are those computed by hand", "[series]") {
+TEST_CASE("two steps of EM match the manual calculation", "[series]") {
   // V = 1/2, b = 1 and 2; m = 3/2, S = 1/2 + 1/4. Then V = 3/7, b = 12/7 and 18/7; m = 15/7,
   // S = 3/7 + 9/49.
   const std::vector<Evidence> machines{scalar(1.0, 2.0), scalar(1.0, 4.0)};
@@ -65,7 +65,7 @@ TEST_CASE("two steps of EM are those computed by hand", "[series]") {
   CHECK_THAT(second.covariance(0, 0), WithinRel(30.0 / 49.0, 1e-12));
 }
 
-TEST_CASE("EM ends where the likelihood does", "[series]") {
+TEST_CASE("EM converges to the maximum of the likelihood", "[series]") {
   // Estimates 1 and 5 with an error of variance 1: m = 3, S + 1 = 4.
   const std::vector<Evidence> machines{scalar(1.0, 1.0), scalar(1.0, 5.0)};
   Population now = standard(1);
@@ -93,7 +93,7 @@ TEST_CASE("m and S of simulated machines are recovered", "[series]") {
   }
 }
 
-TEST_CASE("a very wide prior is the machine's own fit, no rows are the prior",
+TEST_CASE("a very wide prior gives the machine's own fit, no rows give the prior",
           "[series][property]") {
   const unsigned seed = GENERATE(range(0U, 20U));
   std::mt19937 random(seed);
@@ -115,7 +115,7 @@ TEST_CASE("a very wide prior is the machine's own fit, no rows are the prior",
   CHECK((prior.covariance - covariance).norm() < 1e-12 * covariance.norm());
 }
 
-TEST_CASE("a covariance that is singular is refused", "[series]") {
+TEST_CASE("a singular covariance is refused", "[series]") {
   CHECK_THROWS(
       posterior(scalar(1.0, 1.0), 1.0, Eigen::VectorXd::Zero(1), Eigen::MatrixXd::Zero(1, 1)));
 }
@@ -139,7 +139,7 @@ TEST_CASE("the distance of sisters has the stated distribution", "[series]") {
   CHECK_THAT(static_cast<double>(beyond) / machines, WithinAbs(0.05, 0.02));
 }
 
-TEST_CASE("the coefficient that departs is named first", "[series]") {
+TEST_CASE("the departing coefficient is named first", "[series]") {
   std::mt19937 random(9);
   const Eigen::Vector3d mean(1.0, 2.0, 3.0);
   const std::vector<Group> groups{{"a", {0}}, {"b", {1}}, {"c", {2}}};
@@ -151,7 +151,7 @@ TEST_CASE("the coefficient that departs is named first", "[series]") {
   CHECK_THAT(departure.parts.front().effect_um, WithinRel(3.0, 0.2));
 }
 
-TEST_CASE("the tail of F is that of tables", "[series]") {
+TEST_CASE("the tail of F matches tables", "[series]") {
   CHECK_THAT(f_tail(4.10, 2.0, 10.0), WithinAbs(0.05, 0.003));
   CHECK_THAT(f_tail(4.94, 5.0, 12.0), WithinAbs(0.011, 0.003));
   const double of_chi_square = f_tail(1.8307, 10.0, std::numeric_limits<double>::infinity());

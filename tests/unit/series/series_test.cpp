@@ -80,7 +80,7 @@ std::filesystem::path written(const std::string& name, const std::string& text) 
 TEST_CASE("the mean of sisters and a machine's adaptation are near its gains", "[series]") {
   const Series series = series_of(sisters(), std::nullopt);
   const OutputSeries& z = series.outputs.at("z_um");
-  CHECK_THAT(z.mean[0] + z.mean[2], WithinAbs(5.0, 0.7));  // a at once and late
+  CHECK_THAT(z.mean[0] + z.mean[2], WithinAbs(5.0, 0.7));  // a, immediate and delayed
   CHECK_THAT(z.remainder_um, WithinAbs(0.2, 0.1));
   const Statistics machine = statistics_of_run(run_of(50, 6.5, -2.0, 3.0), "new");
   const Adapted result = adapted(series, machine, "series.toml");
@@ -94,13 +94,13 @@ TEST_CASE("the mean of sisters and a machine's adaptation are near its gains", "
         result.model.matrix_um_per_K);
 }
 
-TEST_CASE("a machine without a sensor gets what the others make of it", "[series]") {
+TEST_CASE("a machine without a sensor gets its expectation from the others", "[series]") {
   const Series series = series_of(sisters(), std::nullopt);
   const RunFile run = run_of(50, 5.0, -2.0, 10.0);
   const Adapted result =
       adapted(series, statistics_of_run(without(run, "b_degC"), "new"), "series.toml");
   CHECK(result.model.inputs == std::vector<std::string>{"a_degC"});
-  // With few rows it is the mean's, with b as far as a shows it; not the gain of a alone.
+  // With few rows it is the mean's gain, with b as far as a predicts it; not the gain of a alone.
   const Adapted few =
       adapted(series, statistics_of_run(without(run_of(51, 5.0, -2.0, 0.2), "b_degC"), "new"),
               "series.toml");
@@ -110,7 +110,7 @@ TEST_CASE("a machine without a sensor gets what the others make of it", "[series
   CHECK(gain > 2.5);
 }
 
-TEST_CASE("what does not fit together is refused by name", "[series]") {
+TEST_CASE("machines that do not fit together are refused by name", "[series]") {
   std::vector<Statistics> machines = sisters(2);
   const RunFile run = run_of(9, 5.0, -2.0);
   SECTION("one machine only") {
@@ -140,7 +140,7 @@ TEST_CASE("what does not fit together is refused by name", "[series]") {
   }
 }
 
-TEST_CASE("statistics and series are read as they were written", "[series]") {
+TEST_CASE("statistics and series survive writing and reading", "[series]") {
   const std::vector<Statistics> machines = sisters(2);
   const auto statistics_file = written("statistics.toml", write_statistics(machines[0]));
   CHECK(write_statistics(load_statistics(statistics_file)) == write_statistics(machines[0]));
@@ -167,7 +167,7 @@ TEST_CASE("a machine with another gain departs, and its sensor is named", "[seri
   CHECK(other[0].departure.parts.front().name == "b_degC");
 }
 
-TEST_CASE("how sure a machine's own past is does not depend on how few its sisters are",
+TEST_CASE("the confidence in a machine's own past does not depend on the number of sisters",
           "[series]") {
   const Series series = series_of(sisters(2), std::nullopt);
   std::vector<std::string> notes;
@@ -179,7 +179,7 @@ TEST_CASE("how sure a machine's own past is does not depend on how few its siste
   const Statistics changed = statistics_of_run(run_of(83, 6.0, -2.0), "changed");
   const auto beside_past = compared(own, changed);
   CHECK(departs(beside_past.at(0)));
-  // The same distance where so few sisters had shown the covariance.
+  // The same distance with a covariance from these few sisters.
   Series of_type = own;
   of_type.past_of.clear();
   const auto beside_type = compared(of_type, changed);
@@ -188,7 +188,7 @@ TEST_CASE("how sure a machine's own past is does not depend on how few its siste
   CHECK(beside_type[0].departure.probability > beside_past[0].departure.probability);
 }
 
-TEST_CASE("last year's model as a prior gives way to the rows the more it may have drifted",
+TEST_CASE("the more last year's model may have drifted, the more the rows override it",
           "[series]") {
   const Series series = series_of(sisters(), std::nullopt);
   ThermalModel last_year =
