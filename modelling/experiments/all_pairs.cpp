@@ -14,12 +14,12 @@ constexpr std::size_t completion_steps_max = 1'000'000;
 constexpr int restarts = 8;
 constexpr int candidates = 25;
 constexpr std::size_t annealing_moves = 400'000;
-constexpr double start_temperature = 0.6;  // in uncovered pairs; cools to a hundredth
+constexpr double start_temperature = 0.6;  // in uncovered pairs; falls to a hundredth
 
 class Chance {
  public:
   explicit Chance(std::uint64_t seed) : engine_(seed) {}
-  /// Uniform in [0, count): the standard's distributions differ between libraries.
+  /// Uniform in [0, count), since the standard's distributions differ between libraries.
   std::size_t below(std::size_t count) { return static_cast<std::size_t>(engine_() % count); }
   double share() { return static_cast<double>(engine_() >> 11) * 0x1p-53; }
 
@@ -27,7 +27,7 @@ class Chance {
   std::mt19937_64 engine_;
 };
 
-/// How often each pair of levels stands in a plan; impossible pairs are out of account.
+/// Counts each pair of levels in a plan; excludes impossible pairs.
 class PairTable {
  public:
   explicit PairTable(const Constraints& constraints) : counts_(constraints.level_counts()) {
@@ -59,7 +59,6 @@ class PairTable {
     for (std::size_t a = 0; a < row.size(); ++a)
       for (std::size_t b = a + 1; b < row.size(); ++b) add(a, row[a], b, row[b]);
   }
-  /// Changes one level of a row.
   void change(Row& row, std::size_t factor, int level) noexcept {
     for (std::size_t other = 0; other < row.size(); ++other)
       if (other != factor) remove(factor, row[factor], other, row[other]);
@@ -67,7 +66,7 @@ class PairTable {
     for (std::size_t other = 0; other < row.size(); ++other)
       if (other != factor) add(factor, level, other, row[other]);
   }
-  /// An open pair, the one after a random place. @pre open() > 0
+  /// The first open pair after a random place. @pre open() > 0
   [[nodiscard]] std::pair<Pick, Pick> some_open(Chance& chance) const {
     for (std::size_t from = chance.below(seen_.size());; from = (from + 1) % seen_.size()) {
       const std::size_t i = from / width_;
@@ -119,7 +118,7 @@ class PairTable {
   std::size_t impossible_{0};
 };
 
-/// A level whose choice leaves the row completable, with the most open pairs to the levels set.
+/// The level with the most open pairs to the levels set that leaves the row completable.
 int best_level(const PairTable& table, const Constraints& constraints, Row& row, std::size_t factor,
                Chance& chance) {
   int best = Constraints::no_level;
@@ -176,7 +175,7 @@ std::vector<Row> greedy_rows(PairTable table, const Constraints& constraints, Ch
   return table.open() > 0 ? std::vector<Row>{} : rows;
 }
 
-/// Tries to cover everything with the rows given; true when it did.
+/// Tries to cover all pairs with the given number of rows. @return success
 bool anneal(PairTable table, const Constraints& constraints, std::vector<Row>& rows,
             Chance& chance) {
   for (const Row& row : rows) table.add(row);
@@ -200,7 +199,7 @@ bool anneal(PairTable table, const Constraints& constraints, std::vector<Row>& r
   return table.open() == 0;
 }
 
-/// The smallest orthogonal array that holds every pair; empty rows: none.
+/// The smallest orthogonal array with every pair; empty rows: none.
 Design smallest_array(const std::vector<int>& level_counts) {
   for (const std::string& name : array_names())
     for (const Design& variant : array_variants(name)) {
@@ -260,7 +259,7 @@ Design all_pairs(const Constraints& constraints, std::uint64_t seed) {
     if (!rows.empty()) best = std::move(rows);
   }
   Design array = constraints.empty() ? smallest_array(counts) : Design{};
-  std::size_t fewest = 1;  // two factors with the most levels need a test a pair
+  std::size_t fewest = 1;  // the two factors with the most levels need one test per pair
   std::vector<int> sorted = counts;
   std::sort(sorted.rbegin(), sorted.rend());
   if (constraints.empty() && sorted.size() > 1)

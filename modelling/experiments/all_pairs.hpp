@@ -1,5 +1,5 @@
-/// All-pairs plans: every two levels of every two factors meet in some test, unless something
-/// forbids it.
+/// All-pairs plans: every two levels of every two factors occur together in some test, unless
+/// forbidden.
 #pragma once
 
 #include <cstddef>
@@ -14,10 +14,10 @@ struct Pick {
   std::size_t factor{0};
   int level{0};
 };
-/// Levels that must not all occur in one test.
+/// Levels that must not occur together in one test.
 using Forbidden = std::vector<Pick>;
 
-/// What a plan must keep; `no_level` in a row stands for a level still open.
+/// Constraints of a plan; `no_level` marks an open level of a row.
 class Constraints {
  public:
   static constexpr int no_level = -1;
@@ -25,10 +25,10 @@ class Constraints {
 
   [[nodiscard]] bool empty() const noexcept { return forbidden_.empty(); }
   [[nodiscard]] const std::vector<int>& level_counts() const noexcept { return level_counts_; }
-  /// Whether the row, as far as it is filled, holds nothing forbidden.
+  /// The row's set levels contain no forbidden combination.
   [[nodiscard]] bool kept_by(const std::vector<int>& row) const noexcept;
-  /// The row with its open levels filled in; empty where that is impossible.
-  /// @throws std::runtime_error when the search takes too long (a million steps)
+  /// The row with its open levels filled in; empty if impossible.
+  /// @throws std::runtime_error if the search takes more than a million steps
   [[nodiscard]] std::vector<int> completed(std::vector<int> row) const;
 
  private:
@@ -39,16 +39,17 @@ class Constraints {
 };
 
 struct PairCount {
-  std::size_t possible{0};    ///< pairs of levels that some allowed test holds
-  std::size_t impossible{0};  ///< pairs that the forbidden combinations rule out
-  std::size_t covered{0};     ///< of the possible ones, by the plan
+  std::size_t possible{0};    ///< pairs of levels in some allowed test
+  std::size_t impossible{0};  ///< pairs excluded by forbidden combinations
+  std::size_t covered{0};     ///< possible pairs in the plan
 };
 [[nodiscard]] PairCount count_pairs(const Design& design, const Constraints& constraints);
 
-/// Greedy rows (of several candidates the one with the most new pairs), begun anew several times;
-/// then one test fewer is tried by simulated annealing for as long as that works. Where nothing is
-/// forbidden, an orthogonal array that is smaller takes its place. The same seed, the same plan.
-/// @throws std::runtime_error when no test at all is allowed
+/// Greedy construction (of several candidate rows, the one with the most new pairs), restarted
+/// several times; then simulated annealing removes tests one by one while possible. Without
+/// forbidden combinations a smaller orthogonal array is preferred. The plan depends only on the
+/// seed.
+/// @throws std::runtime_error if no test is allowed
 [[nodiscard]] Design all_pairs(const Constraints& constraints, std::uint64_t seed);
 
 }  // namespace thermocomp::experiments

@@ -80,7 +80,7 @@ std::vector<std::string> read_columns(const TomlTable& table, std::string_view k
   return names;
 }
 
-/// A factor called cutting decides test by test, [test] cutting for all of them.
+/// A factor named cutting applies to each test, [test] cutting to all of them.
 void read_cutting(const TomlTable& table, const std::vector<Factor>& factors, TestSpec& test) {
   const auto factor = std::find_if(factors.begin(), factors.end(),
                                    [](const Factor& each) { return each.name == "cutting"; });
@@ -97,7 +97,7 @@ void read_cutting(const TomlTable& table, const std::vector<Factor>& factors, Te
       table.problem("cutting", level, "the factor cutting has the levels actual and simulated");
 }
 
-/// A factor called rough_cuts decides test by test, [test] rough_cuts for all of them.
+/// A factor named rough_cuts applies to each test, [test] rough_cuts to all of them.
 void read_rough_cuts(const TomlTable& table, const std::vector<Factor>& factors, TestSpec& test) {
   test.rough_cuts = table.integer<int>("rough_cuts", 0, 1000, test.rough_cuts);
   const auto factor = std::find_if(factors.begin(), factors.end(),
@@ -126,7 +126,7 @@ void read_test(const TomlTable& table, TestSpec& test) {
     if (!(running_until_h <= test.hours)) each.problem("after_h", "must end within the test");
     test.stops.push_back(stop);
   }
-  // What JP7689460B2 names; a test too short for a stop goes without it.
+  // Stops of JP7689460B2, as far as the test is long enough.
   if (!table.has("stop"))
     for (const Stop& stop : {Stop{1, 10}, Stop{3, 60}, Stop{5, 20}})
       if (stop.after_h + stop.pause_min / 60.0 <= test.hours) test.stops.push_back(stop);

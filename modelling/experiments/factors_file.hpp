@@ -1,5 +1,4 @@
-/// The file of factors from which `thermocomp plan` makes tests. Its commented example:
-/// config/examples/factors.toml.
+/// File of factors for `thermocomp plan`; commented example: config/examples/factors.toml.
 #pragma once
 
 #include <cstdint>
@@ -17,16 +16,16 @@ enum class Method { automatic, orthogonal, all_pairs };
 
 struct Factor {
   std::string name;
-  std::vector<std::string> levels;  ///< as written; numbers as their shortest text
+  std::vector<std::string> levels;  ///< as written; numbers in shortest form
 };
 
-/// A planned standstill, counted from the test's start.
+/// A planned standstill, from the test's start.
 struct Stop {
   double after_h{0.0};
   double pause_min{0.0};
 };
 
-/// The tool cuts, or moves as if it did beside a dummy workpiece.
+/// The tool cuts, or makes the same motion beside a dummy workpiece.
 enum class Cutting { actual, simulated };
 
 struct TestSpec {
@@ -35,15 +34,15 @@ struct TestSpec {
   std::vector<std::string> temperatures;  ///< columns of the run files
   std::vector<std::string> outputs;
   std::vector<Stop> stops;  ///< in order
-  int rough_cuts{0};        ///< of a cycle, before one finishing cut; 0: not said
-  std::optional<std::size_t> rough_cuts_factor;  ///< the factor that says it test by test
+  int rough_cuts{0};        ///< of a cycle, before one finishing cut; 0: not given
+  std::optional<std::size_t> rough_cuts_factor;  ///< factor that sets it for each test
   Cutting cutting{Cutting::actual};
-  std::optional<std::size_t> cutting_factor;  ///< the factor that says it test by test
+  std::optional<std::size_t> cutting_factor;  ///< factor that sets it for each test
 };
 
 struct FactorsSpec {
   Method method{Method::automatic};
-  std::string array;  ///< empty: the smallest that fits
+  std::string array;  ///< empty: the smallest fitting one
   std::uint64_t seed{1};
   std::vector<Factor> factors;
   std::vector<Forbidden> forbidden;
@@ -54,7 +53,7 @@ struct FactorsSpec {
 
 /// @throws ConfigurationError with every problem of the file
 [[nodiscard]] FactorsSpec load_factors(const std::filesystem::path& path);
-/// @param name stands for the file in problems
+/// @param name file name for problems
 [[nodiscard]] FactorsSpec parse_factors(const std::string& text, const std::string& name);
 
 }  // namespace thermocomp::experiments

@@ -26,8 +26,8 @@ std::string described(std::string_view name, const std::vector<int>& level_count
   return text.append(")");
 }
 
-/// GF(2)^bits: a run is a vector, a column a linear form. Lines {a, b, a+b} make four-level
-/// columns; `lines` of them are used, all other forms are two-level columns.
+/// GF(2)^bits: a run is a vector, a column a linear form. `lines` {a, b, a+b} become four-level
+/// columns, all other forms two-level columns.
 Design binary_array(std::string_view name, unsigned bits,
                     const std::vector<std::array<unsigned, 2>>& lines) {
   const unsigned runs = 1u << bits;
@@ -52,7 +52,7 @@ Design binary_array(std::string_view name, unsigned bits,
   return design;
 }
 
-/// GF(3)^digits: columns are the linear forms whose first coefficient that is not 0 is 1.
+/// GF(3)^digits: columns are the linear forms whose first nonzero coefficient is 1.
 Design ternary_array(std::string_view name, int digits) {
   int runs = 1;
   for (int i = 0; i < digits; ++i) runs *= 3;
@@ -77,7 +77,7 @@ Design ternary_array(std::string_view name, int digits) {
   return design;
 }
 
-/// Plackett and Burman: one row shifted round, and a row of zeros.
+/// Plackett and Burman: one row shifted cyclically, and a row of zeros.
 Design plackett_burman_12() {
   constexpr std::array<int, 11> generator{1, 1, 0, 1, 1, 1, 0, 0, 0, 1, 0};
   Design design;
@@ -93,8 +93,8 @@ Design plackett_burman_12() {
   return design;
 }
 
-/// A difference matrix: of any two columns the differences mod 3 hold each of 0, 1, 2 twice. Its
-/// rows developed mod 3, beside the row's own number as a column of six levels, or of 2 times 3.
+/// Difference matrix: the differences mod 3 of any two columns contain each of 0, 1, 2 twice. Its
+/// rows developed mod 3, with the row number as a column of six levels or of 2 times 3.
 Design difference_array_18(bool six_levels) {
   constexpr std::array<std::array<int, 6>, 6> matrix{{{0, 0, 0, 0, 0, 0},
                                                       {0, 0, 1, 1, 2, 2},
@@ -117,7 +117,7 @@ Design difference_array_18(bool six_levels) {
   return design;
 }
 
-/// Five lines that share no form fill GF(2)^4: the powers of a generator of GF(16), 5 apart.
+/// Five lines without a common form fill GF(2)^4: the powers of a generator of GF(16), 5 apart.
 std::vector<std::array<unsigned, 2>> lines_of_16(unsigned count) {
   std::array<unsigned, 15> power{};
   unsigned element = 1;

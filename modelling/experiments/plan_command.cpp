@@ -41,7 +41,7 @@ int run(const Options& options) {
   if (!options.folder.empty()) {
     const std::filesystem::path folder(options.folder);
     std::filesystem::create_directories(folder);
-    // A run file may hold an evening's measurements by now: those of an earlier plan stay.
+    // Existing run files are kept, since they may contain measurements of an earlier plan.
     for (std::size_t test = 0; test < plan.design.rows.size(); ++test) {
       char name[32];
       std::snprintf(name, sizeof name, "test_%02zu.csv", test + 1);

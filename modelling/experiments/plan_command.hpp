@@ -1,4 +1,4 @@
-/// `thermocomp plan`: tests from factors and levels.
+/// The command `thermocomp plan`: tests from factors and levels.
 #pragma once
 
 #include <functional>

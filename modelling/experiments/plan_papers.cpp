@@ -70,7 +70,7 @@ std::string cycle_of(const TestPlan& plan, std::size_t test) {
          ", one finishing cut, tool back at its origin, then measure.\n";
 }
 
-/// Where the machine stands at a minute of the test: running (1) or in a stop (0).
+/// The machine runs (1) or stops (0) at a minute of the test.
 bool runs_at(const TestSpec& test, double minute) {
   return std::none_of(test.stops.begin(), test.stops.end(), [&](const Stop& stop) {
     return minute > stop.after_h * 60.0 && minute <= stop.after_h * 60.0 + stop.pause_min;
@@ -124,7 +124,7 @@ std::string plan_json(const TestPlan& plan) {
 }
 
 std::string plan_csv(const TestPlan& plan) {
-  // Levels are free text: quoted where a comma or quote stands in them.
+  // Levels are free text: quoted if they contain a comma or quote.
   const auto field = [](const std::string& text) {
     if (text.find_first_of(",\"\n") == std::string::npos) return text;
     std::string quoted("\"");

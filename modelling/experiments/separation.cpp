@@ -19,7 +19,7 @@ using identification::TestRun;
 constexpr double alike = 0.98;
 constexpr double apart = 0.9;
 
-/// A kind of column over all runs: temperatures, or operating signals.
+/// Columns of one kind over all runs: temperatures or operating signals.
 struct Columns {
   std::vector<std::string> names;
   Eigen::MatrixXd squares;  ///< about the mean of each run [unit^2 h]
@@ -37,7 +37,7 @@ double hours_of(const TestRun& run) {
   return (run.time_s[run.time_s.size() - 1] - run.time_s[run.begin]) / 3600.0;
 }
 
-/// Largest rate between two rows an hour apart; of a shorter run from its beginning on [1/h].
+/// Largest rate between two rows an hour apart; in a shorter run, since its beginning [1/h].
 double largest_per_h(const Eigen::VectorXd& hours, const Eigen::VectorXd& values) {
   double largest = 0.0;
   Eigen::Index from = 0;
@@ -77,7 +77,7 @@ double correlation(const Columns& of, Eigen::Index a, Eigen::Index b) {
   return lengths > 0 ? of.squares(a, b) / lengths : 0.0;
 }
 
-/// How long column a has to move while b rests.
+/// Duration for which column a must move while b rests.
 Move move_of(const Columns& of, Eigen::Index a, Eigen::Index b) {
   const double r = correlation(of, a, b);
   const double range = of.range[a];
@@ -101,7 +101,7 @@ void add_moves(const Columns& of, std::vector<Move>& moves) {
   std::vector<Eigen::Index> left(of.names.size());
   std::iota(left.begin(), left.end(), 0);
   while (!left.empty()) {
-    // The group of the first one that is left.
+    // Group of the first remaining column.
     std::vector<Eigen::Index> group;
     std::copy_if(left.begin(), left.end(), std::back_inserter(group), [&](Eigen::Index each) {
       return each == left.front() || std::abs(correlation(of, left.front(), each)) > alike;

@@ -13,7 +13,7 @@ struct Choice {
   bool found{false};
 };
 
-/// The smallest array; of one size the variant with the fewest columns left over.
+/// The smallest array; among equal sizes the variant with the fewest unused columns.
 Choice choose_array(const std::vector<std::string>& names, const std::vector<int>& level_counts,
                     bool dummy_allowed) {
   Choice best;

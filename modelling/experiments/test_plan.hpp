@@ -1,4 +1,4 @@
-/// From factors to tests, what the plan promises, and the papers that go with it.
+/// Test plan from factors, its verified properties, and its papers.
 #pragma once
 
 #include <string>
@@ -11,27 +11,27 @@ namespace thermocomp::experiments {
 struct TestPlan {
   FactorsSpec spec;
   Design design;
-  std::vector<std::size_t> order;  ///< in which the tests are to be run: drawn by the seed
+  std::vector<std::size_t> order;  ///< order of the tests, drawn by the seed
   bool dummy_levels{false};
-  // verified on the finished plan, whatever made it
+  // verified on the finished plan
   int strength{0};
   bool levels_balanced{false};  ///< every level of a factor equally often
   PairCount pairs;
 };
 
-/// `automatic` takes the smallest orthogonal array that fits without dummy levels where nothing is
-/// forbidden, and all pairs otherwise.
-/// @throws std::runtime_error when no array fits, or nothing is allowed
+/// `automatic` uses the smallest orthogonal array that fits without dummy levels if nothing is
+/// forbidden, else all pairs.
+/// @throws std::runtime_error if no array fits, or no test is allowed
 [[nodiscard]] TestPlan make_plan(const FactorsSpec& spec);
 
-/// Tests with their levels, strength and balance, for a person.
+/// Text with the tests' levels, strength and balance.
 [[nodiscard]] std::string plan_text(const TestPlan& plan);
 [[nodiscard]] std::string plan_json(const TestPlan& plan);
 /// The plan as CSV: test, then one column per factor.
 [[nodiscard]] std::string plan_csv(const TestPlan& plan);
-/// What to do in the workshop, test by test, with the planned stops (Markdown).
+/// Instructions for the workshop, test by test, with the planned stops (Markdown).
 [[nodiscard]] std::string test_sheet(const TestPlan& plan);
-/// A run file whose temperatures and displacements are to be filled in. @param test from 0
+/// A run file with empty temperatures and displacements. @param test from 0
 [[nodiscard]] std::string run_file_skeleton(const TestPlan& plan, std::size_t test);
 
 }  // namespace thermocomp::experiments

@@ -18,23 +18,24 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// Neighbours answer at once and late: the places of a spindle are apart by minutes to an hour.
+// Delays of the inputs: places of a spindle respond minutes to an hour apart.
 constexpr std::array<double, 2> lags_s{600.0, 3600.0};
-// One kelvin of a neighbour moves a reading by about a kelvin, a displacement by some tens of um.
+// Response to one kelvin of a neighbour: about a kelvin of a reading, some tens of um of
+// displacement.
 constexpr double prior_K_per_K = 1.0;
 constexpr double prior_um_per_K = 20.0;
-constexpr Index rows_min = 40;  // of a run; fewer show no colour
-// Smallest faults worth a word: a thermocouple's own tolerance, and 1 um of displacement.
+constexpr Index rows_min = 40;  // per run, needed for the remainder's colour
+// Smallest faults reported: a thermocouple's tolerance, and 1 um of displacement.
 constexpr double step_K_min = 0.5;
 constexpr double drift_K_min = 1.0;
 constexpr double step_um_min = 1.0;
-constexpr double step_share_min = 0.3;  ///< of what wanders; where all of it is less than 1 um
-constexpr double moved_K_min = 1.0;     // below that a reading's gain cannot be seen
-constexpr double normal_maximum = 2.6;  // of |z| among a window's rows, where z is normal
+constexpr double step_share_min = 0.3;  ///< of the spread, if that is less than 1 um
+constexpr double moved_K_min = 1.0;     // needed to see a reading's gain
+constexpr double normal_maximum = 2.6;  // largest |z| of a window's rows, for normal z
 constexpr Index windows = 24;
-constexpr int findings_max = 12;  // that are taken out one after another
+constexpr int findings_max = 12;  // removed one after another
 constexpr double taken_out_score_min = 5.0;
-// The median column's strongest offer on a calm machine.
+// Strongest candidate of the median column on a calm machine.
 constexpr double usual_level = 3.0;
 constexpr double loose_gain_max = 0.9;
 constexpr double loose_gain_min = -0.3;
@@ -45,9 +46,9 @@ struct Target {
   Index column{0};
 };
 
-/// What all expectations are made from: columns of temperatures and signals, now and late.
+/// Regressors of all expectations: temperatures and signals, immediate and delayed.
 struct Inputs {
-  MatrixXd temps;    ///< shape (rows, temps (1 + lags)), those of a place side by side
+  MatrixXd temps;    ///< shape (rows, temps (1 + lags)), by place
   MatrixXd signals;  ///< shape (rows, ...), each of unit spread
 };
 
@@ -85,9 +86,9 @@ Inputs inputs_of(const Recording& recording) {
   return inputs;
 }
 
-/// The rows of a target and its expectation on them.
+/// A target's rows and its expectation on them.
 struct Judged {
-  std::vector<Index> rows;  ///< of the recording
+  std::vector<Index> rows;  ///< rows of the recording
   std::vector<Index> begins;
   Expectation expectation;
 };
@@ -125,8 +126,8 @@ std::optional<Judged> judge(const Recording& recording, const Inputs& inputs,
   return judged;
 }
 
-/// How wild the column is otherwise: the median of the largest |z| of windows, against that of
-/// normal noise.
+/// Usual level of the column: median over windows of the largest |z|, relative to normal noise; at
+/// least 1.
 double wildness(const std::vector<Expectation::Evidence>& steps) {
   std::vector<double> largest;
   const std::size_t length = std::max<std::size_t>(8, steps.size() / windows);
@@ -178,8 +179,8 @@ class ChangeSearch {
     }
   }
 
-  /// Of all offers the one that stands out most of what the other columns show of the same kind: on
-  /// a machine where every place wanders, one that does is nothing.
+  /// The candidate that stands out most from the other columns' candidates of the same kind, since
+  /// on a machine where every place wanders, wandering is no fault.
   [[nodiscard]] std::optional<Suspicion> likeliest() const {
     std::optional<Suspicion> best;
     for (const Suspicion& offer : offers_) {
@@ -238,7 +239,7 @@ class ChangeSearch {
     });
   }
 
-  /// Whether a signal changed about then: then the machine moved, not the sensor.
+  /// A signal changed nearby, so the machine moved, not the sensor.
   [[nodiscard]] bool is_operated(Index row, std::size_t run, Index reach = 3) const {
     const Index first = std::max(recording_.begins[run], row - reach);
     const Index last = std::min(recording_.begins[run + 1] - 1, row + reach);
@@ -251,7 +252,7 @@ class ChangeSearch {
     return false;
   }
 
-  /// Whether a gap ends about then: what went on in it came all at once.
+  /// A gap ends nearby, so its changes appear at once.
   [[nodiscard]] bool is_after_gap(Index row, const Target& target) const {
     constexpr Index reach = 2;
     const Index first = std::max<Index>(0, row - reach);
@@ -260,7 +261,7 @@ class ChangeSearch {
     return recording_.after_gap.col(column).segment(first, last - first + 1).any();
   }
 
-  /// Whether nothing near takes it back by half or more: what comes back is no step.
+  /// No nearby step reverses it by half or more.
   static bool stays(const std::vector<Expectation::Evidence>& steps, std::size_t at) {
     constexpr std::size_t near = 60;
     const std::size_t begin = at < near ? 0 : at - near;
@@ -270,8 +271,8 @@ class ChangeSearch {
         [&](const auto& other) { return other.size / steps[at].size < -0.5; });
   }
 
-  /// Whether the column itself leaps there: by half of the size within two rows, by far more than
-  /// in the rows around, and not on and on: a heater's ramp is as steep three rows away.
+  /// The column itself jumps: by at least half the size within two rows, by several times the usual
+  /// change of the surrounding rows, and not as steeply three rows away, unlike a heater's ramp.
   [[nodiscard]] bool is_sudden(const Judged& judged, const Target& target, std::size_t run,
                                Index row, double size) const {
     constexpr Index beside = 15;
@@ -336,7 +337,7 @@ class ChangeSearch {
     }
   }
 
-  /// From a time on the reading is room + gain (truth - room): a step, and a share of the motion.
+  /// From a time on, the reading is room + gain (truth - room): a step plus a share of the motion.
   void look_for_loosening(const Judged& judged, const Target& target, std::size_t run) {
     constexpr Index times = 30;
     const Index begin = judged.begins[run];
@@ -365,7 +366,7 @@ class ChangeSearch {
         best.size = gain;
       }
     }
-    // Loosening lowers a gain; what also raises it elsewhere in the run is wander.
+    // Loosening lowers a gain; a gain that also rises elsewhere in the run is wander.
     const double wild = std::max(1.0, z_of_others / usual_level);
     if (z_best > 0) offer(target, "sensor_loose", run, best.at_s, best.size, z_best / wild);
   }
@@ -391,7 +392,7 @@ class ChangeSearch {
     }
   }
 
-  /// A loose reading says little of its neighbours: it is put back to where it stood.
+  /// Restores a loose reading from its gain, since it is a poor regressor for its neighbours.
   void loosen_back(Index row, Index column, const Finding& finding) {
     const double gain = std::max(0.1, finding.size);
     const Index first = recording_.begins[finding.run];
@@ -422,7 +423,7 @@ void check_changes(Recording recording, Looked looked, Suspicions& found,
 void check_exchanged(const Recording& recording, Suspicions& found) {
   const Index places = recording.temps_K.cols();
   if (recording.runs() < 2 || places < 2) return;
-  // Temperatures of the runs, each from its run's mean: what an exchange changes is how they move.
+  // Temperatures relative to each run's mean: an exchange shows in the motion.
   MatrixXd moved = recording.temps_K;
   for (std::size_t r = 0; r < recording.runs(); ++r) {
     auto rows =
@@ -436,7 +437,8 @@ void check_exchanged(const Recording& recording, Suspicions& found) {
     MatrixXd others = moved;
     others.middleRows(begin, rows).setZero();
     const MatrixXd own = moved.middleRows(begin, rows);
-    const double noise = 0.05;  // K: a thermocouple's own, so that pairs alike are not told apart
+    const double noise =
+        0.05;  // K, of a thermocouple, so that similar places are not distinguished
     const MatrixXd covariance =
         others.transpose() * others / static_cast<double>(others.rows() - rows) +
         noise * noise * MatrixXd::Identity(places, places);

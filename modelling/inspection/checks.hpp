@@ -1,5 +1,5 @@
-/// The checks that inspect() is made of. Each gives findings with a `score` in place of the
-/// probability; inspect() says what it is worth.
+/// Checks of inspect(). Each gives findings with a `score`, which inspect() converts to a
+/// probability.
 #pragma once
 
 #include <functional>
@@ -11,34 +11,33 @@
 
 namespace thermocomp::inspection {
 
-/// A candidate finding, with how far it stands out from what the same column does otherwise.
+/// A candidate finding with its score relative to the column's usual level.
 struct Suspicion {
   Finding finding;
   double score{0.0};
 };
 using Suspicions = std::vector<Suspicion>;
 
-/// Rows, step, gaps; times that jump although nothing on the machine did (`gap`, `clock`).
+/// Rows, step, gaps; jumps of time without a change of the machine (`gap`, `clock`).
 [[nodiscard]] RunSampling sampling_of(const RunFile& run);
 void check_clock(const RunFile& run, std::size_t index, const RunSampling& sampling,
                  Suspicions& found);
-/// The longest stretch in which rows are there and a column has no value; `other`: the further
-/// columns.
+/// Longest stretch of rows without a value of a column; `other`: the further columns.
 void check_empty(const RunFile& run, std::size_t index, Suspicions& found);
 
-/// Values that leap away and come back (`spikes` of a reading, `outliers` of a displacement). What
-/// leapt is replaced in `run` by the median of its neighbours.
+/// Values that jump and return (`spikes` of a reading, `outliers` of a displacement). In `run` they
+/// are replaced by the median of their neighbours.
 void check_spikes(RunFile& run, std::size_t index, Suspicions& found);
-/// Readings that do not move while others do, that move in coarse steps, or that are another's.
+/// Readings that are constant while others move, that have coarse steps, or that duplicate another.
 void check_values(const std::vector<RunFile>& runs, Suspicions& found);
 
-/// Each reading against its expectation from the others: steps, creep, loosening of temperatures;
-/// steps of displacements. What is found is taken out of `recording`, and what is left is looked at
-/// again, so that one sensor's fault is not blamed on its neighbours.
+/// Compares each reading with its expectation from the others: steps, drift, loosening of
+/// temperatures; steps of displacements. Findings are removed from `recording` and the rest is
+/// checked again, so that a sensor's fault is not attributed to its neighbours.
 enum class Looked { all, displacements };
 void check_changes(Recording recording, Looked looked, Suspicions& found,
                    const std::function<void(double)>& progress);
-/// Pairs of readings that agree with the other runs only when they are exchanged.
+/// Pairs of readings that agree with the other runs only if exchanged.
 void check_exchanged(const Recording& recording, Suspicions& found);
 
 [[nodiscard]] std::vector<std::vector<std::string>> groups_of(const Recording& recording);

@@ -14,7 +14,7 @@ std::size_t row_of(const RunFile& run, double time_s) {
                                   times.begin());
 }
 
-/// Values at the given times become the median of those around that are not among them.
+/// Replaces the values at the given times by the median of the others around them.
 void smooth_out(RunFile& run, std::vector<double>& values, const std::vector<double>& times_s) {
   constexpr std::size_t half_window = 3;
   for (const double time_s : times_s) values[row_of(run, time_s)] = std::nan("");
@@ -28,7 +28,7 @@ void smooth_out(RunFile& run, std::vector<double>& values, const std::vector<dou
   }
 }
 
-/// @return what was done; empty: nothing
+/// @return description of the change; empty: none
 std::string clean(RunFile& run, const Finding& finding) {
   const auto column = run.find(finding.column);
   if (!column) return "";

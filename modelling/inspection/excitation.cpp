@@ -14,12 +14,12 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-constexpr double alike_correlation = 0.98;  // as diagnose counts places as one group
-constexpr double structure_s = 900.0;       // a signal acts on a structure over minutes
-constexpr double own_share_min = 0.1;       // of its variance that no other signal explains
-constexpr int changes_min = 2;              // there and back
+constexpr double alike_correlation = 0.98;  // as for groups of places in diagnose
+constexpr double structure_s = 900.0;       // response time of a structure to a signal
+constexpr double own_share_min = 0.1;       // of its variance not explained by other signals
+constexpr int changes_min = 2;              // up and down
 
-/// Rises: each run from its own mean.
+/// Subtracts each run's mean.
 MatrixXd from_means(const Recording& recording, MatrixXd columns) {
   for (std::size_t r = 0; r < recording.runs(); ++r) {
     auto rows =
@@ -29,7 +29,7 @@ MatrixXd from_means(const Recording& recording, MatrixXd columns) {
   return columns;
 }
 
-/// Times that a signal crosses the middle of its range, with a tenth of it as play.
+/// Crossings of the middle of a signal's range, with a hysteresis of a tenth of it.
 int changes_of(const Eigen::Ref<const Eigen::VectorXd>& values) {
   const double low = values.minCoeff();
   const double high = values.maxCoeff();
@@ -89,7 +89,7 @@ void judge_excitation(const Recording& recording, Inspection& inspection) {
     const std::string& name = recording.signals[static_cast<std::size_t>(i)];
     const std::string other =
         nearest >= 0 ? recording.signals[static_cast<std::size_t>(nearest)] : "the others";
-    // Nobody runs a temperature by itself, not even one that is recorded in steps like a setpoint.
+    // A temperature cannot be run alone, even if it changes in steps like a setpoint.
     inspection.experiments.push_back(name + " always went with " + other +
                                      (is_temperature(name)
                                           ? ": a model cannot tell them apart."

@@ -15,11 +15,11 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int rounds = 3;           // rho settles to two digits within them on all shared sets
-constexpr double rho_max = 0.999;   // beyond it a remainder is a random walk for any use here
-constexpr Index batches = 12;       // of a run's remainder: 12 give its slow variance to +-40 %
-constexpr double wild_share = 0.3;  // a lone step of 2 K in 1000 rows adds 0.02 K by it
-constexpr double offset_prior_share = 1e-8;  // an offset a run costs nothing
+constexpr int rounds = 3;           // rho converges to two digits on all shared data sets
+constexpr double rho_max = 0.999;   // above it a remainder is effectively a random walk
+constexpr Index batches = 12;       // of a run's remainder; 12 give its slow variance to +-40 %
+constexpr double wild_share = 0.3;  // with it, one step of 2 K in 1000 rows adds 0.02 K
+constexpr double offset_prior_share = 1e-8;  // offsets per run are practically free
 
 }  // namespace
 
@@ -75,7 +75,7 @@ void Expectation::solve(const VectorXd& y, const MatrixXd& x, const VectorXd& pr
   remainder_ = y - expected_;
   innovations_ = white_y - white * solution;
   basis_ = factor.matrixL().solve(white.transpose()).transpose();
-  // Wild values make more than the median of them says.
+  // Outliers raise sigma above the robust deviation.
   const std::vector<double> innovations(innovations_.begin(), innovations_.end());
   sigma_ = std::max({robust_deviation(innovations), wild_share * spread(innovations_), 1e-9});
 }

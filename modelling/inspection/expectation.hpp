@@ -1,5 +1,5 @@
-/// What a reading should be, from all others and its own past, and the evidence that it is not:
-/// change points in the remainder, whitened by its own measured colour.
+/// Expectation of a reading from all others and its own past, and evidence of deviations: change
+/// points in the remainder, whitened by its own measured colour.
 #pragma once
 
 #include <vector>
@@ -8,13 +8,13 @@
 
 namespace thermocomp::inspection {
 
-/// Standard deviation; 0 of fewer than two values.
+/// Standard deviation; 0 for fewer than two values.
 [[nodiscard]] double spread(const Eigen::Ref<const Eigen::VectorXd>& values);
 
 /// y = X b + an offset per run + n, n_t = rho n_(t-1) + white, with priors b_i ~ N(0, prior_i^2):
-/// ridge regression on whitened rows, rho from the remainder. A fault's shape f is judged by
-/// f'Mr / (sigma sqrt(f'Mf)) with M the projection that takes out what the regression could take
-/// of it; so what the neighbours can imitate is no evidence.
+/// ridge regression on whitened rows, rho from the remainder. A fault's shape f is judged by f'Mr /
+/// (sigma sqrt(f'Mf)), where the projection M removes what the regression can explain; a shape that
+/// the neighbours can imitate is no evidence.
 class Expectation {
  public:
   /// @param y       shape (rows)
@@ -28,12 +28,12 @@ class Expectation {
     double z{0.0};     ///< in standard deviations
     double size{0.0};  ///< in units of y per unit of the shape
   };
-  /// A step at each row of a run, all of them together in O(rows columns). Shape (rows of the run).
+  /// Evidence of a step at each row of a run, in O(rows columns) for all. Shape (rows of the run).
   [[nodiscard]] std::vector<Evidence> steps(std::size_t run) const;
-  /// A shape given on a run's rows (zero elsewhere). `coloured`: the remainder's slow part, which
-  /// the whitening did not take, counts too (batch means).
+  /// Evidence of a shape on a run's rows (zero elsewhere). `coloured`: includes the remainder's
+  /// slow part, which is not whitened (batch means).
   [[nodiscard]] Evidence shape(std::size_t run, const Eigen::VectorXd& shape, bool coloured) const;
-  /// The second of two shapes that are fitted together; z: root of its gain in 2 ln L.
+  /// Evidence of the second of two shapes fitted together; z: root of its gain in 2 ln L.
   [[nodiscard]] Evidence second_shape(std::size_t run, const Eigen::VectorXd& first,
                                       const Eigen::VectorXd& second) const;
 

@@ -1,4 +1,4 @@
-/// `thermocomp inspect RUN.csv...`
+/// The command `thermocomp inspect RUN.csv...`
 #pragma once
 
 #include <functional>

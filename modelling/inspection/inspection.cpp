@@ -11,7 +11,7 @@
 namespace thermocomp::inspection {
 namespace {
 
-/// P = 1 / (1 + (even / score)^steepness): half at `even`.
+/// P = of_plain_facts / (1 + (even / score)^steepness): about half at `even`.
 struct Worth {
   std::string_view kind;
   double even;
@@ -27,9 +27,9 @@ constexpr std::array<Worth, 8> worths{{
     {"stuck", 2.0, 3},
     {"displacement_step", 10.0, 6},
 }};
-constexpr double of_plain_facts = 0.99;  // coarse, copy, gap, clock: they stand in the file
+constexpr double of_plain_facts = 0.99;  // coarse, copy, gap, clock: evident in the file
 
-/// Probability of a score, by kind; docs/inspection.md says what the constants were set from.
+/// Probability of a score, by kind; docs/inspection.md gives the origin of the constants.
 double probability_of(const std::string& kind, double score) {
   for (const Worth& worth : worths)
     if (worth.kind == kind)
@@ -40,7 +40,7 @@ double probability_of(const std::string& kind, double score) {
 constexpr Eigen::Index rows_of_all_runs_max = 4000;
 constexpr Eigen::Index rows_of_a_run_max = 1000;
 
-/// A straight line in place of what is stuck, so that the others are not held against it.
+/// Replaces a stuck stretch by a straight line, so that it does not affect the others.
 void bridge(RunFile& run, const Finding& stuck) {
   const std::vector<double>& time_s = run.time_s();
   std::vector<double>& values = run.values[*run.find(stuck.column)];
@@ -56,8 +56,8 @@ void bridge(RunFile& run, const Finding& stuck) {
     values[i] = values[begin] + slope * (time_s[i] - time_s[begin]);
 }
 
-/// Without what the compensation did, in a file that `thermocomp export` wrote: beside an axis'
-/// offset there is what the controller applied. These are no displacements of the machine.
+/// Removes the columns of the compensation in a file of `thermocomp export` (an axis' offset with
+/// what the controller applied), which are not displacements of the machine.
 RunFile of_machine(RunFile run) {
   const std::vector<std::string> columns = run.columns;
   for (const std::string& name : columns) {
@@ -74,7 +74,7 @@ RunFile of_machine(RunFile run) {
   return run;
 }
 
-/// Displacements only of `outputs`, no row behind the selection.
+/// Keeps only `outputs` of the displacements, and no rows after the selection.
 RunFile selected_part(RunFile run, const std::vector<std::string>& outputs) {
   for (std::size_t i = run.columns.size(); i-- > 0;) {
     run.values[i].resize(run.selected_end);

@@ -10,7 +10,8 @@
 namespace thermocomp::inspection {
 namespace {
 
-/// One column over the run's hours, with the finding: its stretch shaded, its moments as dots.
+/// Plots one column over the run's hours, with the finding's stretch shaded and its moments as
+/// dots.
 std::string picture(const RunFile& run, const std::string& column, double from_s, double to_s,
                     const Finding& finding) {
   const auto& time_s = run.time_s();
@@ -26,7 +27,7 @@ std::string picture(const RunFile& run, const std::string& column, double from_s
   for (double& at_s : since_start_s) at_s -= time_s.front();
   std::vector<double> marks(count, std::nan(""));
   for (const double at_s : finding.times_s) {
-    const std::size_t row = row_at(at_s) - begin;  // before `begin`: too large as well
+    const std::size_t row = row_at(at_s) - begin;  // wraps to a large number before `begin`
     if (row < count) marks[row] = values[row];
   }
   std::vector<PlotSpan> spans;
@@ -43,7 +44,7 @@ std::string picture(const RunFile& run, const std::string& column, double from_s
                      "");
 }
 
-/// The place that moved most like the one of the finding, for comparison.
+/// The place most similar to the finding's, for comparison.
 std::string neighbour_of(const Inspection& inspection, const Finding& finding, const RunFile& run) {
   if (finding.kind == "gap") return "";
   if (!finding.other.empty()) return finding.other;

@@ -11,7 +11,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Four digits: more would be none.
+/// Rounds to four significant digits.
 double rounded(double value) {
   if (!(std::abs(value) > 0) || !std::isfinite(value)) return value;
   const double scale = std::pow(10.0, 3.0 - std::floor(std::log10(std::abs(value))));
@@ -35,14 +35,14 @@ Json json_of(const Finding& finding, const Inspection& inspection) {
   return json;
 }
 
-/// Two digits that count.
+/// Two significant digits.
 std::string two_digits(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.2g", value);
   return std::abs(value) >= 100 ? std::to_string(std::lround(value)) : text;
 }
 
-/// "3 h 20 min" after the run's first row.
+/// Time after the run's first row: "3 h 20 min".
 std::string moment(double time_s, const RunFile& run) {
   const auto minutes = std::lround((time_s - run.time_s().front()) / 60.0);
   if (minutes < 1) return "the start";

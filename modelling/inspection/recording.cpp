@@ -11,7 +11,7 @@
 namespace thermocomp::inspection {
 namespace {
 
-// A row or two are lost to a busy logger; three in a row are a gap.
+// A busy logger can lose one or two rows; three in a row are a gap.
 constexpr double gap_steps_min = 3.5;
 constexpr double irregular_gap_steps_min = 20.0;
 
@@ -33,8 +33,8 @@ bool is_usable(const std::vector<RunFile>& runs, const std::string& name) {
   });
 }
 
-/// A column that stands still from row to row in four of five rows is set or very coarse: it acts
-/// like a signal, and what it should be cannot be told from neighbours.
+/// A column that is constant from row to row in four of five rows is a setpoint or very coarse: it
+/// acts like a signal, and neighbours do not predict it.
 bool is_held(const std::vector<RunFile>& runs, const std::string& name) {
   std::size_t still = 0;
   std::size_t steps = 0;
@@ -46,7 +46,7 @@ bool is_held(const std::vector<RunFile>& runs, const std::string& name) {
   return 5 * still >= 4 * steps;
 }
 
-/// Mean of the values that are there; NaN without any.
+/// Mean of the finite values; NaN without any.
 double mean_of(const std::vector<double>& column, std::size_t begin, std::size_t end) {
   double sum = 0.0;
   double count = 0.0;
@@ -58,7 +58,7 @@ double mean_of(const std::vector<double>& column, std::size_t begin, std::size_t
   return count > 0 ? sum / count : std::numeric_limits<double>::quiet_NaN();
 }
 
-/// Missing values at the start take the first that is there.
+/// Replaces missing values by the previous one, at the start by the first.
 void hold(Eigen::Ref<Eigen::VectorXd> column) {
   double held = std::numeric_limits<double>::quiet_NaN();
   for (Index row = 0; row < column.size() && !std::isfinite(held); ++row) held = column[row];

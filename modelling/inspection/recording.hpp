@@ -1,4 +1,4 @@
-/// All runs as matrices on a coarser grid, on which readings are compared with each other.
+/// All runs as matrices on a coarser grid for comparing readings.
 #pragma once
 
 #include <cstddef>
@@ -11,8 +11,8 @@
 
 namespace thermocomp::inspection {
 
-/// Rows of all runs one after another. A missing temperature or signal is that of the row before;
-/// a missing displacement is NaN.
+/// Rows of all runs in sequence. A missing temperature or signal repeats the previous one; a
+/// missing displacement is NaN.
 struct Recording {
   std::vector<std::string> temps;
   std::vector<std::string> signals;
@@ -21,30 +21,30 @@ struct Recording {
   Eigen::MatrixXd temps_K;           ///< shape (rows, temps)
   Eigen::MatrixXd values;            ///< shape (rows, signals)
   Eigen::MatrixXd outputs_um;        ///< shape (rows, outputs)
-  std::vector<Eigen::Index> begins;  ///< of each run, and the end
-  /// Whether a gap ends in the row; shape (rows, temps + 1), last those in which rows are missing.
+  std::vector<Eigen::Index> begins;  ///< first row of each run, and the end
+  /// A gap ends in this row; shape (rows, temps + 1), the last column for missing rows.
   Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic> after_gap;
 
   [[nodiscard]] std::size_t runs() const noexcept { return begins.size() - 1; }
 };
 
-/// Columns that all runs have, and that have values in at least half of each run's rows
-/// (displacements: in 20 rows). Thinned by means, so that each run has at most `rows_max` rows.
+/// Takes columns of all runs with values in at least half of each run's rows (displacements: in 20
+/// rows). Averages them to at most `rows_max` rows per run.
 [[nodiscard]] Recording make_recording(const std::vector<RunFile>& runs, Eigen::Index rows_max);
 
-/// First-order low pass of each column, started at each run's first row.
+/// First-order low pass of each column, initialised at each run's first row.
 [[nodiscard]] Eigen::MatrixXd low_pass(const Recording& recording, const Eigen::MatrixXd& columns,
                                        double tau_s);
 
-// Stretches of a recording without a row or a value.
+// Gaps: stretches of a recording without a row or a value.
 
-/// From row to row [s].
+/// Time steps between rows [s].
 [[nodiscard]] std::vector<double> steps_of(const RunFile& run);
-/// Nine rows in ten are a step apart, give or take a fifth.
+/// Nine of ten rows are one step apart, within a fifth.
 [[nodiscard]] bool is_regular(const std::vector<double>& steps, double step_s);
-/// From how many seconds on a stretch without a value is a gap.
+/// Least duration of a gap without a value [s].
 [[nodiscard]] double gap_s_min(const RunFile& run);
-/// Rows of the first value after each gap of the column, be it that rows or its values are missing.
+/// Rows of the first value after each gap of the column, with missing rows or values.
 [[nodiscard]] std::vector<std::size_t> ends_of_gaps(const RunFile& run,
                                                     const std::vector<double>& column);
 

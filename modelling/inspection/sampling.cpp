@@ -11,8 +11,8 @@ namespace {
 
 constexpr double hour_s = 3600.0;
 
-/// Whether the temperatures went on over a row as if no time had passed: each moved no more than
-/// three times what it moves in a row otherwise.
+/// The temperatures continue over a row as if no time had passed: each changes by at most five
+/// times its usual change per row.
 bool goes_on(const RunFile& run, std::size_t row) {
   std::size_t judged = 0;
   for (std::size_t i = 0; i < run.columns.size(); ++i) {
@@ -24,7 +24,7 @@ bool goes_on(const RunFile& run, std::size_t row) {
     const double usual = median(moves);
     const double over = std::abs(values[row] - values[row - 1]);
     if (!std::isfinite(over)) continue;
-    // A reading that stands still says nothing.
+    // A constant reading gives no information.
     if (!(usual > 0)) continue;
     ++judged;
     if (over > 5.0 * usual) return false;
@@ -34,7 +34,7 @@ bool goes_on(const RunFile& run, std::size_t row) {
 
 using Span = std::pair<double, double>;
 
-/// Stretches without a value, from the last one before to the first one after.
+/// Stretches without a value, from the last value before to the first after.
 std::vector<Span> gaps_of(const RunFile& run, const std::vector<double>& column) {
   std::vector<Span> gaps;
   for (const std::size_t end : ends_of_gaps(run, column)) {
@@ -45,7 +45,8 @@ std::vector<Span> gaps_of(const RunFile& run, const std::vector<double>& column)
   return gaps;
 }
 
-/// Whether it is meant to have a value in every row; displacements are often probed now and then.
+/// The column has values in at least half of the rows; displacements are often probed only
+/// occasionally.
 bool is_dense(const RunFile& run, std::size_t column) {
   const std::vector<double>& values = run.values[column];
   const auto count = std::count_if(values.begin(), values.end(),
@@ -127,7 +128,7 @@ void check_clock(const RunFile& run, std::size_t index, const RunSampling& sampl
     const double hours = std::round(jump_s / hour_s);
     const bool whole_hours = hours >= 1 && std::abs(jump_s - hours * hour_s) <= 2 * sampling.step_s;
     const bool set_forward = gap && regular && whole_hours && goes_on(run, i + 1);
-    // A little, without going back over a row.
+    // Set back by less than a row.
     const bool set_back = !gap && regular && steps[i] < 0.3 * sampling.step_s;
     if (set_forward || set_back) {
       offer("clock", from_s, to_s, jump_s, 10.0);

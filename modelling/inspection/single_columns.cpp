@@ -11,16 +11,16 @@ namespace thermocomp::inspection {
 namespace {
 
 constexpr std::size_t half_window = 3;
-// What a value may leap in a row for other reasons: the tolerance of a thermocouple, a probing's.
+// Jumps of a row that have other causes: tolerance of a thermocouple or a probing.
 constexpr double leap_K_min = 0.5;
 constexpr double leap_um_min = 1.0;
 constexpr double leap_deviations_min = 8.0;
-constexpr std::size_t nearby = 15;    // rows on each side that show how wild it is just then
+constexpr std::size_t nearby = 15;    // rows on each side that give the local deviation
 constexpr double coarse_K_min = 0.2;  // half of it is 0.1 K, about 1 um on a machine
 constexpr double coarse_um_min = 1.0;
 constexpr std::size_t stuck_rows_min = 10;
 constexpr double others_moved_K_min = 1.0;
-constexpr std::size_t copy_values_min = 20;  // different ones; fewer agree by chance
+constexpr std::size_t copy_values_min = 20;  // distinct values; fewer agree by chance
 
 Suspicion suspicion(const std::string& kind, const std::string& column, std::size_t run,
                     double at_s, double until_s, double size, double score) {
@@ -36,7 +36,7 @@ Suspicion suspicion(const std::string& kind, const std::string& column, std::siz
   return made;
 }
 
-/// Whether another temperature leaps the same way in that row: then the place does, not the sensor.
+/// Another temperature jumps likewise in that row, so the place changed, not the sensor.
 bool others_leap(const RunFile& run, std::size_t column, std::size_t row, double leap) {
   for (std::size_t i = 0; i < run.columns.size(); ++i) {
     if (i == column || !is_temperature(run.columns[i])) continue;
@@ -46,7 +46,7 @@ bool others_leap(const RunFile& run, std::size_t column, std::size_t row, double
   return false;
 }
 
-/// Whether the column comes back to where it was: by more than what it goes on by.
+/// The column returns: it changes by less than the jump.
 bool comes_back(const std::vector<double>& values, std::size_t row, double leap) {
   const auto at = values.begin() + static_cast<std::ptrdiff_t>(row);
   const auto before = static_cast<std::ptrdiff_t>(std::min(half_window, row));
@@ -54,7 +54,7 @@ bool comes_back(const std::vector<double>& values, std::size_t row, double leap)
   return std::abs(median({at + 1, at + 1 + after}) - median({at - before, at})) < std::abs(leap);
 }
 
-/// Deviation of the leaps of the rows beside it.
+/// Robust deviation of the jumps in the surrounding rows.
 double deviation_nearby(const std::vector<double>& leaps, std::size_t row) {
   const std::size_t begin = row - std::min(nearby, row);
   const std::size_t end = std::min(leaps.size(), row + nearby + 1);
@@ -71,7 +71,7 @@ void check_leaps(RunFile& run, std::size_t index, std::size_t column, Suspicions
     leaps[row] = values[row] - around[row];
   }
   double deviation = robust_deviation(leaps);
-  // Where most rows hold still, those that move say how far it moves.
+  // If most rows are constant, the others give the deviation.
   if (!(deviation > 0)) {
     std::vector<double> moving;
     for (const double leap : leaps)
@@ -111,8 +111,8 @@ double range_of(const std::vector<double>& values, StillRows rows) {
   return high > low ? high - low : 0.0;
 }
 
-/// Whether a signal has the same value throughout: what is controlled to a set value stays there. 0
-/// is that of too many.
+/// A signal has the same value throughout, so the reading is controlled to a setpoint. 0 is too
+/// common to count.
 bool is_held(const RunFile& run, std::size_t column, StillRows rows) {
   const double value = run.values[column][rows.begin];
   return value != 0 && std::any_of(run.columns.begin(), run.columns.end(), [&](const auto& name) {

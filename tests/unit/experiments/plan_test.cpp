@@ -18,7 +18,7 @@ name = "coolant"
 levels = ["off", "on"]
 )";
 
-/// Told apart from PairTable: looks at the finished rows only.
+/// Independent of PairTable: uses the finished rows only.
 std::size_t pairs_missing(const Design& design) {
   std::size_t missing = 0;
   for (std::size_t a = 0; a < design.level_counts.size(); ++a)
@@ -39,7 +39,7 @@ TEST_CASE("every listed array is balanced, of strength two, and as large as its 
       CHECK(array.rows.size() == std::stoul(name.substr(1)));
       CHECK(strength_of(array) >= 2);
       CHECK(pairs_missing(array) == 0);
-      // Saturated: the columns use up all degrees of freedom (L18 keeps some of 2 x 3 in itself).
+      // Saturated: the columns use all degrees of freedom (except some of 2 x 3 in L18).
       int freedom = 0;
       for (const int levels : array.level_counts) freedom += levels - 1;
       const int left_over = static_cast<int>(array.rows.size()) - 1 - freedom;
@@ -48,7 +48,7 @@ TEST_CASE("every listed array is balanced, of strength two, and as large as its 
   }
 }
 
-TEST_CASE("an array in which one level is changed is no longer called balanced", "[plan]") {
+TEST_CASE("an array with one changed level is no longer reported as balanced", "[plan]") {
   Design array = array_variants("L9").front();
   REQUIRE(strength_of(array) == 2);
   array.rows[4][1] = (array.rows[4][1] + 1) % 3;
@@ -78,9 +78,9 @@ TEST_CASE("all pairs covers every pair of twenty random factor sets, also with s
   }
 }
 
-TEST_CASE("what is forbidden is in no test, and all other pairs are", "[plan]") {
-  // Level 0 of factor 0 never with level 1 of factor 1; three levels never together; and factor 2
-  // at 2 forces factor 3 to 0 so that two pairs are ruled out without being named.
+TEST_CASE("no test contains a forbidden combination, and all other pairs occur", "[plan]") {
+  // Level 0 of factor 0 never with level 1 of factor 1; three levels never together; factor 2 at 2
+  // forces factor 3 to 0, which excludes two pairs implicitly.
   const std::vector<Forbidden> forbidden{
       {{0, 0}, {1, 1}}, {{0, 1}, {1, 1}, {2, 1}}, {{2, 2}, {3, 1}}, {{2, 2}, {3, 2}}};
   const Constraints constraints({3, 3, 3, 3}, forbidden);
@@ -92,12 +92,12 @@ TEST_CASE("what is forbidden is in no test, and all other pairs are", "[plan]") 
   CHECK(pairs_missing(design) == 3);
 }
 
-TEST_CASE("what leaves no test at all is refused", "[plan]") {
+TEST_CASE("constraints that allow no test are refused", "[plan]") {
   const Constraints nothing({2, 2}, {{{0, 0}}, {{0, 1}}});
   CHECK_THROWS_WITH(all_pairs(nothing, 1), Catch::Contains("no test is allowed"));
 }
 
-TEST_CASE("four factors of three levels make L9, and a fifth an array or all pairs", "[plan]") {
+TEST_CASE("four factors of three levels give L9, with a fifth an array or all pairs", "[plan]") {
   FactorsSpec spec;
   for (int i = 0; i < 4; ++i)
     spec.factors.push_back({std::string("f").append(std::to_string(i)), {"a", "b", "c"}});
@@ -113,7 +113,7 @@ TEST_CASE("four factors of three levels make L9, and a fifth an array or all pai
   CHECK(pairs.pairs.covered == pairs.pairs.possible);
 }
 
-TEST_CASE("a factor with fewer levels than its column is said to be so", "[plan]") {
+TEST_CASE("a factor with fewer levels than its column is reported", "[plan]") {
   FactorsSpec spec = parse_factors(
       std::string("method = \"orthogonal\"\narray = \"L9\"\n").append(two_factors), "f");
   const TestPlan plan = make_plan(spec);
@@ -122,7 +122,7 @@ TEST_CASE("a factor with fewer levels than its column is said to be so", "[plan]
   CHECK_THAT(plan_text(plan), Catch::Contains("twice as often"));
 }
 
-TEST_CASE("a run file skeleton is a run file with the stops in it", "[plan]") {
+TEST_CASE("a run file skeleton is a valid run file with the stops", "[plan]") {
   FactorsSpec spec = parse_factors(two_factors, "f");
   spec.test.hours = 6;
   const TestPlan plan = make_plan(spec);
@@ -137,7 +137,7 @@ TEST_CASE("a run file skeleton is a run file with the stops in it", "[plan]") {
   CHECK_THAT(test_sheet(plan), Catch::Contains("| 3:00 | stop for 60 min |"));
 }
 
-TEST_CASE("the sheet says of each test whether the tool cuts", "[plan]") {
+TEST_CASE("the sheet states for each test whether the tool cuts", "[plan]") {
   const std::string all = test_sheet(make_plan(parse_factors(two_factors, "f")));
   CHECK_THAT(all, Catch::Contains("Actual cutting") && !Catch::Contains("dummy"));
   const std::string simulated =
@@ -147,7 +147,7 @@ TEST_CASE("the sheet says of each test whether the tool cuts", "[plan]") {
   CHECK_THAT(run_file_skeleton(plan, 0), Catch::Contains("# cutting = simulated"));
 }
 
-TEST_CASE("as a factor, cutting is said test by test", "[plan]") {
+TEST_CASE("as a factor, cutting is stated for each test", "[plan]") {
   const std::string text =
       std::string(two_factors)
           .append("[[factor]]\nname = \"cutting\"\nlevels = [\"actual\", \"simulated\"]\n");
@@ -200,7 +200,7 @@ pause_min = 30
 
 }  // namespace
 
-TEST_CASE("the sheet knows rough cuts, one finishing cut, then the measurement", "[plan]") {
+TEST_CASE("the sheet lists rough cuts, one finishing cut, then the measurement", "[plan]") {
   const std::string each = std::string(two_factors).append("[test]\nrough_cuts = 3\n");
   CHECK_THAT(
       test_sheet(make_plan(parse_factors(each, "f"))),

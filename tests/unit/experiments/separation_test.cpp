@@ -26,7 +26,7 @@ TestRun run_of(const std::vector<double>& hours, const std::vector<std::vector<d
   return run;
 }
 
-/// One place up at 3 K/h for `hours` / 2 and down again, the other at rest.
+/// One place rises at 3 K/h for `hours` / 2 and falls again, the other rests.
 TestRun moved_apart(double hours) {
   std::vector<double> time_h;
   std::vector<double> moved_K;
@@ -39,7 +39,8 @@ TestRun moved_apart(double hours) {
 
 }  // namespace
 
-TEST_CASE("the shortest run that tells two places apart, by hand", "[plan][apart]") {
+TEST_CASE("the shortest run that separates two places matches the manual calculation",
+          "[plan][apart]") {
   MeasuredTests tests;
   tests.places = {"bed_degC", "nozzle_degC"};
   tests.runs.push_back(run_of({0, 1, 2}, {{0, 3, 0}, {0, 6, 0}}));
@@ -61,7 +62,7 @@ TEST_CASE("the shortest run that tells two places apart, by hand", "[plan][apart
   CHECK(separation(tests).moves.size() == 1);
 }
 
-TEST_CASE("a place that went no further is moved several times", "[plan][apart]") {
+TEST_CASE("a place with a limited range is moved several times", "[plan][apart]") {
   MeasuredTests tests;
   tests.places = {"a_degC", "b_degC"};
   // Up in an hour, down in another, five times: S = 5 (4 + 1) + 6 about the mean 15 / 11.
@@ -74,7 +75,8 @@ TEST_CASE("a place that went no further is moved several times", "[plan][apart]"
   CHECK(found.moves[0].swing == 3.0);
 }
 
-TEST_CASE("signals that were always on together, and one that never went back", "[plan][apart]") {
+TEST_CASE("signals that were always on together, and one that never returned, are reported",
+          "[plan][apart]") {
   MeasuredTests tests;
   tests.signals = {"coolant_on", "pump_on", "door_on", "spindle_rpm"};
   tests.unmoved = {"door_on"};

@@ -1,5 +1,5 @@
-// A machine of six places that warm from two sources: what is planted into one reading is found,
-// and nothing on the machine as it is.
+// Tests of the inspection on a machine with six places and two heat sources: planted faults are
+// found, and none on the unchanged machine.
 #include "modelling/inspection/inspection.hpp"
 
 #include <algorithm>
@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t rows = 700;
 
-/// Twelve hours, a row a minute; speed in three levels, a room that wanders.
+/// Twelve hours with a row per minute; three speed levels and a wandering room.
 RunFile recording(unsigned seed = 1) {
   RunFile run;
   run.name = "run.csv";
@@ -56,7 +56,7 @@ const Finding* find(const Inspection& inspection, const std::string& kind) {
 
 }  // namespace
 
-TEST_CASE("what the compensation did is no displacement of the machine", "[inspection]") {
+TEST_CASE("offsets of the compensation are not displacements of the machine", "[inspection]") {
   RunFile run = recording();
   for (const char* name : {"z_offset_um", "z_applied_um", "z_measured_um"}) {
     run.columns.emplace_back(name);
@@ -67,7 +67,7 @@ TEST_CASE("what the compensation did is no displacement of the machine", "[inspe
     CHECK_THAT(each.column, !Catch::Contains("z_"));
 }
 
-TEST_CASE("nothing is found in a recording that is as it should be", "[inspection]") {
+TEST_CASE("nothing is found in a faultless recording", "[inspection]") {
   for (unsigned seed = 1; seed <= 3; ++seed) {
     const Inspection inspection = inspect({recording(seed)});
     INFO(inspection_text(inspection));
@@ -97,9 +97,8 @@ TEST_CASE("a reading that jumps is named with its time and size, and its neighbo
         Approx(run.column("t3_degC")[500] - 2.0).margin(0.1));
 }
 
-TEST_CASE(
-    "a step of a displacement is taken out before a fit, large or below 1 um, and nothing else",
-    "[inspection]") {
+TEST_CASE("only steps of displacements are removed before a fit, above or below 1 um",
+          "[inspection]") {
   const double size_um = GENERATE(40.0, 0.5);
   RunFile run = recording();
   if (size_um < 1.0)
@@ -115,11 +114,11 @@ TEST_CASE(
         Approx(still.column("z_um")[500]).margin(0.1 * size_um));
   CHECK(clean.runs.front().column("t3_degC") == run.column("t3_degC"));
   CHECK(without_steps({run}, {}).notes.empty());
-  run.selected_end = 300;  // what is behind the selection is not looked at
+  run.selected_end = 300;  // rows after the selection are ignored
   CHECK(without_steps({run}, {"z_um"}).notes.empty());
 }
 
-TEST_CASE("a module that was away left a gap, and no sensor moved", "[inspection]") {
+TEST_CASE("a module's outage is a gap, not a step of its sensors", "[inspection]") {
   RunFile run = recording();
   for (const char* name : {"t1_degC", "t2_degC"})
     for (std::size_t row = 215; row < 240; ++row) column(run, name)[row] = std::nan("");
@@ -134,7 +133,7 @@ TEST_CASE("a module that was away left a gap, and no sensor moved", "[inspection
   CHECK_THAT(inspection_html({run}, inspection), Catch::Contains("t1_degC, t2_degC"));
 }
 
-TEST_CASE("single places are no group", "[inspection]") {
+TEST_CASE("single places do not form a group", "[inspection]") {
   Inspection inspection;
   inspection.groups = {{"t1_degC"}, {"t2_degC"}};
   CHECK_THAT(inspection_text(inspection), Catch::Contains("No two places move alike."));
@@ -145,8 +144,9 @@ TEST_CASE("single places are no group", "[inspection]") {
   CHECK_THAT(inspection_text(inspection), !Catch::Contains("t3_degC"));
 }
 
-TEST_CASE("a heater that is switched on and off is a ramp, no step of a sensor", "[inspection]") {
-  // No signal says when: the bed warms by 4 K in a row for six rows, holds, and cools.
+TEST_CASE("a heater that switches on and off causes a ramp, not a step of a sensor",
+          "[inspection]") {
+  // Without a signal: the bed warms by 4 K per row for six rows, holds, and cools.
   for (unsigned seed = 1; seed <= 3; ++seed) {
     RunFile run = recording(seed);
     std::vector<double>& bed = column(run, "t3_degC");
@@ -163,7 +163,7 @@ TEST_CASE("a heater that is switched on and off is a ramp, no step of a sensor",
   }
 }
 
-TEST_CASE("the likeliest creep is that of the reading that creeps", "[inspection]") {
+TEST_CASE("the most probable drift is that of the drifting reading", "[inspection]") {
   RunFile run = recording();
   for (std::size_t row = 0; row < rows; ++row)
     column(run, "t4_degC")[row] += 4.0 * static_cast<double>(row) / static_cast<double>(rows);
@@ -188,8 +188,7 @@ TEST_CASE("spikes are found one by one, and replaced", "[inspection]") {
         Approx(run.column("t2_degC")[299]).margin(0.3));
 }
 
-TEST_CASE("a value amid a jump, or where a column is wild for a while, is no spike",
-          "[inspection]") {
+TEST_CASE("a value during a jump, or in a noisy stretch, is not a spike", "[inspection]") {
   RunFile run = recording();
   std::mt19937 random(5);
   std::normal_distribution<double> gust(0.0, 0.5);
@@ -204,7 +203,7 @@ TEST_CASE("a value amid a jump, or where a column is wild for a while, is no spi
   CHECK(find(inspection, "outliers") == nullptr);
 }
 
-TEST_CASE("a reading that is held at a set value is not stuck", "[inspection]") {
+TEST_CASE("a reading controlled to a setpoint is not stuck", "[inspection]") {
   RunFile run = recording();
   for (std::size_t row = 330; row < 430; ++row) column(run, "t1_degC")[row] = 40.0;
   REQUIRE(find(inspect({run}), "stuck") != nullptr);
@@ -213,7 +212,7 @@ TEST_CASE("a reading that is held at a set value is not stuck", "[inspection]") 
   CHECK(find(inspect({run}), "stuck") == nullptr);
 }
 
-TEST_CASE("what stands still, is coarse or is another's reading is said", "[inspection]") {
+TEST_CASE("stuck, coarse and duplicate readings are reported", "[inspection]") {
   RunFile run = recording();
   for (std::size_t row = 330; row < 430; ++row)
     column(run, "t1_degC")[row] = column(run, "t1_degC")[330];
@@ -230,7 +229,7 @@ TEST_CASE("what stands still, is coarse or is another's reading is said", "[insp
   CHECK(find(inspection, "copy")->other == "t4_degC");
 }
 
-TEST_CASE("a gap and a clock that was put forward are told apart", "[inspection]") {
+TEST_CASE("a gap and a clock set forward are distinguished", "[inspection]") {
   RunFile run = recording();
   RunFile gap = run;
   for (std::vector<double>& values : gap.values)
@@ -244,7 +243,7 @@ TEST_CASE("a gap and a clock that was put forward are told apart", "[inspection]
   CHECK(find(inspection, "clock")->at_s == 249 * 60.0);
 }
 
-TEST_CASE("a signal that never changed cannot be told of, and an experiment is proposed",
+TEST_CASE("a signal that never changed is not identifiable, and an experiment is proposed",
           "[inspection]") {
   RunFile run = recording();
   std::fill(column(run, "spindle_rpm").begin(), column(run, "spindle_rpm").end(), 1000.0);
