@@ -45,7 +45,7 @@ std::optional<double> distance_of(std::string_view text) {
   return value;
 }
 
-/// "ch3_um-ch4_um": names may hold a minus themselves, so that the place is where both are columns.
+/// "ch3_um-ch4_um": names may contain a minus, so the separator is the one between two columns.
 void take_difference(const RunFile& run, const std::string& value, std::string_view both,
                      AxisBinding& binding) {
   int found = 0;
@@ -96,8 +96,8 @@ bool has_a_course(const RunFile& run, const std::string& column) {
   return count >= 2;
 }
 
-/// The column that is called like an axis: as measured at the tool, or as a displacement. A history
-/// has columns of all axes, also of those that nobody measured.
+/// The column named like an axis: measured at the tool, or a displacement. Skips columns without a
+/// course: a history has columns of all axes, measured or not.
 std::optional<std::string> column_called(const RunFile& run, const std::string& axis) {
   for (const char* end : {"_measured_um", "_um", "_measured_urad", "_urad"})
     for (const std::string& column : run.columns) {
@@ -123,7 +123,7 @@ std::vector<AxisBinding> by_names(const RunFile& run, const TestOptions& options
     if (options.kind == TestKind::axis) add(axis + "2", axis + "2");
   }
   if (options.kind == TestKind::axis || !(options.distance_mm > 0.0)) return bindings;
-  // Two probes along the test bar: those across X tilt about Y, those across Y about X.
+  // Two probes along the test bar: across X they give the tilt about Y, across Y that about X.
   for (const auto& [tilt, across] : {std::pair<const char*, const char*>{"a", "y"}, {"b", "x"}}) {
     const auto first = column_called(run, std::string(across) + "1");
     const auto second = column_called(run, std::string(across) + "2");

@@ -13,11 +13,11 @@ namespace {
 constexpr double window_s = 300.0;
 constexpr double bin_s_min = 15.0;
 constexpr double bins_max = 6000.0;
-/// Fewer values than this in a window determine no parabola worth having.
+/// Required values of a window for a parabola.
 constexpr std::size_t window_values_min = 5;
 constexpr double normal_of_median = 1.4826;
 
-/// Of a robust spread the half is 0 where values are coarse: then the plain one counts.
+/// Robust spread; for coarse values, where it is 0, the RMS.
 double spread_of(const std::vector<double>& values) {
   std::vector<double> sizes;
   double squares = 0.0;
@@ -30,7 +30,7 @@ double spread_of(const std::vector<double>& values) {
   return robust > 0.0 ? robust : std::sqrt(squares / static_cast<double>(values.size()));
 }
 
-/// Each value less the straight line between its neighbours, in standard deviations of one value.
+/// Each value minus the line between its neighbours, in standard deviations of one value.
 std::vector<double> second_differences(const std::vector<double>& time_s,
                                        const std::vector<double>& values) {
   std::vector<double> result;
@@ -43,13 +43,13 @@ std::vector<double> second_differences(const std::vector<double>& time_s,
   return result;
 }
 
-/// Which of the stretches between the breaks a moment is in.
+/// Index of the stretch between the breaks that contains a time.
 std::size_t stretch_of(double time_s, std::span<const double> breaks_s) {
   return static_cast<std::size_t>(std::upper_bound(breaks_s.begin(), breaks_s.end(), time_s) -
                                   breaks_s.begin());
 }
 
-/// Weights that give the value at `at` of the parabola through the values at `times`.
+/// Weights for the value at `at` of the parabola through the values at `times`.
 std::vector<double> parabola_weights(std::span<const double> times, double at) {
   Eigen::MatrixXd basis(static_cast<Eigen::Index>(times.size()), 3);
   for (std::size_t i = 0; i < times.size(); ++i) {
@@ -83,7 +83,7 @@ SmoothCourse::SmoothCourse(const MeasuredCourse& measured, std::span<const doubl
   }
 }
 
-/// Means of some seconds where a probe gave many values: nothing thermal is faster.
+/// Averages dense values over some seconds; no thermal change is faster.
 void SmoothCourse::average_bins(const MeasuredCourse& measured, std::span<const double> breaks_s) {
   const auto& times = measured.time_s;
   if (times.empty()) return;
@@ -131,9 +131,9 @@ void SmoothCourse::place_windows(std::span<const double> breaks_s) {
   block_ = longest;
 }
 
-/// In units of a single value's noise. Smoothing takes a part of the noise with it, the weight of a
-/// value in its own window; that is put back. Values that were not smoothed show their noise by
-/// their second differences alone.
+/// Residuals in units of a single value's noise. Smoothing removes part of the noise, by the weight
+/// of a value in its own window; the scale corrects this. Without smoothing, second differences
+/// give the noise.
 void SmoothCourse::keep_what_is_left(double noise) {
   if (!smoothed_) {
     left_ = second_differences(time_s_, raw_);
@@ -151,7 +151,7 @@ void SmoothCourse::keep_what_is_left(double noise) {
     squares += left_.back() * left_.back();
   }
   const double spread = std::sqrt(squares / static_cast<double>(left_.size()));
-  // What somebody says of his probe counts in place of what the values show; never less of them.
+  // A given noise replaces the estimate, which is at least the spread.
   const double wanted = std::isfinite(noise) ? noise : std::max(noise_, spread);
   for (double& value : left_) value *= spread > 0.0 ? wanted / spread : 0.0;
   noise_ = wanted;

@@ -1,4 +1,4 @@
-/// The course of one displacement in a test, smoothed, with its noise known.
+/// Smoothed course of one displacement in a test, with its noise.
 #pragma once
 
 #include <cstddef>
@@ -9,32 +9,32 @@
 
 namespace thermocomp::thermal_test {
 
-/// As a probe gave it; no missing values.
+/// Values of a probe without missing ones.
 struct MeasuredCourse {
   std::vector<double> time_s;
   std::vector<double> value;
 };
 
-/// Local parabolas over a few minutes, never across a moment at which the speed changed: a machine
-/// may jump there. Where values are too rare for that they stay as they are.
+/// Smoothing by local parabolas over a few minutes, but not across changes of speed, where a
+/// machine may jump. Values too rare for that are kept.
 class SmoothCourse {
  public:
-  /// @param breaks_s  the moments at which the speed changed, increasing
-  /// @param noise  standard deviation of a single value where it is known; NaN: from the values
+  /// @param breaks_s  times of speed changes, increasing
+  /// @param noise  standard deviation of a single value; NaN: estimated from the values
   SmoothCourse(const MeasuredCourse& measured, std::span<const double> breaks_s, double noise);
 
   [[nodiscard]] const std::vector<double>& time_s() const noexcept { return time_s_; }
   [[nodiscard]] const std::vector<double>& value() const noexcept { return value_; }
-  /// Standard deviation of a single value as measured, from second differences: what is left of a
-  /// value after the straight line between its neighbours is white noise of a known share.
+  /// Standard deviation of a single measured value, from second differences, whose share of white
+  /// noise is known.
   [[nodiscard]] double noise() const noexcept { return noise_; }
-  /// Whether values are close enough together that they were smoothed.
+  /// The values are dense enough for smoothing.
   [[nodiscard]] bool is_smoothed() const noexcept { return smoothed_; }
   /// Largest standard deviation of a smoothed value.
   [[nodiscard]] double noise_left() const noexcept { return noise_left_; }
 
-  /// The noise alone, smoothed as the values were: what was left of them is drawn anew in blocks as
-  /// long as a window, so that noise that lasts keeps lasting.
+  /// Draws noise, smoothed like the values: residuals are resampled in blocks as long as a window,
+  /// to keep the correlation of the noise.
   [[nodiscard]] std::vector<double> noise_draw(std::mt19937_64& random) const;
 
  private:
@@ -49,10 +49,10 @@ class SmoothCourse {
 
   std::vector<double> time_s_;
   std::vector<double> raw_;
-  std::vector<double> share_;  ///< standard deviation of a bin's mean, in those of a value
+  std::vector<double> share_;  ///< standard deviation of a bin's mean, relative to a value's
   std::vector<Window> windows_;
   std::vector<double> value_;
-  std::vector<double> left_;  ///< of the values, scaled to the noise of one
+  std::vector<double> left_;  ///< residuals, scaled to the noise of one value
   std::size_t block_{1};
   double noise_{0.0};
   double noise_left_{0.0};

@@ -10,12 +10,12 @@ namespace thermocomp::thermal_test {
 namespace {
 
 constexpr double hour_s = 3600.0;
-// A report has a dozen figures, and who accepts a machine by it wants all of them to hold.
+// High quantile, since all of a report's dozen figures must hold for an acceptance.
 constexpr int draws_count = 1000;
 constexpr double draws_quantile = 0.995;
 constexpr double normal_995 = 2.576;
 constexpr std::uint64_t seed = 230;
-/// Of the largest hour: how far apart those lie that are looked at.
+/// Step between the hours tried for the largest hour.
 constexpr double hours_step_s = 300.0;
 constexpr std::size_t combined_points = 240;
 
@@ -26,8 +26,8 @@ struct Stretch {
   [[nodiscard]] bool has_range() const noexcept { return end > begin + 1; }
 };
 
-/// From the last value at or before `from_s` (the first one there is) to the last at or before
-/// `to_s`: what is displaced is displaced from the state before.
+/// From the last value at or before `from_s` (or the first one) to the last at or before `to_s`, so
+/// that the displacement is relative to the state before.
 Stretch stretch_between(const std::vector<double>& time_s, double from_s, double to_s) {
   const auto begin = std::upper_bound(time_s.begin(), time_s.end(), from_s);
   const auto end = std::upper_bound(time_s.begin(), time_s.end(), to_s);
@@ -49,8 +49,8 @@ double quantile(std::vector<double> values, double share) {
   return values[static_cast<std::size_t>(std::lround(place))];
 }
 
-/// A range of course and noise is at most that of the course and that of the noise together; and at
-/// least the difference of the two moments that the course itself has farthest apart.
+/// The range of course plus noise is at most the sum of their ranges, and at least the difference
+/// between the course's two extreme moments.
 Figure with_interval(double value, std::vector<double> noise_ranges, double noise_left) {
   Figure figure;
   if (!std::isfinite(value)) return figure;
@@ -62,7 +62,7 @@ Figure with_interval(double value, std::vector<double> noise_ranges, double nois
 
 enum class Part { whole, first_hour, last_hour, until_end, cooling, largest_hour };
 
-/// The stretches of a part; of the largest hour all hours that are looked at.
+/// Stretches of a part; for the largest hour, all hours tried.
 std::vector<Stretch> stretches_of(Part part, const std::vector<double>& time_s,
                                   const TestPhases& phases, double running_to_s) {
   const double from_s = phases.running_from_s;
@@ -88,7 +88,7 @@ std::vector<Stretch> stretches_of(Part part, const std::vector<double>& time_s,
   if (phases.runs || phases.to_s - phases.from_s < hour_s) return hours;
   for (double from = phases.from_s; from + hour_s <= phases.to_s; from += hours_step_s) {
     const Stretch hour = stretch_between(time_s, from, from + hour_s);
-    // It begins with the value before; where values are rare that may be hours away.
+    // The value before the hour may be hours old if values are rare.
     if (hour.end > hour.begin && time_s[hour.end - 1] - time_s[hour.begin] <= 1.25 * hour_s)
       hours.push_back(hour);
   }
@@ -167,7 +167,7 @@ double interpolated(const std::vector<double>& time_s, const std::vector<double>
   return values[i - 1] + share * (values[i] - values[i - 1]);
 }
 
-/// Largest distance between two of the places that the axes together go through.
+/// Largest distance between two places on the path of all axes.
 double largest_distance(const std::vector<const SmoothCourse*>& courses,
                         const std::vector<std::vector<double>>& values, double from_s,
                         double to_s) {
@@ -267,9 +267,9 @@ Figure ratio_of(const Figure& after, const Figure& before) {
                                  share(before.high - before.value, before.value));
   const double up = std::hypot(share(after.high - after.value, after.value),
                                share(before.value - before.low, before.value));
-  // No farther than where both ends go the same way, which bounds a small `after` more closely.
+  // Limited by the ratios of opposite ends, a tighter bound for a small `after`.
   ratio.low = std::max(after.low / before.high, ratio.value * (1.0 - down));
-  // A range before that may be nothing at all bounds no ratio.
+  // A range `before` that may be zero does not bound the ratio.
   if (before.low > 0.0)
     ratio.high = std::min(after.high / before.low, ratio.value / std::max(0.05, 1.0 - up));
   return ratio;

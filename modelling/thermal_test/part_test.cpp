@@ -20,7 +20,7 @@ namespace thermocomp::thermal_test {
 
 namespace {
 
-/// Student's t, 0.975, of 1, 2, ... degrees of freedom; beyond them that of the last.
+/// 0.975 quantile of Student's t for 1, 2, ... degrees of freedom; the last one holds beyond.
 constexpr std::array student{12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228};
 
 double student_t(std::size_t freedom) {
@@ -33,7 +33,7 @@ struct Pair {
   std::optional<double> warm;
 };
 using Repeats = std::map<std::string, Pair>;
-/// In the order of the sheet.
+/// A feature, in the order of the sheet.
 struct Feature {
   std::string name;
   std::vector<Repeats> axes;
@@ -50,7 +50,7 @@ class PartReader {
     problems_.throw_any();
   }
 
-  /// @param axes  out: letters of the columns that are there
+  /// @param axes  out: letters of the columns found
   std::vector<Feature> read(std::vector<std::string>& axes) {
     const std::size_t repeat = column("repeat");
     const std::size_t state = column("state");
@@ -164,7 +164,7 @@ PartFigures part_figures(const std::string& path) {
       sum += each.mean * each.mean;
       widest = std::max(widest, half);
     }
-    // Where each shift is wrong by no more than `widest`, so is their root mean square.
+    // If no shift is wrong by more than `widest`, neither is their root mean square.
     const double rms = std::sqrt(sum / static_cast<double>(measured.size()));
     axis.rms_um = {rms, std::max(0.0, rms - widest), rms + widest};
     figures.axes.push_back(axis);
@@ -221,7 +221,7 @@ std::vector<std::string> instructions(const PartSheet& sheet) {
        "measured stays empty.")};
 }
 
-/// Each feature's shift as a line from its lower to its upper bound, without and with compensation.
+/// Draws each feature's shift as a line between its bounds, without and with compensation.
 std::string picture(const PartTest& test) {
   const auto& [before, after, tolerance_um] = test;
   constexpr double left = 90.0;
@@ -302,7 +302,7 @@ nlohmann::json figures_json(const PartFigures& figures) {
   return result;
 }
 
-/// The shift whose interval reaches farthest from 0.
+/// The shift with the interval bound farthest from 0.
 const PartShift& farthest(const PartFigures& figures) {
   const auto reach = [](const PartShift& each) {
     return std::max(std::abs(each.shift_um.low), std::abs(each.shift_um.high));

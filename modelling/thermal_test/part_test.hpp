@@ -1,11 +1,11 @@
-/// A test part, or a probed artefact, cold and warm: how far heat moves its features.
+/// Test with a part or probed artefact, cold and warm: thermal shift of its features.
 ///
 ///   shift of a feature = mean over repeats of (deviation warm - deviation cold)
 ///
-/// What a feature deviates by itself, its clamping and the probe's calibration stand in both and go
-/// out. The repeats differ by all that differs from one warming to the next, so their scatter is
-/// the uncertainty: +- t(0.975, repeats - 1) * s / sqrt(repeats), s pooled over the features of an
-/// axis. Features of one repeat share its thermal state, so more of them give no more freedom.
+/// A feature's own deviation, its clamping and the probe's calibration cancel. The scatter of the
+/// repeats includes all differences between warm-ups and gives the uncertainty: +- t(0.975, repeats
+/// - 1) * s / sqrt(repeats), s pooled over the features of an axis. Features of one repeat share
+/// its thermal state, so they add no degrees of freedom.
 #pragma once
 
 #include <optional>
@@ -19,55 +19,55 @@ namespace thermocomp::thermal_test {
 struct PartShift {
   std::string feature;
   std::string axis;  ///< "X"
-  Figure shift_um;   ///< warm less cold, with its 95 % interval
+  Figure shift_um;   ///< warm minus cold, with its 95 % interval
 };
 
 struct PartAxis {
   std::string axis;
-  std::size_t repeats{0};  ///< the fewest of a feature
-  double repeat_sd_um{0};  ///< s: of one repeat's warm less cold
+  std::size_t repeats{0};  ///< smallest number of repeats of a feature
+  double repeat_sd_um{0};  ///< s, of one repeat's warm minus cold
   Figure rms_um;           ///< over the features
 };
 
-/// What the rows of one filled-in sheet give.
+/// Figures of one completed sheet.
 struct PartFigures {
   std::string file;
   std::vector<PartShift> shifts;
   std::vector<PartAxis> axes;
 };
 
-/// Whether every shift is within +-`tolerance_um`: kept where every interval is, exceeded where an
-/// interval lies outside as a whole, else undecided.
+/// Verdict on |shift| <= `tolerance_um`: kept if every interval is within, exceeded if one is
+/// entirely outside, else undecided.
 enum class Tolerance { kept, exceeded, undecided };
 [[nodiscard]] Tolerance tolerance_of(const PartFigures& figures, double tolerance_um);
 
-/// Reads columns repeat, state (cold or warm), feature and x_um, y_um, z_um as far as they are
-/// there; empty values are left out, and with them the feature's repeat.
+/// Reads columns repeat, state (cold or warm), feature and, if present, x_um, y_um, z_um; an empty
+/// value excludes the feature's repeat.
 /// @throws ConfigurationError naming file, line and rule
 [[nodiscard]] PartFigures part_figures(const std::string& path);
 
 struct PartSheet {
   int features{6};
   int repeats{3};
-  double hours{2.0};  ///< of warming
+  double hours{2.0};  ///< duration of the warm-up
 };
 
-/// A sheet to be filled in, which part_figures() reads; `as_page` for paper.
+/// A blank sheet for part_figures(); `as_page` for paper.
 /// @throws ConfigurationError naming the option
 [[nodiscard]] std::string part_sheet(const PartSheet& sheet, bool as_page);
 
-/// The two filled-in sheets, and the tolerance that they are judged by.
+/// The two completed sheets and the tolerance.
 struct PartTest {
   PartFigures before;
   std::optional<PartFigures> after;  ///< with compensation
   std::optional<double> tolerance_um;
 };
 
-/// One page to be signed: without and, where there is one, with compensation.
+/// One page for signature: without and, if present, with compensation.
 [[nodiscard]] std::string part_html(const PartTest& test);
 [[nodiscard]] std::string part_json(const PartTest& test);
-/// "Z: heat moves the 6 features by 21.3 um RMS (18.0 to 24.6); with compensation 3.1 ..."; first
-/// of all the verdicts by the tolerance.
+/// "Z: heat moves the 6 features by 21.3 um RMS (18.0 to 24.6); with compensation 3.1 ..."; the
+/// verdicts on the tolerance come first.
 [[nodiscard]] std::vector<std::string> part_sentences(const PartTest& test);
 
 }  // namespace thermocomp::thermal_test

@@ -33,14 +33,14 @@ std::string duration_words(double seconds) {
   return text;
 }
 
-/// "22", "1.5": a percentage is not known more exactly.
+/// "22", "1.5": a decimal only below 10 %.
 std::string percent(double share) {
   char text[32];
   std::snprintf(text, sizeof text, share < 0.0995 ? "%.1f" : "%.0f", 100.0 * share);
   return text;
 }
 
-/// In a column, what stands in brackets stays in one line.
+/// Keeps text in brackets on one line of a column.
 std::string cell_of(std::string words) {
   const std::size_t bracket = words.find('(');
   for (std::size_t at = words.find(" to "); bracket != std::string::npos && at != std::string::npos;
@@ -281,7 +281,7 @@ std::string method_part(const TestAnswer& answer) {
 
 std::string percent_words(const Figure& ratio) {
   const std::string words = percent(ratio.value) + " %";
-  // From a fraction of the figure to many times the other side: no figure at all.
+  // An interval from a fraction of the value to far above it gives no information.
   const bool is_wide = !(ratio.high <= 1.5);
   if (is_wide && !(ratio.low > 0.2 * ratio.value)) return words + " (noise alone may have made it)";
   if (std::isfinite(ratio.high))
@@ -297,7 +297,7 @@ std::string figure_words(const Figure& figure, const std::string& unit) {
 }
 
 std::string axis_sentence(const AxisFigures& axis, const TestPhases& phases) {
-  // Two positions of an axis come nearer or go apart.
+  // The distance between two positions of an axis changes.
   const bool is_distance = axis.name.find("growth") != std::string::npos;
   const std::string verb = axis.unit == "urad" ? " tilted by "
                            : is_distance       ? " changed by "

@@ -14,7 +14,7 @@
 namespace thermocomp::thermal_test {
 namespace {
 
-/// Of the largest speed: less is standing still, and no change.
+/// Share of the largest speed below which the machine stands still.
 constexpr double speed_share = 0.02;
 constexpr double moved_mm = 0.01;
 constexpr double urad_per_um_per_mm = 1000.0;
@@ -55,7 +55,7 @@ TestAxis axis_of(const RunFile& run, const AxisBinding& binding, const TestOptio
     char text[48];
     std::snprintf(text, sizeof text, ", %g mm apart", binding.distance_mm);
     axis.from.append(" less ").append(binding.less).append(text);
-    // Two probes, each with its noise.
+    // Noise of two probes.
     if (axis.noise >= 0.0) axis.noise *= std::sqrt(2.0) * urad_per_um_per_mm / binding.distance_mm;
   } else if (tilts) {
     axis.noise = -1.0;
@@ -65,7 +65,7 @@ TestAxis axis_of(const RunFile& run, const AxisBinding& binding, const TestOptio
   return axis;
 }
 
-/// Of a linear axis measured at two positions: how the distance between them grows.
+/// Adds the growth of the distance between two measured positions of a linear axis.
 void add_growths(const RunFile& run, const std::vector<AxisBinding>& bindings,
                  const TestOptions& options, std::vector<TestAxis>& axes) {
   if (options.kind != TestKind::axis) return;
@@ -73,8 +73,7 @@ void add_growths(const RunFile& run, const std::vector<AxisBinding>& bindings,
     if (second.axis.size() < 2 || second.axis[1] != '2') continue;
     for (const AxisBinding& first : bindings) {
       if (first.axis != second.axis.substr(0, 1) + "1") continue;
-      // Over a thousand millimetres a difference of micrometres has the same figure in
-      // microradians.
+      // Over 1000 mm, a difference in micrometres equals the angle in microradians.
       AxisBinding growth{second.axis, second.column, first.column, urad_per_um_per_mm};
       TestAxis axis = axis_of(run, growth, options);
       axis.name = axis_words(second.axis.substr(0, 1)) + ", growth from position 1 to 2";
@@ -98,7 +97,7 @@ std::optional<std::string> column_of_unit(const RunFile& run, std::string_view s
   return found;
 }
 
-/// Whether something ran, row by row; a missing value is what was before.
+/// Rows in which the machine ran; a missing value repeats the previous state.
 std::vector<bool> active_rows(const RunFile& run, const std::string& column) {
   const auto& values = run.column(column);
   const bool moves = kind_of(column) == QuantityKind::position;
@@ -156,7 +155,7 @@ void phases_from_column(const RunFile& run, const std::string& column, TestPhase
                 hours_text(phases.running_to_s) + ", as " + column + " says";
 }
 
-/// The column that says when it ran; empty: times say it.
+/// Column that shows when it ran; empty: given by times.
 std::string running_column(const RunFile& run, const TestOptions& options) {
   if (!options.running.empty()) {
     if (run.find(options.running)) return options.running;

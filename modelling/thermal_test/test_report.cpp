@@ -9,7 +9,7 @@ namespace thermocomp::thermal_test {
 
 namespace {
 
-/// Running or record times that differ by less are the same.
+/// Durations of running or record that differ by less count as equal.
 constexpr double same_length_share = 0.05;
 constexpr double room_difference_K = 1.0;
 

@@ -1,4 +1,4 @@
-/// What a test of thermal behaviour showed: a page, and JSON for programs.
+/// Report of a thermal test: HTML page, and JSON.
 #pragma once
 
 #include <optional>
@@ -10,13 +10,13 @@
 
 namespace thermocomp::thermal_test {
 
-/// An axis that both tests have. Where one ran shorter, both until then.
+/// An axis of both tests, compared up to the end of the shorter one.
 struct AxisRatio {
   std::string name;
   std::string unit;
-  Figure before;  ///< range until then, or of the whole record of the surroundings
+  Figure before;  ///< range until then; in a test of the environment, of the whole record
   Figure after;
-  Figure first_hour;  ///< of here on: after by before
+  Figure first_hour;  ///< this and the following: after / before
   Figure until_end;
   Figure whole;
 };
@@ -28,10 +28,10 @@ struct TestAnswer {
   std::optional<TestData> after;
   std::optional<TestFigures> after_figures;
   std::vector<AxisRatio> ratios;
-  std::vector<std::string> notes;  ///< what to bear in mind in a comparison
+  std::vector<std::string> notes;  ///< caveats of the comparison
 };
 
-/// Figures and, of two tests, their ratios.
+/// Figures and, for two tests, their ratios.
 [[nodiscard]] TestAnswer answer_of(TestData before, std::optional<TestData> after);
 
 [[nodiscard]] std::string report_html(const TestAnswer& answer);
@@ -41,7 +41,7 @@ struct TestAnswer {
 [[nodiscard]] std::string figure_words(const Figure& figure, const std::string& unit);
 /// "15 % (11 to 19)"
 [[nodiscard]] std::string percent_words(const Figure& ratio);
-/// A sentence or two on an axis, for a person.
+/// One or two sentences on an axis.
 [[nodiscard]] std::string axis_sentence(const AxisFigures& axis, const TestPhases& phases);
 
 }  // namespace thermocomp::thermal_test

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double rest_min = 15.0;
 constexpr double step_min = 30.0;
-/// Of the largest speed, one after the other: up, down and a rest, as in a working day.
+/// Successive shares of the largest speed: up, down and a rest, as in a working day.
 constexpr std::array<double, 8> step_shares{0.25, 0.5, 0.75, 1.0, 0.5, 0.0, 1.0, 0.75};
 constexpr double constant_share = 0.75;
 constexpr double rows_max = 2000.0;
@@ -136,7 +136,7 @@ std::vector<SheetStep> sheet_steps(const SheetOptions& options) {
     for (double from = rest_min; from < end_min; from += step_min)
       steps.push_back({from, std::min(end_min, from + step_min),
                        speed * step_shares[next++ % step_shares.size()]});
-    // A rest at the end would be cooling already.
+    // A final rest would already be cooling.
     if (steps.back().speed == 0.0) steps.back().speed = constant_share * speed;
   }
   if (options.cooling_h > 0.0) steps.push_back({end_min, end_min + 60.0 * options.cooling_h, 0.0});

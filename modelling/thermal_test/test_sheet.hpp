@@ -1,4 +1,4 @@
-/// A plan of a test as a sheet: what to do, and a row for each reading.
+/// Plan of a test as a sheet: instructions, and a row for each reading.
 #pragma once
 
 #include <string>
@@ -10,28 +10,28 @@ namespace thermocomp::thermal_test {
 
 struct SheetOptions {
   TestKind kind{TestKind::spindle};
-  double hours{4.0};          ///< of running, or of the whole environment's test
+  double hours{4.0};          ///< of running, or of a whole test of the environment
   double cooling_h{2.0};      ///< after running
-  double every_min{5.0};      ///< a reading
-  double rpm_max{0.0};        ///< of the spindle; 0: not given
-  bool steps{false};          ///< speeds in steps in place of one
-  double feed_mm_per_min{0};  ///< of the axis; 0: not given
+  double every_min{5.0};      ///< interval of readings
+  double rpm_max{0.0};        ///< spindle; 0: not given
+  bool steps{false};          ///< stepped speeds instead of one
+  double feed_mm_per_min{0};  ///< axis; 0: not given
   char moving{'x'};           ///< the axis that moves
 };
 
 struct SheetStep {
   double from_min{0.0};
   double to_min{0.0};
-  double speed{0.0};  ///< of the spindle or feed of the axis
+  double speed{0.0};  ///< spindle speed, or feed of the axis
 };
 
-/// What runs when: a quarter of an hour of rest, running, cooling.
+/// Schedule: a quarter of an hour of rest, running, cooling.
 /// @throws ConfigurationError naming the option
 [[nodiscard]] std::vector<SheetStep> sheet_steps(const SheetOptions& options);
 
-/// A run file to be filled in: `thermal-test report` reads it.
+/// A blank run file for `thermal-test report`.
 [[nodiscard]] std::string sheet_csv(const SheetOptions& options);
-/// The same for paper.
+/// Likewise for paper.
 [[nodiscard]] std::string sheet_html(const SheetOptions& options);
 
 }  // namespace thermocomp::thermal_test

@@ -41,13 +41,13 @@ struct ReportOptions {
   std::string after;
   std::string kind;
   TestOptions test;
-  std::optional<double> tolerance_um;  ///< of a part
+  std::optional<double> tolerance_um;  ///< for a part
   std::string columns;
   std::string output;
   std::string json;
 };
 
-/// Lines for a terminal: the sentences of the page.
+/// The page's sentences as lines for a terminal.
 std::string sentences(const TestFigures& figures) {
   std::string text = figures.file + "\n";
   for (const AxisFigures& axis : figures.axes)

@@ -1,4 +1,4 @@
-/// `thermocomp thermal-test plan|report`
+/// The command `thermocomp thermal-test plan|report`.
 #pragma once
 
 #include <functional>

@@ -20,7 +20,7 @@ using namespace thermocomp;
 using namespace thermocomp::thermal_test;
 using Catch::Matchers::Contains;
 
-/// A sheet on disk, gone with the object.
+/// A sheet on disk; the destructor removes it.
 class Sheet {
  public:
   explicit Sheet(const std::string& text)
@@ -41,12 +41,12 @@ const std::string head = "repeat,state,feature,x_um,z_um\n";
 
 }  // namespace
 
-TEST_CASE("shifts of a part and their intervals, by hand", "[part]") {
-  // P1 in Z: shifts 10 and 14, P2: 4 and 4. s^2 = (8 + 0) / 2; t of one degree of freedom: 12.706.
+TEST_CASE("shifts of a part and their intervals match the manual calculation", "[part]") {
+  // P1 in Z: shifts 10 and 14, P2: 4 and 4. s^2 = (8 + 0) / 2; t for one degree of freedom: 12.706.
   const Sheet sheet(head +
                     "1,cold,P1,,100\n1,cold,P2,,-3\n1,warm,P1,,110\n1,warm,P2,,1\n"
                     "2,cold,P1,,90\n2,cold,P2,,0\n2,warm,P1,,104\n2,warm,P2,,4\n"
-                    "3,cold,P1,,95\n");  // never warm: left out
+                    "3,cold,P1,,95\n");  // without warm: excluded
   const PartFigures figures = sheet.figures();
   REQUIRE(figures.axes.size() == 1);
   const PartAxis& axis = figures.axes.front();
@@ -62,7 +62,7 @@ TEST_CASE("shifts of a part and their intervals, by hand", "[part]") {
   CHECK(axis.rms_um.low == 0.0);
 }
 
-TEST_CASE("a tolerance is kept, exceeded or not decided by whole intervals", "[part]") {
+TEST_CASE("a tolerance is kept, exceeded or undecided by whole intervals", "[part]") {
   const auto figure = [](double low, double high) { return Figure{(low + high) / 2.0, low, high}; };
   PartFigures figures{
       "on.csv", {{"P1", "Z", figure(-2.0, 3.0)}, {"P2", "Z", figure(4.0, 8.0)}}, {}};
@@ -79,7 +79,7 @@ TEST_CASE("a tolerance is kept, exceeded or not decided by whole intervals", "[p
   CHECK_THAT(part_json(test), Contains("\"after\": \"undecided\""));
 }
 
-TEST_CASE("a sheet that cannot be judged names line, column and rule", "[part]") {
+TEST_CASE("an invalid sheet is reported with line, column and rule", "[part]") {
   const std::string cold = "1,cold,P1,,1\n";
   const auto says = [](const std::string& text, const std::string& words) {
     CHECK_THROWS_WITH(Sheet(text).figures(), Contains(words));
@@ -94,7 +94,7 @@ TEST_CASE("a sheet that cannot be judged names line, column and rule", "[part]")
   says("repeat,state,feature,length\n1,cold,P1,1\n1,warm,P1,2\n", "x_um, y_um, z_um");
 }
 
-TEST_CASE("the plan's sheet is what the report reads", "[part]") {
+TEST_CASE("the report reads the plan's sheet", "[part]") {
   std::string text = part_sheet({2, 2, 1.5}, false);
   CHECK_THAT(text, Contains("own load for 1.50 h") && Contains("finishing cut"));
   double value = 0.0;
@@ -106,8 +106,8 @@ TEST_CASE("the plan's sheet is what the report reads", "[part]") {
   CHECK_THAT(part_sheet({2, 2, 1.5}, true), Contains("signed for the user"));
 }
 
-TEST_CASE("intervals of a part hold on simulated days", "[part]") {
-  // A head that warms by its spindle and a column, in a room that is another each day.
+TEST_CASE("intervals of a part cover the truth on simulated days", "[part]") {
+  // A head warmed by its spindle and a column, in a room that differs each day.
   const std::string machine =
       "format = 1\npitch_s = 30.0\n[plant]\nstep_s = 10.0\n"
       "[[signal]]\nname = \"spindle_rpm\"\nkind = \"steps\"\ntimes_s = [0, 600]\nvalues = [0, "
@@ -124,7 +124,7 @@ TEST_CASE("intervals of a part hold on simulated days", "[part]") {
       "[[thermocouple]]\nname = \"head\"\nnode = \"head\"\nnoise_K = 0.05\n";
   const auto plant = parse_machine(machine, "machine.toml");
   constexpr std::array names{"x_um", "y_um", "z_um"};
-  /// Of one day: cold at 10 min, warm two hours later.
+  /// Displacements of one day: cold at 10 min, warm two hours later.
   const auto day = [&](std::uint64_t seed) {
     const RunFile run = simulate(plant, 7800.0, seed);
     std::array<std::array<double, 3>, 2> values{};

@@ -25,8 +25,7 @@ constexpr double running_s = 4.0 * 3600.0;
 constexpr double whole_s = rest_s + running_s + 2.0 * 3600.0;
 constexpr double distance_mm = 100.0;
 
-/// A spindle that warms within the hour and a column that takes several: X by both ends of a bar,
-/// Z.
+/// A spindle that warms within an hour and a column that takes several: X at both ends of a bar, Z.
 std::string machine_text(double noise_um, double share) {
   const auto gain = [share](double value) { return std::to_string(share * value); };
   const std::string noise = "noise_um = " + std::to_string(noise_um) + "\n";
@@ -63,7 +62,7 @@ TestOptions options_of(TestKind kind) {
   return options;
 }
 
-/// Largest less smallest of the truth, by another way than the report: row by row.
+/// Range of the truth, computed row by row independently of the report.
 double true_range(const std::vector<double>& time_s, const std::vector<double>& values,
                   double from_s, double to_s) {
   double low = std::numeric_limits<double>::infinity();
@@ -85,7 +84,7 @@ const AxisFigures& axis_called(const TestFigures& figures, const std::string& na
 struct Coverage {
   int figures{0};
   int within{0};
-  double width_share{0.0};  ///< mean of interval by value
+  double width_share{0.0};  ///< mean of interval / value
   void take(const Figure& figure, double truth) {
     REQUIRE(figure.is_there());
     ++figures;
@@ -115,10 +114,10 @@ void take_axis(Coverage& coverage, const AxisFigures& axis, const std::vector<do
 
 }  // namespace
 
-TEST_CASE("figures of a noisy test are within their intervals of the machine without noise",
+TEST_CASE("the intervals of a noisy test cover the figures of the machine without noise",
           "[thermal_test]") {
   Coverage coverage;
-  Coverage of_z;  // which moves by much more than its noise
+  Coverage of_z;  // moves by much more than its noise
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
     const RunFile truth = simulated(0.0, seed);
     const TestFigures figures =
@@ -135,11 +134,11 @@ TEST_CASE("figures of a noisy test are within their intervals of the machine wit
                                      << of_z.width_share / of_z.figures);
   CHECK(coverage.within == coverage.figures);
   CHECK(of_z.within == of_z.figures);
-  // An interval that says nothing would hold everything.
+  // Rejects intervals so wide that they cover everything.
   CHECK(of_z.width_share / of_z.figures < 0.2);
 }
 
-TEST_CASE("after by before, and the combined drift, are within their intervals", "[thermal_test]") {
+TEST_CASE("the intervals of ratios and of the combined drift cover the truth", "[thermal_test]") {
   Coverage ratios;
   Coverage of_z;
   Coverage together;
@@ -173,7 +172,7 @@ TEST_CASE("after by before, and the combined drift, are within their intervals",
   CHECK(of_z.width_share / of_z.figures < 0.3);
 }
 
-TEST_CASE("whether a machine has settled follows the shares of its last hour", "[thermal_test]") {
+TEST_CASE("whether a machine has settled is judged by its last hour's share", "[thermal_test]") {
   const auto data = [](double tau_s, double noise_um) {
     RunFile run;
     run.name = "exponential";
@@ -197,12 +196,12 @@ TEST_CASE("whether a machine has settled follows the shares of its last hour", "
   const AxisFigures slow = figures_of(data(20000.0, 0.2)).axes.at(0);
   REQUIRE(slow.settled);
   CHECK_FALSE(*slow.settled);
-  // exp(-5 h / tau) = 0.15: the noise decides, so nothing is said.
+  // exp(-5 h / tau) = 0.15: within the noise, so undecided.
   CHECK_FALSE(figures_of(data(18000.0 / std::log(1.0 / 0.15), 1.0)).axes.at(0).settled);
   CHECK_THAT(axis_sentence(slow, data(20000.0, 0.2).phases), Contains("had not settled"));
 }
 
-TEST_CASE("rare probings are figures too, with their own noise", "[thermal_test]") {
+TEST_CASE("rare probings also give figures, with their own noise", "[thermal_test]") {
   RunFile run = simulated(0.0, 3);
   auto& z = run.values[*run.find("z_um")];
   for (std::size_t i = 0; i < z.size(); ++i)
@@ -216,7 +215,7 @@ TEST_CASE("rare probings are figures too, with their own noise", "[thermal_test]
   CHECK(axis.until_end.high - axis.until_end.value == Approx(2.576 * std::sqrt(2.0) * 0.5));
 }
 
-TEST_CASE("values that are hours apart say nothing of an hour", "[thermal_test]") {
+TEST_CASE("values that are hours apart give no figure of an hour", "[thermal_test]") {
   RunFile run = simulated(0.0, 3);
   auto& z = run.values[*run.find("z_um")];
   const auto keep_every = [&](std::size_t rows) {
@@ -233,7 +232,7 @@ TEST_CASE("values that are hours apart say nothing of an hour", "[thermal_test]"
   CHECK(rare.whole.is_there());
 }
 
-TEST_CASE("an axis by a formula of two probes is the tilt that names give", "[thermal_test]") {
+TEST_CASE("an axis by a formula of two probes equals the tilt by names", "[thermal_test]") {
   const RunFile run = simulated(0.1, 5);
   TestOptions options = options_of(TestKind::spindle);
   const TestData named = test_data(run, options);
@@ -244,7 +243,7 @@ TEST_CASE("an axis by a formula of two probes is the tilt that names give", "[th
   CHECK(given.axes[0].unit == "urad");
 }
 
-TEST_CASE("of a history, axes that nobody measured are left out", "[thermal_test]") {
+TEST_CASE("unmeasured axes of a history are left out", "[thermal_test]") {
   RunFile run = simulated(0.0, 3);
   run.columns[*run.find("x1_um")] = "x_measured_um";
   run.columns[*run.find("x2_um")] = "z_measured_um";
@@ -257,7 +256,7 @@ TEST_CASE("of a history, axes that nobody measured are left out", "[thermal_test
   const TestData data = test_data(run, options_of(TestKind::spindle));
   REQUIRE(data.axes.size() == 1);
   CHECK(data.axes[0].from == "z_measured_um");
-  // Where what was measured has no values, the displacement of that name is the axis.
+  // Without measured values, the displacement of that name is used.
   for (double& value : run.values[z]) value = std::nan("");
   CHECK(test_data(run, options_of(TestKind::spindle)).axes.at(0).from == "z_um");
   for (double& value : run.values[*run.find("z_um")]) value = std::nan("");
@@ -265,7 +264,7 @@ TEST_CASE("of a history, axes that nobody measured are left out", "[thermal_test
                     Contains("has two values") && Contains("thermocomp measured AXIS UM"));
 }
 
-TEST_CASE("what is not clear is asked for by the option to write", "[thermal_test]") {
+TEST_CASE("an ambiguous record is refused with the option that resolves it", "[thermal_test]") {
   RunFile run = simulated(0.1, 1);
   TestOptions options = options_of(TestKind::spindle);
   options.axes = {"z=z_mm"};
@@ -289,7 +288,7 @@ TEST_CASE("what is not clear is asked for by the option to write", "[thermal_tes
                     Contains("it has ch1_um, ch2_um, ch5_um: say which is which, --axis z=COLUMN"));
 }
 
-TEST_CASE("a linear axis: positions by names, and how far they grow apart", "[thermal_test]") {
+TEST_CASE("a linear axis: positions by names, and the growth of their distance", "[thermal_test]") {
   RunFile run = simulated(0.1, 2);
   TestOptions options = options_of(TestKind::axis);
   options.running = "595:15000";
@@ -301,7 +300,8 @@ TEST_CASE("a linear axis: positions by names, and how far they grow apart", "[th
         Approx(run.column("x2_um")[50] - run.column("x1_um")[50]));
 }
 
-TEST_CASE("the surroundings: the whole record and the hour with most", "[thermal_test]") {
+TEST_CASE("the environment: the whole record and the hour with the largest range",
+          "[thermal_test]") {
   const RunFile run = simulated(0.2, 9);
   const TestAnswer answer = answer_of(test_data(run, options_of(TestKind::environment)), {});
   const AxisFigures& z = axis_called(answer.before_figures, "Z");
@@ -311,12 +311,12 @@ TEST_CASE("the surroundings: the whole record and the hour with most", "[thermal
   CHECK_THAT(report_html(answer), Contains("hour with most"));
 }
 
-TEST_CASE("a sheet that was filled in is read as it is", "[thermal_test]") {
+TEST_CASE("a completed sheet is read unchanged", "[thermal_test]") {
   SheetOptions sheet;
   sheet.rpm_max = 8000.0;
   sheet.steps = true;
   std::string text = sheet_csv(sheet);
-  // Somebody types: every row's empty fields become numbers.
+  // Fills in numbers for every row's empty fields.
   std::string filled;
   int row = 0;
   std::size_t at = 0;
@@ -339,7 +339,7 @@ TEST_CASE("a sheet that was filled in is read as it is", "[thermal_test]") {
   CHECK_THAT(sheet_html(sheet), Contains("What runs when"));
 }
 
-TEST_CASE("page and JSON say the figures in words, and nothing loads from elsewhere",
+TEST_CASE("page and JSON contain the figures in words, and load nothing from elsewhere",
           "[thermal_test]") {
   const TestAnswer answer =
       answer_of(test_data(simulated(0.4, 1), options_of(TestKind::spindle)),
