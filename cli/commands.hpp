@@ -1,5 +1,4 @@
-/// Command line of `thermocomp`. `--help`, the manual page and the shell completion are generated
-/// from these declarations.
+/// Command line of `thermocomp`. Also the source of `--help`, manual page and shell completion.
 #pragma once
 
 #include "report/command.hpp"
@@ -9,8 +8,6 @@ namespace thermocomp::cli {
 /// Declares the global options and all subcommands. Parsing sets `action`.
 /// @param global, action  must outlive parsing and the action
 void declare_command_line(CLI::App& app, GlobalOptions& global, Action& action);
-
-// Groups of commands, one folder each.
 
 /// init: creates a configuration that passes `check` by asking and scanning.
 void add_init_command(CLI::App& app, Action& action);

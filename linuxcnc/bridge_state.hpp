@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/// State of the bridge's output pins, from the daemon's answers and the input pins. No I/O; time is
-/// an argument.
+/// State of the bridge's output pins from answers and input pins. No I/O; time is an argument.
 #pragma once
 
 #include <chrono>
@@ -34,8 +33,7 @@ struct Outputs {
 };
 
 /// Offsets change only by answers. A new epoch starts from the applied offset, to avoid a jump.
-/// While LinuxCNC takes no offsets, zero is requested, so that no old offset is applied when it
-/// takes them again.
+/// While LinuxCNC takes no offsets, zero is requested, so that it later finds no old one.
 class BridgeState {
  public:
   BridgeState(std::size_t axes, const Limits& limits);

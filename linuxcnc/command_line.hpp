@@ -18,7 +18,6 @@ struct BridgeOptions {
   Limits limits;
 };
 
-/// Task: run as a bridge, or print a HAL file.
 struct Task {
   bool print_hal{false};
   BridgeOptions bridge;

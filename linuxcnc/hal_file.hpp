@@ -9,7 +9,6 @@
 
 namespace thermocomp_linuxcnc {
 
-/// Where the offset is added.
 enum class Way {
   joint,    ///< between motion and drive, by the component `offset`
   external  ///< by LinuxCNC's external offsets, through a gate

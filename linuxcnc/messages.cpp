@@ -16,8 +16,7 @@ json number(double value) {
   return std::isfinite(value) ? json(value) : json(nullptr);
 }
 
-/// Refuses deep nesting, since JSON values are copied and destroyed recursively. Brackets in
-/// strings do not count.
+/// Refuses deep nesting, since JSON is destroyed recursively; ignores brackets in strings.
 bool is_flat(std::string_view line) {
   constexpr int depth_max = 16;
   int depth = 0;

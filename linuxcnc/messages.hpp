@@ -53,7 +53,6 @@ struct MachineView {
   return type == MotionType::feed || type == MotionType::arc || type == MotionType::probe;
 }
 
-/// An answer that must not be used.
 class BadAnswer : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

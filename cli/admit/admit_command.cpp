@@ -151,7 +151,6 @@ class Admission {
                    "checksum");
   }
 
-  /// Checks a release that is new to this machine.
   void receive() {
     std::string found;
     const std::string why = why_refused(found);
@@ -187,8 +186,7 @@ class Admission {
     order.takes_back = takes_back;
     return signer_of(order, signature, settings_.approvers);
   }
-  /// Origin of a change not made by this run: a signed order, interrupted before it was noted, or
-  /// an operator.
+  /// Origin of a change not made by this run: an interrupted signed order, or an operator.
   [[nodiscard]] std::string done_by(bool takes_back) const {
     const std::string name = signer(takes_back);
     return name.empty() ? "by an operator at the machine" : "as ordered by " + name;

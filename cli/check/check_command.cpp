@@ -153,8 +153,7 @@ std::string text_of(const DaemonConfig& config, const AxisSpan& span) {
 }
 
 /// One line for each axis whose controller interpolates: the largest deviation of its line or table
-/// from the model's curve when one temperature, or all of them, are 10 K warmer. Empty: no such
-/// axis.
+/// from the model's curve when one temperature or all are 10 K warmer. Empty: none.
 std::string travel_deviation_text(const DaemonConfig& config) {
   std::string text;
   for (const AxisSpan& span : axis_spans(config.estimator.axes))
@@ -204,7 +203,6 @@ std::string list_axes(const DaemonConfig& config) {
   return result;
 }
 
-/// Sensors that no input of the model uses; empty: none.
 std::string unused_sensors_text(const EstimatorConfig& config) {
   std::string names;
   for (std::size_t i = 0; i < config.sensors.size(); ++i) {

@@ -1,5 +1,4 @@
-/// Reads the daemon's answers: an absent, null or wrongly typed field gives NaN, empty, zero or
-/// false.
+/// Reads the daemon's answers: an absent or wrongly typed field gives NaN, empty, 0 or false.
 #pragma once
 
 #include <cstdint>

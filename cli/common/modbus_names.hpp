@@ -1,5 +1,4 @@
-/// Display names of Modbus values, lines and exceptions, with configuration keywords where they
-/// exist.
+/// Display names of Modbus values, lines and exceptions, by configuration keywords if any.
 #pragma once
 
 #include <string>
@@ -18,8 +17,7 @@ namespace thermocomp::cli {
 [[nodiscard]] std::string type_name(const ModbusValue& value);
 /// Returns the value with an unsigned encoding, for counts and bit fields.
 [[nodiscard]] ModbusValue without_sign(ModbusValue value) noexcept;
-/// Meaning and unit of a value of a travel's set: "slope" in "um/m", "offset at 400 mm" in "um",
-/// ...
+/// Meaning and unit of a value of a travel's set: "slope" in "um/m", "offset at 400 mm" in "um".
 struct TravelValueText {
   std::string what;
   std::string unit;

@@ -142,7 +142,6 @@ std::optional<ClockShift> clock_shift(const RunFile& first, const RunFile& secon
 
 namespace {
 
-/// Rows closer than this share one time.
 constexpr double same_moment_s = 0.001;
 constexpr double gap_s_min = 60.0;
 constexpr double gap_steps = 3.0;

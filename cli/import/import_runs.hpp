@@ -22,9 +22,8 @@ struct ClockShift {
 
 /// Finds the pair of columns and the shift k with the largest |r|, over all shifts with at least a
 /// third of the shorter recording in common. a and b are the changes of a column over a fortieth of
-/// the shorter recording:
-/// r(k) = sum a_i b_(i-k) / sqrt(A B), A = (sum of a_i^2 in common + sum of all a_i^2) / 2, B
-/// likewise.
+/// the shorter recording: r(k) = sum a_i b_(i-k) / sqrt(A B), A = (sum of common a_i^2 + sum of all
+/// a_i^2) / 2, B likewise.
 /// @return nullopt if no column of either recording changes
 [[nodiscard]] std::optional<ClockShift> clock_shift(const RunFile& first, const RunFile& second);
 

@@ -45,7 +45,6 @@ class Questions {
 
 /// Queries to the machine during the interview.
 struct InitEyes {
-  /// Units that answer on a bus.
   std::function<std::vector<int>(const InitBus&)> find_units;
   /// One line for each preset that contains the word.
   std::function<std::vector<std::string>(const std::string&)> preset_lines;
@@ -58,7 +57,6 @@ struct InitEyes {
 void ask_for_rest(InitDraft& draft, bool has_controller, Questions& questions,
                   const InitEyes& eyes);
 
-/// Signals that the model needs and the draft lacks.
 [[nodiscard]] std::vector<std::string> missing_signals(const InitDraft& draft);
 
 /// "3" and channel 2 -> "m3_2"; with several buses "b2m3_2".

@@ -72,7 +72,6 @@ struct InitDraft {
   std::string model_file{"model.toml"};  ///< relative to the configuration
   /// Inputs of an existing model; each must be the name of a sensor with `_degC`.
   std::vector<std::string> model_inputs;
-  /// Signals that the model reads from the controller.
   std::vector<std::string> model_signals;
   std::vector<std::string> model_outputs;
   double offset_um_max{5.0};
@@ -87,7 +86,6 @@ struct InitDraft {
 [[nodiscard]] std::string bus_text(const InitBus& bus);
 /// "bed" -> "bed_degC".
 [[nodiscard]] std::string input_name(const std::string& sensor);
-/// Configuration with comments.
 [[nodiscard]] std::string configuration_text(const InitDraft& draft);
 /// Initial model without any displacement, with all sensors and axes.
 [[nodiscard]] std::string first_model_text(const InitDraft& draft);

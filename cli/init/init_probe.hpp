@@ -22,8 +22,7 @@ namespace thermocomp::cli {
 /// Checks the draft as the daemon would. @throws Failure with every problem
 void check_draft(const InitDraft& draft, const std::filesystem::path& folder);
 
-/// Fills in the channels of the module's preset if it has none, and removes those without a
-/// temperature.
+/// Fills in the preset's channels if the module has none; removes those without a temperature.
 /// @return one line for each channel. @throws Failure
 std::vector<std::string> try_module(const InitDraft& draft, InitModule& module,
                                     const std::filesystem::path& folder);

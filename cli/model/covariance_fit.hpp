@@ -1,5 +1,4 @@
-/// Estimates from records the covariance of a model's inputs and the errors of lost inputs'
-/// estimates.
+/// Fits to records the covariance of a model's inputs and the errors of lost inputs' estimates.
 #pragma once
 
 #include <span>
@@ -34,8 +33,8 @@ struct CovarianceFit {
 [[nodiscard]] CovarianceFit fit_covariance(std::span<const RunFile> runs,
                                            const std::vector<std::string>& inputs);
 
-/// Replaces the `[covariance]` table in the text of a model file; the rest, with its comments, is
-/// kept if possible.
+/// Replaces the `[covariance]` table in the text of a model file; keeps the rest, with comments, if
+/// possible.
 /// @param model  model of the text, with the new covariance
 [[nodiscard]] std::string with_covariance(const std::string& text, const ThermalModel& model);
 

@@ -30,8 +30,7 @@ struct FurthestRow {
   double high{0.0};
 };
 
-/// The selected rows with every input and, if the run file has measured outputs, at least one
-/// measured value.
+/// The selected rows with every input and, if outputs were measured, at least one measured value.
 struct Prediction {
   std::vector<double> time_s;
   std::vector<double> outside;  ///< 1: outside the model's domain; empty: unknown
@@ -45,7 +44,6 @@ struct Prediction {
 /// @throws ConfigurationError if a column of the model is missing or empty
 [[nodiscard]] Prediction predict(const ThermalModel& model, const RunFile& run);
 
-/// Share of the rows outside the model's domain.
 [[nodiscard]] double outside_share(const Prediction& prediction);
 
 /// A sentence with the furthest row's distance and column; empty if every row is inside.

@@ -199,7 +199,6 @@ std::string model_error_lines(const ModelStatus& model) {
   return text;
 }
 
-/// Origin, time and temperature range of the reference.
 std::string reference_line(const ReferenceStatus& reference) {
   double low = not_a_number;
   double high = not_a_number;
@@ -254,7 +253,6 @@ std::string history_line(const HistoryStatus& history) {
   return line("History", text);
 }
 
-/// Last columns of a sensor's line.
 std::string sensor_state(const SensorStatus& sensor, bool colours) {
   // An out-of-range reading is NaN only if the value read was.
   const bool is_nan = sensor.fault == Fault::out_of_range && std::isnan(sensor.raw_degC);

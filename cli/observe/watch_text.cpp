@@ -33,7 +33,6 @@ void AxisTrends::add(const Status& status) {
   if (!std::isfinite(now_s)) return;
   for (const AxisStatus& axis : status.axes) {
     std::deque<Sample>& samples = axes_[axis.name];
-    // The daemon has restarted.
     if (!samples.empty() && now_s < samples.back().time_s) samples.clear();
     if (std::isfinite(axis.offset)) samples.push_back({now_s, axis.offset});
     while (!samples.empty() && samples.front().time_s < now_s - window_s) samples.pop_front();

@@ -15,7 +15,6 @@
 
 namespace thermocomp::cli {
 
-/// Recent offsets of each axis.
 class AxisTrends {
  public:
   static constexpr std::size_t cells = 16;
@@ -26,8 +25,7 @@ class AxisTrends {
 
   /// The sample's time is the status' uptime.
   void add(const Status& status);
-  /// "▁▂▃▅▇ ↗": oldest sample left, scaled to the window's range; empty with fewer than two
-  /// samples.
+  /// "▁▂▃▅▇ ↗": oldest sample left, scaled to the window's range; empty below two samples.
   [[nodiscard]] std::string text(const std::string& axis) const;
 
  private:

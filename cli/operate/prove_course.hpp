@@ -16,13 +16,11 @@ class ProveCourse {
 
   void take(const nlohmann::json& axis);
 
-  /// The daemon has ended the move.
   [[nodiscard]] bool over() const noexcept { return begun_ && !proving_; }
   /// The read-back has returned to its initial value; true without read-back.
   [[nodiscard]] bool is_back() const noexcept;
   /// The move has ended and the read-back has returned to within a register's resolution.
   [[nodiscard]] bool is_settled() const noexcept;
-  /// Moved as asked and came back.
   [[nodiscard]] bool passed() const noexcept { return went() && over() && is_back(); }
   /// "sent +3.20 um, read back +3.15 um", both relative to the start
   [[nodiscard]] std::string progress() const;

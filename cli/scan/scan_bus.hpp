@@ -23,8 +23,7 @@ struct ScanSensors {
   std::vector<double> stale_after_s;
 };
 
-/// Waiting for another value is worthwhile: the last second brought none, and the last is not stale
-/// yet.
+/// Another value may come: the last second brought none, and the last is not stale yet.
 [[nodiscard]] bool may_come_again(nanoseconds taken_at, double stale_after_s, nanoseconds end,
                                   nanoseconds now);
 /// Marks a value as stale by the daemon's rule.
@@ -57,7 +56,6 @@ struct ScanTask {
 [[nodiscard]] ScanBus scan_bus(const J1939BusConfig& config, const ScanSensors& sensors,
                                const ScanTask& task);
 
-/// Another process that holds a serial port open.
 struct SerialHolder {
   std::string name;       ///< "thermocompd (process 812)"; empty: none, or not visible
   bool is_daemon{false};  ///< the process is thermocompd

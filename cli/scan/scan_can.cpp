@@ -18,7 +18,6 @@
 namespace thermocomp::cli {
 namespace {
 
-/// Frames received while listening.
 struct Heard {
   FrameCounts frames;
   std::vector<std::optional<CanFrame>> of_signal;  ///< newest frame with the signal

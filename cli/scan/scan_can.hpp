@@ -12,7 +12,6 @@
 
 namespace thermocomp::cli {
 
-/// Number of frames received, by identifier.
 using FrameCounts = std::map<CanId, std::size_t>;
 /// "identifiers on the bus: 0x281 (5) ..."
 [[nodiscard]] std::string heard_text(const FrameCounts& frames);

@@ -27,7 +27,6 @@ namespace {
 
 constexpr int tries_max = 2;
 
-/// A controller register with its displayed value.
 struct Place {
   ModbusValue value;
   ScanValue shown;

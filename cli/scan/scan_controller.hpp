@@ -9,8 +9,7 @@
 
 namespace thermocomp::cli {
 
-/// Reads every configured value, including those that the daemon writes. Listens to a controller on
-/// CAN.
+/// Reads every configured value, also those that the daemon writes. On CAN it only listens.
 ///
 /// To test whether a Modbus controller accepts writes, the registers' present values are written
 /// back as the daemon would. This moves nothing if every axis already applies the value in its

@@ -33,7 +33,6 @@ std::string place_of(const ModbusChannel& channel) {
   return text;
 }
 
-/// Result for a device from which nothing could be read.
 ScanDevice without_answer(const ModbusDeviceConfig& device, const ScanSensors& sensors,
                           const std::string& why) {
   ScanDevice result{device.name, "unit " + std::to_string(device.unit), false, why, {}};
@@ -46,7 +45,6 @@ ScanDevice without_answer(const ModbusDeviceConfig& device, const ScanSensors& s
   return result;
 }
 
-/// Words read with one exchange.
 struct Answer {
   Exchange exchange;
   std::vector<std::uint16_t> words;
@@ -131,8 +129,8 @@ std::string ModbusScan::describe(const ModbusDeviceConfig& device, const Exchang
   return exchange.detail;
 }
 
-/// Polls until every device was asked for every value. A busy device is asked again, for as long as
-/// a reading may be old.
+/// Polls until every value was requested; retries a busy device for as long as a reading may be
+/// old.
 void ModbusScan::ask_as_the_daemon() {
   progress_("bus " + config_.name + ": asking its devices as the daemon does");
   const std::size_t count = config_.devices.size();

@@ -102,8 +102,7 @@ struct PlausibleRange {
   double max_degC{200.0};
 };
 
-/// The temperature is within range, and not a float so close to 0 that it must be another number in
-/// the wrong byte order.
+/// Within range, and not a float so close to 0 that its byte order must be wrong.
 [[nodiscard]] bool is_plausible(const ModbusChannel& channel, double temp_degC,
                                 const PlausibleRange& range);
 

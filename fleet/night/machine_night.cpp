@@ -132,8 +132,7 @@ bool was_unusual(pqxx::connection& store, const MachineNight& night) {
   return !before.empty() && before[0][0].as<bool>();
 }
 
-/// Runs `diagnose` with the model in use, trained on the three nights before and tested on this
-/// one.
+/// Runs `diagnose` with the model in use: trains on the three nights before, tests this one.
 nlohmann::json diagnosed(pqxx::connection& store, const MachineNight& night,
                          const WorkFolder& folder, const fs::path& run) {
   pqxx::nontransaction work(store);
@@ -357,8 +356,8 @@ struct Ready {
   std::string statistics;
 };
 
-/// Creates missing minute means of a past night; `--slurm` needs the series before the nights'
-/// tasks create them.
+/// Creates missing minute means of a past night; with `--slurm` the series need them before the
+/// tasks.
 constexpr const char* make_missing_minutes =
     "SELECT fleet.make_minutes($1, $2::date) FROM fleet.uplink WHERE machine = $1 AND NOT EXISTS"
     " (SELECT FROM fleet.minute WHERE machine = $1 AND at >= $2::date AND at < $2::date + 1)"

@@ -1,5 +1,4 @@
-/// `thermocomp-fleet night`: compares each machine's past days with its sisters and its own past,
-/// by modelling commands.
+/// `thermocomp-fleet night`: compares each machine's past days with sisters and own past.
 #pragma once
 
 #include <string>

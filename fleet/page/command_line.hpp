@@ -1,5 +1,4 @@
-/// Command line of `thermocomp-fleet-page`; `--help`, manual page and completion are generated from
-/// it.
+/// Command line of `thermocomp-fleet-page`, also the source of manual page and completion.
 #pragma once
 
 #include <string>

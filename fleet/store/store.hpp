@@ -9,8 +9,7 @@
 
 namespace thermocomp::fleet {
 
-/// Adds defaults to `conninfo`: TLS with a verified name (not for a Unix socket), timeouts, and
-/// `more`.
+/// Adds defaults to `conninfo`: verified TLS (not for a Unix socket), timeouts, and `more`.
 /// @param conninfo  of libpq: "host=... dbname=..." or a URL
 /// @throws std::invalid_argument if it cannot be parsed
 [[nodiscard]] std::string complete_conninfo(const std::string& conninfo,

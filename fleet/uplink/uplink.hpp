@@ -25,8 +25,7 @@ class Pace {
   /// @param ending  blocked signals that end a sleep
   Pace(double cpu_percent_max, const sigset_t& ending)
       : rest_per_work_(100.0 / cpu_percent_max - 1.0), ending_(ending) {}
-  /// Sleeps in proportion to the CPU time since the last call; cheap if that is little. @throws
-  /// Stopped
+  /// Sleeps in proportion to the CPU time since the last sleep. @throws Stopped
   void rest();
   /// @throws Stopped
   void sleep(std::chrono::duration<double> time) const;
@@ -42,8 +41,7 @@ class Uplink {
  public:
   Uplink(const UplinkSettings& settings, Pace& pace);
 
-  /// Sends new data of all histories. After an error the next call reconnects and continues from
-  /// the store's progress.
+  /// Sends new data of all histories. After an error the next call reconnects and resumes.
   /// @return there was new data. @throws pqxx::failure, HistoryError, Stopped
   bool send_new();
   /// Closes the connection; the next send_new() reconnects.

@@ -1,5 +1,4 @@
-/// All-pairs plans: every two levels of every two factors occur together in some test, unless
-/// forbidden.
+/// All-pairs plans: all pairs of levels of two factors occur in some test, unless forbidden.
 #pragma once
 
 #include <cstddef>

@@ -25,8 +25,7 @@ struct Design {
 [[nodiscard]] std::vector<Design> array_variants(std::string_view name);
 
 /// Columns of the array for factors with the given numbers of levels, in their order. A factor with
-/// fewer levels than its column repeats its first levels ("dummy levels"). Empty rows: does not
-/// fit.
+/// fewer levels than its column repeats its first levels ("dummy levels"). No rows: does not fit.
 struct FittedArray {
   Design design;
   bool dummy_levels{false};

@@ -59,8 +59,7 @@ const char* how_to_cut(Cutting cutting) {
              : "Actual cutting: a workpiece is cut in every cycle.";
 }
 
-/// JP7689460B2: the number of machining passes is that of the rough cuts; the distance is measured
-/// after the finishing cut.
+/// JP7689460B2: machining passes are rough cuts; the distance is measured after the finishing cut.
 std::string cycle_of(const TestPlan& plan, std::size_t test) {
   const TestSpec& spec = plan.spec.test;
   const std::string cuts = spec.rough_cuts_factor ? level_of(plan, test, *spec.rough_cuts_factor)

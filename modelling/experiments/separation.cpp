@@ -101,7 +101,6 @@ void add_moves(const Columns& of, std::vector<Move>& moves) {
   std::vector<Eigen::Index> left(of.names.size());
   std::iota(left.begin(), left.end(), 0);
   while (!left.empty()) {
-    // Group of the first remaining column.
     std::vector<Eigen::Index> group;
     std::copy_if(left.begin(), left.end(), std::back_inserter(group), [&](Eigen::Index each) {
       return each == left.front() || std::abs(correlation(of, left.front(), each)) > alike;

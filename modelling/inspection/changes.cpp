@@ -20,8 +20,7 @@ using Eigen::VectorXd;
 
 // Delays of the inputs: places of a spindle respond minutes to an hour apart.
 constexpr std::array<double, 2> lags_s{600.0, 3600.0};
-// Response to one kelvin of a neighbour: about a kelvin of a reading, some tens of um of
-// displacement.
+// Response to one kelvin of a neighbour: about 1 K of a reading, some tens of um.
 constexpr double prior_K_per_K = 1.0;
 constexpr double prior_um_per_K = 20.0;
 constexpr Index rows_min = 40;  // per run, needed for the remainder's colour
@@ -86,7 +85,6 @@ Inputs inputs_of(const Recording& recording) {
   return inputs;
 }
 
-/// A target's rows and its expectation on them.
 struct Judged {
   std::vector<Index> rows;  ///< rows of the recording
   std::vector<Index> begins;
@@ -126,8 +124,7 @@ std::optional<Judged> judge(const Recording& recording, const Inputs& inputs,
   return judged;
 }
 
-/// Usual level of the column: median over windows of the largest |z|, relative to normal noise; at
-/// least 1.
+/// Usual level of the column: median over windows of the largest |z|, relative to normal noise.
 double wildness(const std::vector<Expectation::Evidence>& steps) {
   std::vector<double> largest;
   const std::size_t length = std::max<std::size_t>(8, steps.size() / windows);

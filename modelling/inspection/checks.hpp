@@ -1,5 +1,4 @@
-/// Checks of inspect(). Each gives findings with a `score`, which inspect() converts to a
-/// probability.
+/// Checks of inspect(). They give a `score`, which inspect() converts to a probability.
 #pragma once
 
 #include <functional>

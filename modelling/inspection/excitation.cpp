@@ -19,7 +19,6 @@ constexpr double structure_s = 900.0;       // response time of a structure to a
 constexpr double own_share_min = 0.1;       // of its variance not explained by other signals
 constexpr int changes_min = 2;              // up and down
 
-/// Subtracts each run's mean.
 MatrixXd from_means(const Recording& recording, MatrixXd columns) {
   for (std::size_t r = 0; r < recording.runs(); ++r) {
     auto rows =

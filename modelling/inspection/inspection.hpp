@@ -1,6 +1,5 @@
 /// Inspection of recordings before any model: sampling, each reading compared with its neighbours
-/// and its own past, and identifiable inputs. docs/inspection.md describes the method and the
-/// origin of each number.
+/// and its own past, and identifiable inputs. Method and constants: docs/inspection.md.
 #pragma once
 
 #include <functional>
@@ -25,8 +24,7 @@ struct Cleaned {
 };
 
 /// Removes findings of at least `probability_min`: spikes and outliers become the median of their
-/// neighbours; a step or drift is subtracted; stuck or loose readings are set to missing from there
-/// on.
+/// neighbours; a step or drift is subtracted; stuck or loose readings become missing.
 [[nodiscard]] Cleaned cleaned(const std::vector<RunFile>& runs, const Inspection& inspection,
                               double probability_min = 0.9);
 

@@ -10,8 +10,7 @@
 namespace thermocomp::inspection {
 namespace {
 
-/// Plots one column over the run's hours, with the finding's stretch shaded and its moments as
-/// dots.
+/// Plots one column over the run's hours, with the finding's stretch and moments marked.
 std::string picture(const RunFile& run, const std::string& column, double from_s, double to_s,
                     const Finding& finding) {
   const auto& time_s = run.time_s();

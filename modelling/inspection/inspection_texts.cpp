@@ -11,7 +11,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Rounds to four significant digits.
 double rounded(double value) {
   if (!(std::abs(value) > 0) || !std::isfinite(value)) return value;
   const double scale = std::pow(10.0, 3.0 - std::floor(std::log10(std::abs(value))));
@@ -35,7 +34,6 @@ Json json_of(const Finding& finding, const Inspection& inspection) {
   return json;
 }
 
-/// Two significant digits.
 std::string two_digits(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.2g", value);

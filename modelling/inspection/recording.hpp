@@ -38,7 +38,6 @@ struct Recording {
 
 // Gaps: stretches of a recording without a row or a value.
 
-/// Time steps between rows [s].
 [[nodiscard]] std::vector<double> steps_of(const RunFile& run);
 /// Nine of ten rows are one step apart, within a fifth.
 [[nodiscard]] bool is_regular(const std::vector<double>& steps, double step_s);

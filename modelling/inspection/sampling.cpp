@@ -24,7 +24,6 @@ bool goes_on(const RunFile& run, std::size_t row) {
     const double usual = median(moves);
     const double over = std::abs(values[row] - values[row - 1]);
     if (!std::isfinite(over)) continue;
-    // A constant reading gives no information.
     if (!(usual > 0)) continue;
     ++judged;
     if (over > 5.0 * usual) return false;
@@ -45,8 +44,7 @@ std::vector<Span> gaps_of(const RunFile& run, const std::vector<double>& column)
   return gaps;
 }
 
-/// The column has values in at least half of the rows; displacements are often probed only
-/// occasionally.
+/// The column has values in at least half of the rows, unlike occasional probings.
 bool is_dense(const RunFile& run, std::size_t column) {
   const std::vector<double>& values = run.values[column];
   const auto count = std::count_if(values.begin(), values.end(),

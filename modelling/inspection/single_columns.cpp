@@ -54,7 +54,6 @@ bool comes_back(const std::vector<double>& values, std::size_t row, double leap)
   return std::abs(median({at + 1, at + 1 + after}) - median({at - before, at})) < std::abs(leap);
 }
 
-/// Robust deviation of the jumps in the surrounding rows.
 double deviation_nearby(const std::vector<double>& leaps, std::size_t row) {
   const std::size_t begin = row - std::min(nearby, row);
   const std::size_t end = std::min(leaps.size(), row + nearby + 1);
@@ -111,8 +110,7 @@ double range_of(const std::vector<double>& values, StillRows rows) {
   return high > low ? high - low : 0.0;
 }
 
-/// A signal has the same value throughout, so the reading is controlled to a setpoint. 0 is too
-/// common to count.
+/// A signal has the same value throughout: the reading is at a setpoint. 0 is too common to count.
 bool is_held(const RunFile& run, std::size_t column, StillRows rows) {
   const double value = run.values[column][rows.begin];
   return value != 0 && std::any_of(run.columns.begin(), run.columns.end(), [&](const auto& name) {

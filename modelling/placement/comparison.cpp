@@ -136,7 +136,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Formats like printf.
 template <class... Values>
 std::string line(const char* format, Values... values) {
   char text[512];

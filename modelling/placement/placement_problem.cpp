@@ -12,8 +12,7 @@ namespace {
 using structure::Structure;
 using structure::StructureSpec;
 
-/// Adds the sensitivity rows by curves; a guideway's rows include those of its output, as in the
-/// daemon.
+/// Adds sensitivities by curve; a guideway's rows include those of its output, as in the daemon.
 void add_curves(const StructureSpec& spec, const std::vector<Numbers>& sensitivities,
                 PlacementProblem& problem) {
   const auto add_row = [&](const std::vector<const Numbers*>& parts, double weight) {
@@ -55,7 +54,6 @@ Vec3 mean_of(const std::vector<Vec3>& points_m) {
   return points_m.empty() ? sum : (1.0 / static_cast<double>(points_m.size())) * sum;
 }
 
-/// Centre of the supports and springs.
 Vec3 support_middle_m(const Structure& structure) {
   std::vector<Vec3> held_m;
   for (Index node = 0; node < structure.mesh.nodes_m.size(); ++node) {

@@ -80,10 +80,8 @@ struct PlacementProblem {
 /// Root of the weighted mean square over rows; a curve has the weight of a single output.
 [[nodiscard]] double rms_um(const PlacementProblem& problem, const Numbers& rows_um);
 
-/// Mean of each block's nodes in a field.
 [[nodiscard]] Numbers block_means_K(const PlacementProblem& problem, const Numbers& rise_K);
 
-/// Error of the estimated displacement over fields.
 struct ErrorFigures {
   double rms_um{0.0};
   double peak_um{0.0};

@@ -53,7 +53,6 @@ class ErrorTrace {
     Index node{0};
     double change{far};  ///< change of the trace
   };
-  /// Best node of a block with all others unchanged.
   [[nodiscard]] Best best_node(std::size_t block) const {
     // The trace changes by sum_f 2 x_f g_f + x_f^2 |P_b|^2; x is the block's change.
     Numbers slope(errors_um_.size(), 0.0);
@@ -180,8 +179,7 @@ Eigen::MatrixXd modes_of(const PlacementProblem& problem) {
   return svd.matrixU().leftCols(modes);
 }
 
-/// Pivots among nodes for which `free` is true; `taken(node)` lists the nodes that a choice
-/// excludes.
+/// Pivots among nodes for which `free` is true; `taken(node)` lists what a choice excludes.
 template <class Taken>
 std::vector<Index> pivots_of(const Eigen::MatrixXd& modes, std::vector<bool> free,
                              const Taken& taken) {

@@ -25,8 +25,7 @@ struct BlockBounds {
 void keep_inside(const BlockBounds& bounds, Numbers& blocks_K);
 
 /// Patterns to try: those of the structure file, else derived ones: all blocks; those near to and
-/// far from the supports; the warmer and the cooler half; each alone; by 10 and 5 per cent up and
-/// down.
+/// far from the supports; the warmer and the cooler half; each alone; by +-10 and +-5 %.
 [[nodiscard]] std::vector<Pattern> patterns_of(const PlacementProblem& problem, const Field& field);
 
 struct ChangedBlocks {
@@ -60,7 +59,6 @@ enum class Way {
 [[nodiscard]] std::string_view name_of(Way way);
 inline constexpr std::array<Way, 3> all_ways{Way::coefficients, Way::ratios, Way::difference};
 
-/// Initial temperatures of the iteration.
 enum class Start { mean, median, centroid };
 
 struct TendencyOptions {
@@ -93,8 +91,7 @@ struct TendencyPlacement {
   std::vector<Index> sensors;     ///< one node per block
 };
 
-/// Step 11: the node of each block whose temperatures are nearest to theta_g, by least squares over
-/// the fields.
+/// Step 11: the node of each block nearest to theta_g in least squares over the fields.
 [[nodiscard]] TendencyPlacement place_by_tendencies(const PlacementProblem& problem, Way way,
                                                     const TendencyOptions& options);
 

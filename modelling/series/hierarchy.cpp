@@ -151,8 +151,7 @@ Departure departure_of(const Evidence& evidence, double density, const Eigen::Ve
                        const Eigen::MatrixXd& covariance, double machines,
                        std::span<const Group> groups) {
   const Eigen::MatrixXd root = root_of(covariance);
-  // In units of the series' scatter the rows have the precision B; their score has the variance B +
-  // B^2.
+  // In units of the series' scatter the rows have precision B; their score has variance B + B^2.
   const Eigen::MatrixXd b = root.transpose() * evidence.xx * root / density;
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(b);
   std::vector<Eigen::Index> kept;

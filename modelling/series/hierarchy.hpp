@@ -1,5 +1,4 @@
-/// Hierarchical model of machines of one type: coefficients b_i ~ N(m, S), rows y_i = X_i b_i +
-/// e_i.
+/// Hierarchical model of machines: coefficients b_i ~ N(m, S), rows y_i = X_i b_i + e_i.
 #pragma once
 
 #include <span>

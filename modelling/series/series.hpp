@@ -12,7 +12,6 @@
 
 namespace thermocomp::series {
 
-/// Series of one output.
 struct OutputSeries {
   Eigen::VectorXd mean;        ///< m [um per unit], by column
   Eigen::MatrixXd covariance;  ///< of a further machine: S plus that of m
@@ -33,8 +32,7 @@ struct Series {
   std::map<std::string, OutputSeries> outputs;
 };
 
-/// Assumed scatter, equivalent to two machines: predictions of sisters differ by this share of the
-/// displacement.
+/// Assumed scatter of sisters' predictions as a share of the displacement; weighs two machines.
 inline constexpr double scatter_default = 0.15;
 
 /// @param scatter  nullopt: scatter_default, and a single machine is refused
@@ -51,7 +49,6 @@ inline constexpr double scatter_default = 0.15;
 [[nodiscard]] Series series_of_model(const ThermalModel& model, const std::string& file,
                                      double drift, double years);
 
-/// A machine's adapted model.
 struct Adapted {
   ThermalModel model;  ///< with [made_from]; stated error from V and the remainder
   std::map<std::string, Coefficients> coefficients;  ///< over all columns of the series
@@ -60,8 +57,8 @@ struct Adapted {
 [[nodiscard]] Adapted adapted(const Series& series, const Statistics& machine,
                               const std::string& prior_name);
 
-/// A machine's own past as the prior of its next runs: m = b, S = V plus `drift`, a share of each
-/// output's displacement.
+/// A machine's own past as the prior of its next runs: m = b, S = V plus `drift` of the
+/// displacement.
 /// @throws std::runtime_error if machine and series do not fit together
 [[nodiscard]] Series own_series(const Series& prior, const Statistics& machine,
                                 const std::string& prior_name, double drift);

@@ -68,7 +68,6 @@ std::vector<Subject> subjects_of(const std::vector<RunFile>& runs) {
   return temperatures;
 }
 
-/// Columns that change in the runs.
 identification::BankColumns moving(const identification::MeasuredTests& tests, const Columns& all) {
   identification::BankColumns bank;
   const auto is_in = [](const std::vector<std::string>& names, const std::string& name) {

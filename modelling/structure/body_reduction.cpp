@@ -127,8 +127,7 @@ class Reducer {
   }
 
  private:
-  /// Guideway rows do not affect the choice of the basis, which contains the response to every
-  /// input.
+  /// Guideway rows do not affect the basis, which contains the response to every input.
   void add_guideways(const std::vector<std::vector<double>>& sensitivities,
                      ReducedBody& body) const {
     std::size_t next = spec_.outputs.size();
@@ -142,7 +141,6 @@ class Reducer {
     }
   }
 
-  /// Fields of the states on all nodes.
   [[nodiscard]] std::vector<std::vector<double>> fields() const {
     std::vector<std::vector<double>> all;
     for (const auto& field : basis_.colwise())
@@ -255,8 +253,7 @@ class Reducer {
     THERMOCOMP_ENSURE(solver.info() == Eigen::Success);
     rates_ = solver.eigenvalues();
     basis_ = basis_ * solver.eigenvectors();
-    // Fixes the arbitrary sign of each mode independently of rounding, so that files can be
-    // compared.
+    // Fixes the sign of each mode independently of rounding, so that files can be compared.
     for (Eigen::Index j = 0; j < basis_.cols(); ++j) {
       double most = 0.0;
       for (const Vector& input : free_.inputs) {

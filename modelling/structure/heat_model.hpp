@@ -1,5 +1,4 @@
-/// Heat conduction of a structure file, its load cases, and its reduction to a small state space
-/// for the simulator.
+/// Heat conduction of a structure file: load cases, and reduction to a small state space.
 #pragma once
 
 #include <string>

@@ -130,7 +130,6 @@ class Picture {
   }
 
   void draw(const Face& face, const std::vector<Vec3>& points, double light, bool own_edges) {
-    // The block of most corners.
     const std::size_t corners = shape_info(face.shape).corners;
     std::vector<Index> blocks;
     for (std::size_t i = 0; i < corners; ++i) {

@@ -16,7 +16,6 @@ struct BlockShape {
   std::vector<double> displacement_m;  ///< shape (3 nodes)
 };
 
-/// A quantity at every node.
 struct NodeValues {
   std::string name;            ///< with unit
   int components{1};           ///< per node

@@ -29,7 +29,6 @@ namespace thermocomp::structure {
 
 namespace {
 
-/// Formats like printf.
 template <class... Values>
 std::string line(const char* format, Values... values) {
   char text[256];
@@ -69,7 +68,6 @@ std::vector<double> one_warm(const Structure& structure, Index block) {
   return rise_K;
 }
 
-/// Displacements with each block in turn 1 K warmer.
 std::vector<BlockShape> block_shapes(const Structure& structure, const Statics& statics,
                                      const cli::ProgressLines& progress) {
   std::vector<BlockShape> shapes;

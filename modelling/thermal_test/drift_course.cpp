@@ -43,7 +43,6 @@ std::vector<double> second_differences(const std::vector<double>& time_s,
   return result;
 }
 
-/// Index of the stretch between the breaks that contains a time.
 std::size_t stretch_of(double time_s, std::span<const double> breaks_s) {
   return static_cast<std::size_t>(std::upper_bound(breaks_s.begin(), breaks_s.end(), time_s) -
                                   breaks_s.begin());
@@ -132,8 +131,7 @@ void SmoothCourse::place_windows(std::span<const double> breaks_s) {
 }
 
 /// Residuals in units of a single value's noise. Smoothing removes part of the noise, by the weight
-/// of a value in its own window; the scale corrects this. Without smoothing, second differences
-/// give the noise.
+/// of a value in its own window; the scale corrects this. Unsmoothed: second differences.
 void SmoothCourse::keep_what_is_left(double noise) {
   if (!smoothed_) {
     left_ = second_differences(time_s_, raw_);

@@ -25,10 +25,8 @@ class SmoothCourse {
 
   [[nodiscard]] const std::vector<double>& time_s() const noexcept { return time_s_; }
   [[nodiscard]] const std::vector<double>& value() const noexcept { return value_; }
-  /// Standard deviation of a single measured value, from second differences, whose share of white
-  /// noise is known.
+  /// Standard deviation of a single measured value, from second differences.
   [[nodiscard]] double noise() const noexcept { return noise_; }
-  /// The values are dense enough for smoothing.
   [[nodiscard]] bool is_smoothed() const noexcept { return smoothed_; }
   /// Largest standard deviation of a smoothed value.
   [[nodiscard]] double noise_left() const noexcept { return noise_left_; }

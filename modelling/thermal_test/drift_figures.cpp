@@ -19,7 +19,6 @@ constexpr std::uint64_t seed = 230;
 constexpr double hours_step_s = 300.0;
 constexpr std::size_t combined_points = 240;
 
-/// Rows [begin, end) of a smoothed course.
 struct Stretch {
   std::size_t begin{0};
   std::size_t end{0};

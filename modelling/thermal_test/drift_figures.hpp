@@ -10,8 +10,7 @@
 
 namespace thermocomp::thermal_test {
 
-/// A range with its 99 % interval. Noise can only increase a range, so the interval extends further
-/// down than up.
+/// A range with its 99 % interval, which is wider downwards, since noise increases a range.
 struct Figure {
   double value{std::numeric_limits<double>::quiet_NaN()};
   double low{std::numeric_limits<double>::quiet_NaN()};
@@ -63,8 +62,8 @@ inline constexpr double settled_share = 0.15;
 /// Likewise with an earlier end of running, for comparison with a shorter test.
 [[nodiscard]] TestFigures figures_until(const TestData& data, double running_s);
 
-/// `after` divided by `before`, with independent errors: relative errors add in squares, limited by
-/// the ratios of the ends.
+/// `after` divided by `before`, with independent errors: relative errors add in squares, within the
+/// ends' ratios.
 [[nodiscard]] Figure ratio_of(const Figure& after, const Figure& before);
 
 }  // namespace thermocomp::thermal_test

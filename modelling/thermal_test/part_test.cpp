@@ -27,7 +27,6 @@ double student_t(std::size_t freedom) {
   return student[std::min(freedom, student.size()) - 1];
 }
 
-/// Deviations of a feature in a repeat.
 struct Pair {
   std::optional<double> cold;
   std::optional<double> warm;
@@ -302,7 +301,6 @@ nlohmann::json figures_json(const PartFigures& figures) {
   return result;
 }
 
-/// The shift with the interval bound farthest from 0.
 const PartShift& farthest(const PartFigures& figures) {
   const auto reach = [](const PartShift& each) {
     return std::max(std::abs(each.shift_um.low), std::abs(each.shift_um.high));

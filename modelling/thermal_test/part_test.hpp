@@ -56,7 +56,6 @@ struct PartSheet {
 /// @throws ConfigurationError naming the option
 [[nodiscard]] std::string part_sheet(const PartSheet& sheet, bool as_page);
 
-/// The two completed sheets and the tolerance.
 struct PartTest {
   PartFigures before;
   std::optional<PartFigures> after;  ///< with compensation

@@ -297,7 +297,6 @@ std::string figure_words(const Figure& figure, const std::string& unit) {
 }
 
 std::string axis_sentence(const AxisFigures& axis, const TestPhases& phases) {
-  // The distance between two positions of an axis changes.
   const bool is_distance = axis.name.find("growth") != std::string::npos;
   const std::string verb = axis.unit == "urad" ? " tilted by "
                            : is_distance       ? " changed by "

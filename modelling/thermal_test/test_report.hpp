@@ -41,7 +41,6 @@ struct TestAnswer {
 [[nodiscard]] std::string figure_words(const Figure& figure, const std::string& unit);
 /// "15 % (11 to 19)"
 [[nodiscard]] std::string percent_words(const Figure& ratio);
-/// One or two sentences on an axis.
 [[nodiscard]] std::string axis_sentence(const AxisFigures& axis, const TestPhases& phases);
 
 }  // namespace thermocomp::thermal_test

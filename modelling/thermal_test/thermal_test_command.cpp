@@ -47,7 +47,6 @@ struct ReportOptions {
   std::string json;
 };
 
-/// The page's sentences as lines for a terminal.
 std::string sentences(const TestFigures& figures) {
   std::string text = figures.file + "\n";
   for (const AxisFigures& axis : figures.axes)

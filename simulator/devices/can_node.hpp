@@ -23,7 +23,6 @@ class CanFrames {
   void set_code(const CanSignal& signal, std::int64_t code);
   /// Sets the signal's status, if it has one; bits outside its mask are kept.
   void set_status(const CanSignal& signal, std::int64_t number);
-  /// Increments every counter.
   void count();
   /// Ordered by identifier, then by definition.
   [[nodiscard]] std::vector<CanFrame> frames() const;

@@ -272,8 +272,7 @@ void CanopenSlave::measure(std::span<const double> temps_degC) {
   }
 }
 
-/// Sends emergency messages like a JUMO CANtrans: when a fault begins or ends, and periodically
-/// while it lasts.
+/// Sends emergency messages like a JUMO CANtrans: when a fault begins or ends, and periodically.
 void CanopenSlave::tell_faults() {
   if (config_.emergency != EmergencyForm::jumo) return;
   const bool again = now_ >= emergency_at_;

@@ -19,7 +19,6 @@ class EventLoop {
 
   /// Calls `ready` when one of `events` occurs on `file`; replaces an earlier watch.
   void watch(int file, short events, Ready ready);
-  /// Changes the events of a watched file.
   void change(int file, short events);
   void unwatch(int file);
   /// Calls `wake` once at `when` or as soon as possible after it. Equal times keep their order.

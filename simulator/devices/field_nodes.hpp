@@ -27,7 +27,6 @@ class FieldNode {
   [[nodiscard]] virtual std::optional<CanFrame> next_frame() = 0;
 };
 
-/// Powers the node up.
 [[nodiscard]] std::unique_ptr<FieldNode> switch_on(const SimulatedCanopenNode& node,
                                                    nanoseconds now);
 [[nodiscard]] std::unique_ptr<FieldNode> switch_on(const SimulatedJ1939Node& node, nanoseconds now);

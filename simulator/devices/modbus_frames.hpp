@@ -34,7 +34,6 @@ struct ModbusFrame {
                                                        std::span<const std::uint8_t> pdu);
 [[nodiscard]] std::uint16_t modbus_crc(std::span<const std::uint8_t> bytes);
 
-/// A unit's answer to a request.
 struct WireAnswer {
   std::vector<std::uint8_t> bytes;  ///< PDU; if `raw`, all bytes sent
   bool raw{false};

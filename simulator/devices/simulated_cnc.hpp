@@ -13,8 +13,7 @@ namespace thermocomp {
 
 /// Hysteresis by a play of `dead_band_V`: the effective voltage v follows u within u - dead_band_V
 /// <= v <= u, and the displacement is the curve at v. After a turn nothing moves for the dead band;
-/// rising and falling voltage give two branches a dead band apart. Coming from 0 V is always on the
-/// rising branch.
+/// there are two branches a dead band apart, and from 0 V only the rising one.
 class SimulatedPiezo {
  public:
   /// @pre the curve meets SimulatedPiezoConfig's rules
@@ -29,7 +28,6 @@ class SimulatedPiezo {
   double felt_V_{0.0};
 };
 
-/// Values received by the controller.
 struct CncOrder {
   /// In the order of the axes; all nodes of an interpolated axis. NaN: none received.
   std::vector<double> offset_um;
@@ -66,7 +64,6 @@ class SimulatedCnc {
   }
   /// Reported value: the offset, or a piezo's voltage.
   [[nodiscard]] double shown(std::size_t axis) const { return nodes(axis).front(); }
-  /// Applied offset of each node.
   [[nodiscard]] std::span<const double> nodes(std::size_t axis) const {
     return std::span(applied_um_).subspan(first_.at(axis), config_.axes[axis].offsets());
   }

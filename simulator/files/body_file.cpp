@@ -127,7 +127,6 @@ ReducedBody read_body(const TomlDocument& document) {
   return body;
 }
 
-/// Formats a TOML float.
 std::string number(double value) {
   std::string text = number_text(value);
   if (text.find_first_of(".e") == std::string::npos) text.append(".0");

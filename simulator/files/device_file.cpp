@@ -90,7 +90,6 @@ FaultCodes read_codes(const TomlTable& table) {
   return read_fault_codes(table, -4294967296LL, 4294967295LL);
 }
 
-/// State while reading the file.
 struct Draft {
   MachineConfig& machine;
   NameList buses;
@@ -461,7 +460,6 @@ void read_target(const Draft& state, const TomlTable& table, EventConfig& event)
   }
 }
 
-/// An event of this kind may have this kind of target.
 bool fits(MachineEventKind kind, TargetKind target, bool can) {
   switch (kind) {
     case MachineEventKind::open_circuit:

@@ -35,7 +35,6 @@ class RegistersTaken {
   std::map<std::tuple<int, int, std::size_t>, std::uint16_t> words_;
 };
 
-/// Unique names of one kind.
 class NameList {
  public:
   /// Reads `name`; a duplicate is a problem.
@@ -54,7 +53,6 @@ class NameList {
 
 /// Reads [plant] and its tables. @param folder  folder of a body's file
 [[nodiscard]] PlantConfig read_plant(const TomlTable& root, const std::filesystem::path& folder);
-/// Columns of the plant, in its order.
 [[nodiscard]] std::vector<std::string> plant_columns(const PlantConfig& plant);
 /// Reads [[bus]], [[device]], [[channel]], [controller], [[axis]], [[event]].
 void read_devices(const TomlTable& root, sections::Presets& presets, MachineConfig& machine);

@@ -186,7 +186,6 @@ void read_body_of(const TomlTable& table, const std::filesystem::path& folder,
     plant.body_axes.push_back(signals.index_of(table, "body", guideway.axis, "signal"));
 }
 
-/// Reads lumps, links and heat sources.
 void read_lumps(const TomlTable& root, const NameList& signals, const NameList& outputs,
                 NameList& nodes, PlantConfig& plant) {
   for (const TomlTable& table : root.tables_required("node")) {

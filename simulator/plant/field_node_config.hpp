@@ -19,8 +19,7 @@ enum class ChannelFault { open_circuit, short_circuit, over_range, under_range, 
 /// Raw codes by fault; the first of a list is shown unless an event selects another.
 using FaultCodes = std::map<ChannelFault, std::vector<std::int64_t>>;
 
-/// Code shown for the fault: `named` if it is listed, else the first listed; nullopt: no fault, or
-/// no code.
+/// Code shown for the fault: `named` if listed, else the first listed; nullopt: no fault or code.
 [[nodiscard]] inline std::optional<std::int64_t> code_for(const FaultCodes& codes,
                                                           std::optional<ChannelFault> fault,
                                                           std::optional<std::int64_t> named) {
@@ -68,8 +67,7 @@ struct CanopenNodeChannel {
   CanStatusCodes status{};
 };
 
-/// Its object dictionary has the channels' places and TPDO 1; values written to it are kept until a
-/// reset.
+/// Its object dictionary has the channels' places and TPDO 1; a reset restores it.
 struct SimulatedCanopenNode {
   std::string name;
   std::string interface;
@@ -98,8 +96,7 @@ struct SimulatedJ1939Node {
   std::vector<NodeEvent> events;
 };
 
-/// A node of any kind; each kind also needs read_node() (simulator/files) and switch_on()
-/// (simulator/devices).
+/// Each kind needs read_node() (simulator/files) and switch_on() (simulator/devices).
 using SimulatedNode = std::variant<SimulatedCanopenNode, SimulatedJ1939Node>;
 
 }  // namespace thermocomp

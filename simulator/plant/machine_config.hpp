@@ -38,7 +38,6 @@ struct SimulatedStatus {
   FaultCodes codes;
 };
 
-/// One measured value in a device's registers or frames.
 struct SimulatedChannel {
   std::string name;    ///< name in events
   std::string column;  ///< of the plant or of the replayed run file
@@ -103,7 +102,6 @@ struct SimulatedAxis {
   std::optional<SimulatedPiezoConfig> piezo{};
   std::optional<SimulatedTravel> travel{};  ///< instead of `offset` and `applied`
 
-  /// Number of offsets.
   [[nodiscard]] std::size_t offsets() const noexcept {
     return travel ? travel->shape().nodes_mm.size() : 1;
   }

@@ -117,7 +117,6 @@ struct Plant::Parts {
     }
   }
 
-  /// Inputs of the step that begins at the grid point.
   void take_inputs() {
     evaluate_signals(grid_time_s());
     room_degC = room.temp_degC(grid_time_s());

@@ -11,7 +11,6 @@
 
 namespace thermocomp {
 
-/// Lump of the structure with one temperature.
 struct NodeConfig {
   std::string name;
   std::string block;             ///< the model's block of this lump; empty: none

@@ -15,7 +15,6 @@ struct ChannelEffect {
   double added_K{0.0};
 };
 
-/// Effect on a bus, a device or the controller.
 struct UnitEffect {
   bool silent{false};  ///< drop
   bool down{false};    ///< reboot

@@ -1,5 +1,4 @@
-/// Noise as a pure function of (seed, stream, index), so that a run does not depend on when and how
-/// often the plant is read.
+/// Noise as a pure function of (seed, stream, index), independent of when the plant is read.
 #pragma once
 
 #include <cmath>

@@ -12,8 +12,7 @@ namespace thermocomp {
 /// solution in the modes of C^-1/2 K C^-1/2 is exact for any time step.
 class ThermalNetwork {
  public:
-  /// @param conductance_W_per_K  row by row, n x n, symmetric, positive semidefinite (checked:
-  /// size)
+  /// @param conductance_W_per_K  n x n by row, symmetric, positive semidefinite (checked: size)
   ThermalNetwork(std::span<const double> capacity_J_per_K,
                  std::span<const double> conductance_W_per_K);
   ~ThermalNetwork();

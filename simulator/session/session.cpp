@@ -100,7 +100,6 @@ class StatusLine {
   nanoseconds next_{};
 };
 
-/// Common part of plant and replay sessions.
 class Session {
  public:
   Session(const MachineConfig& machine, const SessionOptions& options,

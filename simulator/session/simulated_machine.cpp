@@ -39,7 +39,6 @@ std::size_t index_in(const std::vector<std::string>& columns, const std::string&
   return static_cast<std::size_t>(found - columns.begin());
 }
 
-/// Combines the effects on a unit and on its bus.
 UnitEffect both(UnitEffect a, const UnitEffect& b) {
   a.silent = a.silent || b.silent;
   a.down = a.down || b.down;
@@ -381,7 +380,6 @@ struct SimulatedMachine::Parts {
       controller->frames.set_code(place, number);
   }
 
-  /// Discards the registers' earlier values.
   void forget_offsets() {
     controller->cnc.forget();
     std::fill(controller->order.offset_um.begin(), controller->order.offset_um.end(), not_a_number);

@@ -14,7 +14,6 @@
 
 namespace thermocomp {
 
-/// Address of a bus.
 struct BusPlace {
   std::string name;
   SimulatedBusKind kind{SimulatedBusKind::modbus_tcp};
@@ -34,15 +33,13 @@ class SimulatedMachine {
   ~SimulatedMachine();
 
   [[nodiscard]] const std::vector<BusPlace>& places() const noexcept;
-  /// Transfers values and scripted events to registers and frames. All registers change between two
-  /// requests of any client.
+  /// Transfers values and scripted events to registers and frames, between two requests.
   /// @param now      real time
   /// @param row      one value per column
   /// @param new_row  every device converts now, regardless of its period
   void update(nanoseconds now, double plant_time_s, std::span<const double> row, bool new_row);
 
-  /// Offset that the controller applies to this output's axis, in the axis' positive direction; 0:
-  /// no such axis.
+  /// Offset applied to this output's axis, in its positive direction; 0: no such axis.
   [[nodiscard]] double applied_um(const std::string& output) const;
   /// The heartbeat has ever changed (true without a controller).
   [[nodiscard]] bool heartbeat_seen() const;

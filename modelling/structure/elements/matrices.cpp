@@ -7,7 +7,6 @@
 namespace thermocomp::structure {
 namespace {
 
-/// Elements and couplings of each node.
 class Neighbourhood {
  public:
   Neighbourhood(const Mesh& mesh, std::span<const Coupling> couplings)
@@ -93,7 +92,6 @@ void add_block(SparseSymmetric& matrix, Index a, Index b, const std::array<Vec3,
   }
 }
 
-/// Calls action(element, coordinates, nodes) for all elements.
 template <class Action>
 void each_element(const Mesh& mesh, const Action& action) {
   for (const Element& element : mesh.elements) {

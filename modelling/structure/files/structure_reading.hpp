@@ -44,7 +44,7 @@ template <class Items>
 [[nodiscard]] Region read_region(const TomlTable& parent, std::string_view key,
                                  const std::vector<PartSpec>& parts);
 
-/// Reads [room], [coolant], [[convection]], [[heat]], [[load_case]]; requires materials, parts and
+/// Reads [room], [coolant], [[convection]], [[heat]], [[load_case]]; after materials, parts and
 /// joints.
 void read_heat_sections(const TomlTable& root, StructureSpec& spec);
 

@@ -1,5 +1,4 @@
-/// Contents of the structure file. Checks that need no mesh are made here, the others in
-/// structure_model.hpp.
+/// Contents of the structure file. Checks that need the mesh are in structure_model.hpp.
 #pragma once
 
 #include <array>
@@ -86,7 +85,6 @@ struct OutputSpec {
   std::vector<PlaceSpec> places;
 };
 
-/// Thermocouple of a simulated machine.
 struct SensorSpec {
   std::string name;
   PlaceSpec place;
@@ -102,7 +100,6 @@ struct GuidewayRows {
   std::map<std::string, Vec3> outputs;  ///< name -> direction
 };
 
-/// Convection between faces and the air or the coolant.
 struct ConvectionSpec {
   Region on;
   double coefficient_W_per_m2_K{0.0};

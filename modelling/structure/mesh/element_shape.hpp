@@ -1,8 +1,7 @@
 /// Isoparametric elements: shape functions with derivatives, quadrature rules and faces.
 ///
 /// Order of nodes: corners, then mid-sides, as in Abaqus, CalculiX and VTK. Local coordinates:
-/// hexahedra and quadrilaterals in [-1, 1]; tetrahedra and triangles r, s, t >= 0 with r + s + t <=
-/// 1.
+/// hexahedra and quadrilaterals in [-1, 1]; simplices r, s, t >= 0 with r + s + t <= 1.
 #pragma once
 
 #include <array>
@@ -47,8 +46,7 @@ struct ShapeInfo {
   std::vector<ShapeFace> faces;                    ///< empty for a face
   /// Exact for products of two derivatives in a straight element; used for the stiffness.
   Rule slope_rule;
-  /// Exact for products of a shape function with a derivative or a shape function in a straight
-  /// element.
+  /// Exact also for products with shape functions in a straight element.
   Rule product_rule;
 };
 

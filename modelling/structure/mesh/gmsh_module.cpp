@@ -1,4 +1,4 @@
-// thermocomp-gmsh.so: meshes by Gmsh. Uses only headers of the program that loads it.
+// thermocomp-gmsh.so: meshes by Gmsh. Uses only headers of the loading program.
 #include <algorithm>
 #include <cstdio>
 #include <gmsh.h>

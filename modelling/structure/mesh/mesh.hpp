@@ -61,12 +61,10 @@ inline constexpr Index no_part = 0xffffffff;
 /// Nodes of the part, including shared ones. Shape (nodes).
 [[nodiscard]] std::vector<bool> nodes_of_part(const Mesh& mesh, Index part);
 
-/// Connected body of each node (over elements that share nodes), from 0; `no_part` if no element
-/// has it.
+/// Connected body of each node (over shared nodes), from 0; `no_part` if no element has it.
 [[nodiscard]] std::vector<Index> bodies_of_nodes(const Mesh& mesh);
 
-/// One line for every element that is inverted or flat at some point, `count_max` at most: element,
-/// part and place.
+/// One line (element, part, place) per inverted or flat element, `count_max` at most.
 [[nodiscard]] std::vector<std::string> inverted_elements(const Mesh& mesh, std::size_t count_max);
 
 /// Removes nodes without an element, also from groups, and renumbers the others.

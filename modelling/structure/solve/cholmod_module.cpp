@@ -1,5 +1,4 @@
-// thermocomp-cholmod.so: Cholesky factors by CHOLMOD. Uses only headers of the program that loads
-// it.
+// thermocomp-cholmod.so: Cholesky factors by CHOLMOD. Uses only headers of the loading program.
 #include <cstdlib>
 #include <cstring>
 #include <dlfcn.h>

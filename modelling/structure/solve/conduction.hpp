@@ -46,8 +46,7 @@ class TransientConduction {
   TransientConduction(const Conduction& conduction, double step_s,
                       std::span<const double> initial_degC);
   /// Advances one step. `input_at(time_s, step_middle_s, input)` fills in the input at a time;
-  /// discontinuous inputs take their value at the step's middle, so that jumps between steps are
-  /// exact.
+  /// discontinuous inputs are taken at the step's middle, which makes jumps between steps exact.
   using InputAt = std::function<void(double, double, HeatInput&)>;
   void step(const InputAt& input_at);
 

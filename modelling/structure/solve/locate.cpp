@@ -27,8 +27,7 @@ std::array<Vec3, 3> tangents_of(std::span<const Vec3> at, const ShapeValues& val
   return tangents;
 }
 
-/// Newton step in local coordinates towards a point at distance `miss`; for a face, in its tangent
-/// plane.
+/// Newton step in local coordinates towards a point `miss` away; in a face's tangent plane.
 Vec3 local_step(std::array<Vec3, 3> tangents, const Vec3& miss, std::size_t dimension) {
   if (dimension == 2) tangents[2] = cross(tangents[0], tangents[1]);
   const std::array<Vec3, 3> dual{cross(tangents[1], tangents[2]), cross(tangents[2], tangents[0]),

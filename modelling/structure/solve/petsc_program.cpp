@@ -28,7 +28,6 @@ constexpr const char* options =
     "-pc_gamg_threshold 0.02 -mg_levels_ksp_type chebyshev -mg_levels_pc_type jacobi "
     "-mg_levels_ksp_max_it 3";
 
-/// Read-only memory map of a file.
 class MappedFile {
  public:
   explicit MappedFile(const std::string& path) {
@@ -94,8 +93,7 @@ struct LocalRows {
   [[nodiscard]] bool has(PetscInt row) const { return row >= first && row < end; }
 };
 
-/// Calls action(row, column, value) for every entry of this rank's rows, columns increasing in a
-/// row.
+/// Calls action(row, column, value) for this rank's entries, columns increasing in a row.
 template <class Action>
 void each_entry(const System& system, const LocalRows& rows, const Action& action) {
   for (std::size_t free = 0; free < system.header.size; ++free) {

@@ -14,7 +14,6 @@ struct Entry {
   double value;
 };
 
-/// Sorts by row and sums entries of the same row.
 void append_column(std::vector<Entry>& entries, SparseSymmetric& matrix) {
   std::sort(entries.begin(), entries.end(),
             [](const Entry& a, const Entry& b) { return a.row < b.row; });
@@ -108,8 +107,7 @@ std::vector<double> Reduction::given(std::span<const double> values) const {
 
 SparseSymmetric Reduction::reduced(const SparseSymmetric& full) const {
   THERMOCOMP_ENSURE(full.size() == full_size());
-  // A free column collects entries of several full columns: they are counted, placed, then sorted
-  // and summed by column.
+  // A free column collects entries of several full columns: counted, placed, sorted, summed.
   const auto each_entry = [&](const auto& action) {
     for (Index column = 0; column < full.size(); ++column) {
       for (Index k = full.column_start[column]; k < full.column_start[column + 1]; ++k) {

@@ -158,8 +158,7 @@ TEST_CASE("a bar held at both ends has the compressive stress E alpha T", "[stru
 }
 
 TEST_CASE("bimetal strip: the cantilever bends as in beam theory", "[structure][statics]") {
-  // l = 10, two layers of 0.05, alpha 1e-5 and 2e-5, 100 K, nu = 0: end displacements 0.015 and
-  // 0.75.
+  // l = 10, two layers of 0.05, alpha 1e-5 and 2e-5, 100 K, nu = 0: ends at 0.015 and 0.75.
   Mesh mesh;
   mesh.part_names = {"lower", "upper"};
   add_boxes(mesh, 0, {{{{0, 0, 0}, {10, 0.1, 0.1}}, false}}, {0.5, 0.1, 0.05}, Shape::hex20);
@@ -227,8 +226,7 @@ TEST_CASE("a warm disc in a thin plate: 50 MPa of hoop stress just outside",
   const Statics statics(mesh, materials, reduction, {});
   const std::vector<double> one(nodes, 1.0);
   const auto stress = nodal_stresses_Pa(mesh, materials, statics.displacement_m(one), one);
-  // Evaluated three rings further out; near the edge the disc's changed thickness affects the
-  // plate.
+  // Three rings further out, since the disc's thickness affects the plate near the edge.
   const double r_mm = std::exp(0.15);
   const Stress& edge = stress[node_at(mesh, {1e-3 * r_mm, 0, 0})];
   const double near_MPa = 50.0 / (r_mm * r_mm);

@@ -22,7 +22,6 @@ poisson_ratio = 0.25
 expansion_um_per_m_K = 10
 )";
 
-/// TOML of a part of one box.
 std::string box_part(const std::string& name, const std::string& from, const std::string& to,
                      const std::string& element = "hex20") {
   return "[[part]]\nname = \"" + name + "\"\nmaterial = \"iron\"\nelement = \"" + element +

@@ -316,7 +316,6 @@ TEST_CASE("a completed sheet is read unchanged", "[thermal_test]") {
   sheet.rpm_max = 8000.0;
   sheet.steps = true;
   std::string text = sheet_csv(sheet);
-  // Fills in numbers for every row's empty fields.
   std::string filled;
   int row = 0;
   std::size_t at = 0;
