@@ -19,8 +19,8 @@ struct AdmissionRules {
 ///
 ///     refused if  r_offered > sqrt(r_in_use^2 + s^2)
 ///
-/// Any other output is refused if neither model states an error, or if sd(predicted_offered -
-/// predicted_in_use) > 3 sqrt(s_offered^2 + s_in_use^2).
+/// Any other output is refused if neither model states an error, or if the models are too far
+/// apart: sd(predicted_offered - predicted_in_use) > 3 sqrt(s_offered^2 + s_in_use^2).
 /// @param config  with the offered model as its candidate
 /// @param found  result of the comparison, one line
 /// @return reason for refusal; empty: admitted

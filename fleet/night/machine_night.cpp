@@ -32,8 +32,7 @@ constexpr int probings_min = 8;              ///< required per night
 constexpr std::size_t nights_of_series = 7;  ///< of each machine, before the night under test
 constexpr double probability_least = 1e-30;  ///< close to the smallest PostgreSQL real
 constexpr int machines_min = 3;              ///< besides the one under test
-constexpr std::size_t sisters_max =
-    3 + 60;  ///< arguments of the command; more machines hardly improve S
+constexpr std::size_t sisters_max = 3 + 60;  ///< arguments of the command; more hardly improve S
 
 /// Offsets, sent or applied, are not inputs of a machine's displacement.
 bool is_column_of_run(const std::string& name) {

@@ -434,8 +434,7 @@ void check_exchanged(const Recording& recording, Suspicions& found) {
     MatrixXd others = moved;
     others.middleRows(begin, rows).setZero();
     const MatrixXd own = moved.middleRows(begin, rows);
-    const double noise =
-        0.05;  // K, of a thermocouple, so that similar places are not distinguished
+    const double noise = 0.05;  // K, of a thermocouple: similar places are not distinguished
     const MatrixXd covariance =
         others.transpose() * others / static_cast<double>(others.rows() - rows) +
         noise * noise * MatrixXd::Identity(places, places);

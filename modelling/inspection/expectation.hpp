@@ -12,9 +12,9 @@ namespace thermocomp::inspection {
 [[nodiscard]] double spread(const Eigen::Ref<const Eigen::VectorXd>& values);
 
 /// y = X b + an offset per run + n, n_t = rho n_(t-1) + white, with priors b_i ~ N(0, prior_i^2):
-/// ridge regression on whitened rows, rho from the remainder. A fault's shape f is judged by f'Mr /
-/// (sigma sqrt(f'Mf)), where the projection M removes what the regression can explain; a shape that
-/// the neighbours can imitate is no evidence.
+/// ridge regression on whitened rows, rho from the remainder. The evidence of a fault's shape f is
+/// f'Mr / (sigma sqrt(f'Mf)), where the projection M removes what the regression can explain; a
+/// shape that the neighbours can imitate is no evidence.
 class Expectation {
  public:
   /// @param y       shape (rows)

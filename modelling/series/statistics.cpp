@@ -16,8 +16,7 @@ namespace {
 
 constexpr double row_s_max = 3600.0;
 constexpr double constant_s = 1800.0;
-constexpr double penalty =
-    1e-4;  ///< of the fit that gives the remainder, relative to a mean square
+constexpr double penalty = 1e-4;       ///< of the remainder's fit, relative to a mean square
 constexpr double ridge_of_map = 1e-3;  ///< relative to a column's mean square
 
 [[noreturn]] void refuse(const std::string& file, const std::string& key, const std::string& rule) {

@@ -16,8 +16,7 @@ namespace {
 constexpr double panel_px = 360.0;
 constexpr double margin_px = 24.0;
 constexpr std::size_t panels_in_a_row = 4;
-constexpr double shown_of_size =
-    0.08;  ///< largest displacement in the picture, as a share of its size
+constexpr double shown_of_size = 0.08;          ///< largest displacement as a share of the picture
 constexpr std::size_t faces_with_edges = 4000;  ///< above this number, edges would hide the colours
 
 /// Isometric directions: right, up, towards the viewer.

@@ -25,7 +25,8 @@ class SmoothCourse {
 
   [[nodiscard]] const std::vector<double>& time_s() const noexcept { return time_s_; }
   [[nodiscard]] const std::vector<double>& value() const noexcept { return value_; }
-  /// Standard deviation of a single measured value, from second differences.
+  /// Standard deviation of a single measured value, from second differences, which have a known
+  /// share of white noise.
   [[nodiscard]] double noise() const noexcept { return noise_; }
   [[nodiscard]] bool is_smoothed() const noexcept { return smoothed_; }
   /// Largest standard deviation of a smoothed value.

@@ -3,9 +3,9 @@
 ///   shift of a feature = mean over repeats of (deviation warm - deviation cold)
 ///
 /// A feature's own deviation, its clamping and the probe's calibration cancel. The scatter of the
-/// repeats includes all differences between warm-ups and gives the uncertainty: +- t(0.975, repeats
-/// - 1) * s / sqrt(repeats), s pooled over the features of an axis. Features of one repeat share
-/// its thermal state, so they add no degrees of freedom.
+/// repeats includes all differences between warm-ups; the uncertainty is +- t(0.975, repeats - 1) *
+/// s / sqrt(repeats), s pooled over the features of an axis. Features of one repeat share its
+/// thermal state, so they add no degrees of freedom.
 #pragma once
 
 #include <optional>

@@ -143,8 +143,7 @@ void ModbusTcpServer::send(const std::shared_ptr<Client>& client,
                            std::span<const std::uint8_t> bytes) {
   if (client->file < 0) return;  // closed before a late answer
   client->unsent.insert(client->unsent.end(), bytes.begin(), bytes.end());
-  if (client->unsent.size() > unsent_bytes_max)
-    return close_client(client);  // the client does not read
+  if (client->unsent.size() > unsent_bytes_max) return close_client(client);  // it never reads
   flush(client);
 }
 

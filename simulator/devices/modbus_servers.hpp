@@ -59,8 +59,7 @@ class ModbusTcpServer {
 /// Serial line with Modbus RTU units on a pseudo terminal.
 struct RtuLineTiming {
   int baud{9600};
-  bool line_delay{
-      false};  ///< simulates the duration of request, 3.5 characters of silence and answer
+  bool line_delay{false};  ///< request, 3.5 characters of silence and answer take real time
 };
 
 class ModbusRtuLine {

@@ -11,9 +11,9 @@
 
 namespace thermocomp {
 
-/// Hysteresis by a play of `dead_band_V`: the effective voltage v follows u within u - dead_band_V
-/// <= v <= u, and the displacement is the curve at v. After a turn nothing moves for the dead band;
-/// there are two branches a dead band apart, and from 0 V only the rising one.
+/// Play of `dead_band_V`: the effective voltage v follows u within u - dead_band_V <= v <= u; the
+/// curve at v is the displacement. After a turn nothing moves for the dead band; there are two
+/// branches a dead band apart, and from 0 V only the rising one.
 class SimulatedPiezo {
  public:
   /// @pre the curve meets SimulatedPiezoConfig's rules
@@ -71,10 +71,8 @@ class SimulatedCnc {
   [[nodiscard]] std::uint64_t set_number(std::size_t axis) const { return set_numbers_.at(axis); }
   /// Index of the axis' first offset in an order.
   [[nodiscard]] std::size_t first(std::size_t axis) const { return first_.at(axis); }
-  [[nodiscard]] bool alive() const noexcept { return alive_; }  ///< the heartbeat changes
-  [[nodiscard]] bool beaten() const noexcept {
-    return beaten_;
-  }  ///< the heartbeat has ever changed
+  [[nodiscard]] bool alive() const noexcept { return alive_; }    ///< the heartbeat changes
+  [[nodiscard]] bool beaten() const noexcept { return beaten_; }  ///< it has ever changed
 
  private:
   void take_axis(std::size_t axis, const CncOrder& order);

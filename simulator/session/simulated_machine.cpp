@@ -74,10 +74,9 @@ struct Controller {
   CanFrames frames;
   CncOrder order;
   SimulatedCnc cnc;
-  std::vector<std::optional<std::size_t>> columns;  ///< by signal; none: fixed value
-  std::vector<std::optional<std::size_t>>
-      positions;  ///< by axis: column of its position, if it has a travel
-  std::vector<std::optional<CanSetReader>> sets;  ///< by axis: on CAN, if it has a travel
+  std::vector<std::optional<std::size_t>> columns;    ///< by signal; none: fixed value
+  std::vector<std::optional<std::size_t>> positions;  ///< by axis with a travel: its column
+  std::vector<std::optional<CanSetReader>> sets;      ///< by axis: on CAN, if it has a travel
   std::vector<double> start;  ///< by signal: a probe's output at its first reading
   nanoseconds next_frame{};
 

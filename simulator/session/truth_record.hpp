@@ -11,8 +11,8 @@
 
 namespace thermocomp {
 
-/// For each displacement x_um: x_um itself, x_offset_um applied by the controller, and x_error_um =
-/// displacement since the first row + offset. Also temperatures and positions.
+/// For each displacement x_um: x_um itself, the applied x_offset_um, and x_error_um = displacement
+/// since the first row + offset. Also temperatures and positions.
 class TruthRecord {
  public:
   using Applied = std::function<double(const std::string& output)>;

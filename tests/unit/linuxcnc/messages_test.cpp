@@ -109,7 +109,7 @@ TEST_CASE("an answer that must not be used is refused", "[linuxcnc]") {
 }
 
 TEST_CASE(
-    "brackets in a string do not hide nesting, and the daemon's text contains no terminal controls",
+    "brackets in a string do not hide nesting, and the daemon's text cannot control a terminal",
     "[linuxcnc]") {
   std::string hidden = R"({"a":")";
   hidden.append(400000, ']').append(R"(","id":3,"result":)");
