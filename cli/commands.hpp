@@ -17,8 +17,8 @@ void add_check_command(CLI::App& app, Action& action);
 void add_scan_command(CLI::App& app, Action& action);
 /// status, sensors, watch: show the state of the running daemon.
 void add_observe_commands(CLI::App& app, const GlobalOptions& global, Action& action);
-/// reference, enable, disable, measured, cycle-end, reload, prove, promote: requests of an operator
-/// or a CNC program to the running daemon.
+/// reference, enable, disable, measured, cycle-end, reload, prove, promote: requests to the running
+/// daemon.
 void add_operate_commands(CLI::App& app, const GlobalOptions& global, Action& action);
 /// admit: checks and runs models that the office offers.
 void add_admit_command(CLI::App& app, Action& action);

@@ -113,8 +113,7 @@ void load_bridge(Writer& out, const std::string& name) {
            letters + (options.arguments.empty() ? "" : " " + options.arguments));
 }
 
-/// Connects inputs before outputs, so that a bridge that joins a running machine knows the applied
-/// offsets before its own take effect.
+/// Connects inputs before outputs, so that a bridge that joins knows the applied offsets first.
 void connect_bridge(Writer& out, const std::string& name) {
   const auto pin = [&](const std::string& end) { return name + "." + end; };
   out.each([&](const std::string& axis, const std::string&, const std::string& axis_pin) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/// Lines of an exchange with the daemon: JSON-RPC `controller_state`, a snapshot of the HAL
-/// component's input pins, and its answer.
+/// Lines of an exchange with the daemon: JSON-RPC `controller_state` with the input pins, and
+/// answer.
 #pragma once
 
 #include <cmath>

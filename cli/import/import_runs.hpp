@@ -21,9 +21,10 @@ struct ClockShift {
 };
 
 /// Finds the pair of columns and the shift k with the largest |r|, over all shifts with at least a
-/// third of the shorter recording in common. a and b are the changes of a column over a fortieth of
-/// the shorter recording: r(k) = sum a_i b_(i-k) / sqrt(A B), A = (sum of common a_i^2 + sum of all
-/// a_i^2) / 2, B likewise.
+/// third of the shorter recording in common. With changes a, b over a fortieth of the shorter one:
+///
+///     r(k) = sum a_i b_(i-k) / sqrt(A B),  A = (sum_common a_i^2 + sum_all a_i^2) / 2, B likewise
+///
 /// @return nullopt if no column of either recording changes
 [[nodiscard]] std::optional<ClockShift> clock_shift(const RunFile& first, const RunFile& second);
 
@@ -41,8 +42,8 @@ struct ClockShift {
 enum class CorrectionEntry { step, total };
 
 /// displacement = -(sum of the steps until then), or -(total), in um, under the axis' name: an
-/// operator who moves a tool by -12 um has measured +12 um. Converts columns named like an axis (x,
-/// Y, z_mm, A_urad, ...); others are kept.
+/// operator who moves a tool by -12 um has measured +12 um. Converts columns named like axes (x,
+/// z_mm, A_urad); others are kept.
 /// @throws ConfigurationError if no column is named like an axis, or its unit is missing
 [[nodiscard]] RunFile displacements_of(RunFile corrections, CorrectionEntry entry);
 

@@ -22,8 +22,8 @@ class Questions {
 
   Questions(std::istream& in, std::ostream& out) : in_(in), out_(out) {}
 
-  /// Calls `body` until it succeeds. On a Failure it prints the text, discards the last answer and
-  /// repeats; without any answer it rethrows.
+  /// Calls `body` until it succeeds. A Failure is printed and the last answer asked for again;
+  /// without any answer it is rethrown.
   void interview(const std::function<void()>& body);
   /// Repeats the question until `take`, which may ask itself, throws no Failure.
   /// @param otherwise  default answer (Enter), shown in brackets

@@ -112,8 +112,7 @@ class Lesson {
     return {point, contribution_um_};
   }
 
-  /// Without a filter, a gain's deviation follows from the noise of the probing that set it; Rc is
-  /// unknown until the displacement has turned.
+  /// Without a filter, a gain is as uncertain as its probing; Rc is unknown until the turn.
   [[nodiscard]] double deviation(const CorrectionReport& report, std::size_t group) const {
     if (correction_.form == CorrectionForm::recursive) return report.gain_sd[group];
     if (group == 1 && report.phase == 1) return correction_.gain_sd;

@@ -23,8 +23,7 @@ struct CourseFit {
 
 /// Runs the daemon's correction over every run with at most one probing each `every_s`, and records
 /// its gains at each state. The bandwidth is the best of 0.125, 0.25, 0.5 and 1 spreads on runs
-/// left out in turn; with one run it is 0.5. Points are thinned evenly to course_points_max per
-/// output.
+/// left out in turn; with one run it is 0.5. Each output is thinned evenly to course_points_max.
 /// @param model  its own course is not used
 /// @throws ConfigurationError if a run lacks a column, or no run changes a gain
 [[nodiscard]] CourseFit fit_course(std::span<const RunFile> runs, const ThermalModel& model,

@@ -33,8 +33,7 @@ struct CovarianceFit {
 [[nodiscard]] CovarianceFit fit_covariance(std::span<const RunFile> runs,
                                            const std::vector<std::string>& inputs);
 
-/// Replaces the `[covariance]` table in the text of a model file; keeps the rest, with comments, if
-/// possible.
+/// Replaces the `[covariance]` table in the text of a model file; keeps the rest if possible.
 /// @param model  model of the text, with the new covariance
 [[nodiscard]] std::string with_covariance(const std::string& text, const ThermalModel& model);
 

@@ -180,8 +180,8 @@ std::string probed_text(const ModelStatus& model) {
   return text;
 }
 
-/// Compares each axis' probings with the claimed error, one line each. The RMS of few probings is
-/// below twice the true sd in 95 % of cases.
+/// Compares probings with the claimed error, a line per axis. In 95 % of cases the RMS of few
+/// probings is below twice the true sd.
 std::string model_error_lines(const ModelStatus& model) {
   constexpr double worse = 2.0;
   std::string text;

@@ -7,8 +7,8 @@
 
 namespace thermocomp::cli {
 
-/// prove: moves the axis, monitors the move and prints the outcome. Shows progress on stderr: one
-/// line on a terminal, else a line every 2 s.
+/// prove: moves the axis, monitors the move and prints the outcome. Progress on stderr: one line,
+/// or without a terminal one every 2 s.
 /// @return exit_success: moved as asked and came back; exit_no: otherwise
 /// @throws Failure as ask_daemon()
 [[nodiscard]] int run_prove(const GlobalOptions& global, const std::string& axis, double move_um);

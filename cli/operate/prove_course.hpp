@@ -7,8 +7,7 @@
 
 namespace thermocomp::cli {
 
-/// Takes the axis from the daemon's `offsets`: once before the move, then until shortly after its
-/// end, since read-backs are late.
+/// Takes the axis from the daemon's `offsets`: once before the move, then until shortly after it.
 class ProveCourse {
  public:
   /// @param before  the axis before the move

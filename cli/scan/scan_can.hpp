@@ -20,8 +20,7 @@ using FrameCounts = std::map<CanId, std::size_t>;
 /// "0x281 bit 7 length 16 big_endian x 0.01"
 [[nodiscard]] std::string place_name(const CanSignal& signal);
 
-/// Decodes `applied` and the signals from the controller's frames. Sends nothing, so values that
-/// the daemon writes are missing.
+/// Decodes `applied` and the signals from the controller's frames. Sends nothing.
 [[nodiscard]] ScanController scan_can_controller(
     const DaemonConfig& config, const CanControllerConfig& controller, double listen_s,
     const std::function<void(const std::string&)>& progress);

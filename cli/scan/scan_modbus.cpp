@@ -129,8 +129,7 @@ std::string ModbusScan::describe(const ModbusDeviceConfig& device, const Exchang
   return exchange.detail;
 }
 
-/// Polls until every value was requested; retries a busy device for as long as a reading may be
-/// old.
+/// Polls until every value was requested; retries a busy device while a reading would be fresh.
 void ModbusScan::ask_as_the_daemon() {
   progress_("bus " + config_.name + ": asking its devices as the daemon does");
   const std::size_t count = config_.devices.size();

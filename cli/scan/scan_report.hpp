@@ -1,5 +1,4 @@
-/// Result of `thermocomp scan` as text and JSON, with hints for registers that decode to
-/// implausible temperatures.
+/// Result of `thermocomp scan` as text and JSON, with hints for implausible registers.
 #pragma once
 
 #include <cstdint>
@@ -32,7 +31,7 @@ struct ScanChannel {
 
 struct ScanDevice {
   std::string name;
-  std::string address;  ///< "unit 3"; empty on a CAN bus
+  std::string address;  ///< "unit 3"; empty on CAN
   bool answers{false};
   std::string note;  ///< fault of the whole device
   std::vector<ScanChannel> channels;
@@ -68,7 +67,7 @@ struct ScanController {
   std::string name;
   std::string kind;
   std::string where;    ///< as ScanBus::where
-  std::string address;  ///< "unit 1"; empty on a CAN bus
+  std::string address;  ///< "unit 1"; empty on CAN
   std::string error;    ///< empty: could be polled
   std::string refused;  ///< reason why the daemon could not read or write it; empty: none
   std::string writes;   ///< result of the writes, or why they were not tried
@@ -110,8 +109,8 @@ struct PlausibleRange {
 [[nodiscard]] std::optional<std::int64_t> likely_open_code(const ModbusChannel& channel,
                                                            std::span<const std::uint16_t> words);
 
-/// Word orders, scales and codes that would make an implausible temperature plausible, one sentence
-/// each. @param words  of the channel's value
+/// Sentences with the word orders, scales and codes that would make a temperature plausible.
+/// @param words  of the channel's value
 [[nodiscard]] std::vector<std::string> hints_for_words(const ModbusChannel& channel,
                                                        std::span<const std::uint16_t> words,
                                                        const PlausibleRange& range);

@@ -355,8 +355,7 @@ struct Ready {
   std::string statistics;
 };
 
-/// Creates missing minute means of a past night; with `--slurm` the series need them before the
-/// tasks.
+/// Creates missing minute means of a night, which with `--slurm` the series need before the tasks.
 constexpr const char* make_missing_minutes =
     "SELECT fleet.make_minutes($1, $2::date) FROM fleet.uplink WHERE machine = $1 AND NOT EXISTS"
     " (SELECT FROM fleet.minute WHERE machine = $1 AND at >= $2::date AND at < $2::date + 1)"

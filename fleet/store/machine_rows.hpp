@@ -1,5 +1,5 @@
-/// A machine's data in the store. Each batch is one transaction together with its position, so
-/// sending a batch again changes nothing.
+/// A machine's data in the store. Each batch is one transaction with its position, so repeating it
+/// changes nothing.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
-/// Orthogonal arrays L4, L8, L9, L12, L16, L18 and L27: each level of a column occurs equally often
-/// with each level of every other column.
+/// Orthogonal arrays L4, L8, L9, L12, L16, L18 and L27: levels of any two columns combine equally
+/// often.
 #pragma once
 
 #include <string>

@@ -28,8 +28,7 @@ struct Cleaned {
 [[nodiscard]] Cleaned cleaned(const std::vector<RunFile>& runs, const Inspection& inspection,
                               double probability_min = 0.9);
 
-/// Removes only steps of these displacements (a probe that was hit, another datum) before a fit.
-/// Ignores rows after a run's selection.
+/// Removes only steps of these displacements (a hit probe, another datum) within the selections.
 [[nodiscard]] Cleaned without_steps(const std::vector<RunFile>& runs,
                                     const std::vector<std::string>& outputs,
                                     double probability_min = 0.8);

@@ -11,8 +11,7 @@
 
 namespace thermocomp::inspection {
 
-/// Rows of all runs in sequence. A missing temperature or signal repeats the previous one; a
-/// missing displacement is NaN.
+/// Rows of all runs. Missing temperatures and signals repeat the last one, displacements are NaN.
 struct Recording {
   std::vector<std::string> temps;
   std::vector<std::string> signals;

@@ -25,8 +25,7 @@ struct Comparison {
   GreedyPlacement greedy;
 
   [[nodiscard]] const MethodResult& method(std::string_view name) const;
-  /// The method with one sensor per block and the smallest RMS over the load cases left out, or
-  /// over those used if none is.
+  /// The method with one sensor per block and the smallest RMS over the left-out, else used, cases.
   [[nodiscard]] const MethodResult& best(const PlacementProblem& problem) const;
 };
 

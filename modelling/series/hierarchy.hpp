@@ -84,8 +84,8 @@ struct Departure {
                                      const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance,
                                      double machines, std::span<const Group> groups);
 
-/// P(F >= f) by Paulson's approximation (Biometrika 29, 1942); for infinite `freedom_below` by
-/// Wilson and Hilferty's for chi-square.
+/// P(F >= f) by Paulson's approximation (Biometrika 29, 1942); by Wilson and Hilferty's if
+/// `freedom_below` is infinite.
 [[nodiscard]] double f_tail(double f, double freedom, double freedom_below);
 
 }  // namespace thermocomp::series

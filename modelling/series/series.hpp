@@ -43,8 +43,7 @@ inline constexpr double scatter_default = 0.15;
 /// The series after `years`: each output's prediction may have drifted by `drift` of its
 /// displacement a year, independently by column.
 [[nodiscard]] Series drifted(Series series, double drift, double years);
-/// Last year's model as a prior: m from its matrix and banks, S from its remainder and the drift,
-/// as shares of the displacement.
+/// Last year's model as a prior: m from its matrix and banks, S from its remainder and the drift.
 /// @throws std::runtime_error if it has a term other than a bank, or no [made_from]
 [[nodiscard]] Series series_of_model(const ThermalModel& model, const std::string& file,
                                      double drift, double years);
@@ -57,8 +56,7 @@ struct Adapted {
 [[nodiscard]] Adapted adapted(const Series& series, const Statistics& machine,
                               const std::string& prior_name);
 
-/// A machine's own past as the prior of its next runs: m = b, S = V plus `drift` of the
-/// displacement.
+/// A machine's own past as a prior: m = b, S = V plus `drift`, a share of the displacement.
 /// @throws std::runtime_error if machine and series do not fit together
 [[nodiscard]] Series own_series(const Series& prior, const Statistics& machine,
                                 const std::string& prior_name, double drift);

@@ -1,5 +1,4 @@
-/// Pictures of mesh, blocks, temperatures and displacements: VTK XML file (ParaView), SVG, and a
-/// three-dimensional page for a browser.
+/// Pictures of blocks, temperatures and displacements: VTK XML file, SVG, and a page in 3D.
 #pragma once
 
 #include <string>

@@ -32,8 +32,8 @@ class SmoothCourse {
   /// Largest standard deviation of a smoothed value.
   [[nodiscard]] double noise_left() const noexcept { return noise_left_; }
 
-  /// Draws noise, smoothed like the values: residuals are resampled in blocks as long as a window,
-  /// to keep the correlation of the noise.
+  /// Draws noise, smoothed like the values: residuals in blocks of a window, to keep their
+  /// correlation.
   [[nodiscard]] std::vector<double> noise_draw(std::mt19937_64& random) const;
 
  private:

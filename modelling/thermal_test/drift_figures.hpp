@@ -62,8 +62,7 @@ inline constexpr double settled_share = 0.15;
 /// Likewise with an earlier end of running, for comparison with a shorter test.
 [[nodiscard]] TestFigures figures_until(const TestData& data, double running_s);
 
-/// `after` divided by `before`, with independent errors: relative errors add in squares, within the
-/// ends' ratios.
+/// `after` divided by `before`, relative errors add in squares, within the ends' ratios.
 [[nodiscard]] Figure ratio_of(const Figure& after, const Figure& before);
 
 }  // namespace thermocomp::thermal_test

@@ -65,8 +65,8 @@ struct PartTest {
 /// One page for signature: without and, if present, with compensation.
 [[nodiscard]] std::string part_html(const PartTest& test);
 [[nodiscard]] std::string part_json(const PartTest& test);
-/// "Z: heat moves the 6 features by 21.3 um RMS (18.0 to 24.6); with compensation 3.1 ..."; the
-/// verdicts on the tolerance come first.
+/// "Z: heat moves the 6 features by 21.3 um RMS (18.0 to 24.6); with compensation 3.1 ...";
+/// verdicts first.
 [[nodiscard]] std::vector<std::string> part_sentences(const PartTest& test);
 
 }  // namespace thermocomp::thermal_test

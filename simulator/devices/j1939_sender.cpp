@@ -43,8 +43,7 @@ bool J1939Sender::is_now(const NodeEvent& event, nanoseconds now) const {
   return time_s >= event.at_s && time_s < event.at_s + event.duration_s;
 }
 
-/// Code sent instead of the value: the event's, else the first listed for its fault, else the
-/// standard's; nullopt: no fault.
+/// Code sent instead of the value: the event's, else the first listed, else the standard's.
 std::optional<std::uint64_t> J1939Sender::code_of(std::size_t channel, nanoseconds now) const {
   const auto event =
       std::find_if(config_.events.begin(), config_.events.end(), [&](const NodeEvent& each) {

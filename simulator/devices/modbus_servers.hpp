@@ -64,8 +64,8 @@ struct RtuLineTiming {
 
 class ModbusRtuLine {
  public:
-  /// Opens a pty and creates a symbolic link to its other end at `link`, replacing an existing
-  /// link. @throws std::runtime_error
+  /// Opens a pty and creates or replaces the symbolic link to its other end. @throws
+  /// std::runtime_error
   ModbusRtuLine(EventLoop& loop, std::filesystem::path link, RtuLineTiming timing,
                 ModbusAnswerer answerer);
   ~ModbusRtuLine();  ///< removes the link unless it was replaced

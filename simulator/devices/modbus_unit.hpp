@@ -25,8 +25,7 @@ class ModbusUnit {
   void set(ModbusTable table, std::uint16_t address, std::span<const std::uint16_t> words);
   [[nodiscard]] std::uint16_t word(ModbusTable table, std::uint16_t address) const;
 
-  /// Encodes a value; saturates; NaN becomes a float's NaN or an integer's highest code (upscale
-  /// burn-out of a thermocouple module).
+  /// Saturates; NaN becomes a float's NaN or an integer's highest code, as in upscale burn-out.
   void set_value(const ModbusValue& place, double offset, double value);
   /// Writes a raw code, without scale.
   void set_code(const ModbusValue& place, std::int64_t code);

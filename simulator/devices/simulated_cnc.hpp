@@ -53,8 +53,8 @@ class SimulatedCnc {
   /// Power loss or homing: applied and wanted offsets are zero until the next order.
   void forget();
 
-  /// Interpolates at the slide's position, also without a heartbeat; the tool follows. @pre now_s
-  /// does not decrease; the axis has a travel
+  /// Interpolates at the slide's position, also without a heartbeat. @pre now_s does not decrease;
+  /// the axis has a travel
   void stand_at(std::size_t axis, double now_s, double position_mm);
 
   /// Offset at the tool.

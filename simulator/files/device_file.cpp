@@ -303,8 +303,7 @@ LimiterConfig bound_of(double offset_um_max) {
   return limiter;
 }
 
-/// Reads the frames of a travel: sent by the daemon and shown by the controller. The section
-/// reports bits used twice within a set.
+/// Reads a travel's frames, sent and shown; bits used twice in a set are already reported.
 CanTravel read_travel_frames(Draft& state, const TomlTable& axis, double offset_um_max,
                              std::size_t bus) {
   sections::TakenBits sent;

@@ -13,8 +13,7 @@
 
 namespace thermocomp {
 
-/// Reads the optional lists open_circuit_codes, short_circuit_codes, over_range_codes,
-/// under_range_codes and error_codes.
+/// Reads the optional lists open_, short_circuit_codes, over_, under_range_codes and error_codes.
 [[nodiscard]] FaultCodes read_fault_codes(const TomlTable& table, std::int64_t low,
                                           std::int64_t high);
 

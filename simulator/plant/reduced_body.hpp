@@ -2,8 +2,8 @@
 ///
 /// dx/dt = -(K + K_coolant while it flows) x + sum of inflows; temperature of a sensor = row . x;
 /// displacement = row . (x - x_start). The states are amplitudes of temperature fields that are
-/// orthonormal in the heat capacity, so their capacity is 1. `thermocomp structure --plant` writes
-/// the file (docs/structure.md).
+/// orthonormal in the heat capacity, so their capacity is 1. How the file is made:
+/// docs/structure.md.
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,5 @@
-// The page of a store of machines: all of them, one of them, one of its places beside its sisters. The address
-// behind # says which; the store answers in JSON.
+// Page of a store of machines: all machines, one machine, or one place compared with its sisters, selected by the
+// address after #. The store answers in JSON.
 'use strict';
 
 const reloadMs = 60000;
@@ -53,7 +53,7 @@ function title(parts, summary) {
 
 // ------------------------------------------------------------------ all machines
 
-let hall = null;  // chosen; null: all
+let hall = null;  // selected; null: all
 
 function cell(label, text, className) {
   return make('td', text, Object.assign({'data-label': label}, className ? {class: className} : {}));
@@ -115,7 +115,7 @@ function showMachines(machines) {
 
 // ------------------------------------------------------------------ one machine
 
-// From whom it departs, and by which subjects: {"sisters": {"z_um": {"departs", "subjects": [...]}}, "own_past": ...}
+// Departures with their subjects: {"sisters": {"z_um": {"departs", "subjects": [...]}}, "own_past": ...}
 const whatDeparts = night => Object.entries(night.departure || {}).flatMap(([kind, outputs]) =>
   Object.entries(outputs || {}).filter(([, output]) => output.departs).map(([name, output]) =>
     'departs from its ' + kind.replace('_', ' ') + ' in ' + placeName(name) + ': ' + (output.subjects || []).slice(0, 3).map(part =>
@@ -215,7 +215,7 @@ function timeText(at_s) {
     : at.toLocaleTimeString([], {hour: '2-digit', minute: '2-digit', hour12: false});
 }
 
-// A gap of more than two points parts a line.
+// A gap of more than two points interrupts the line.
 function pathOf(curve, x, y) {
   let text = '';
   curve.at.forEach((point, i) => {
@@ -245,7 +245,7 @@ function chart(shown, name, column, cursor) {
   for (let i = 0; i <= count; ++i)
     svg.append(draw('text', {x: 48 + (width - 56) * i / count, y: height - 6, 'text-anchor': i === 0 ? 'start' : i === count ? 'end' : 'middle'},
                     timeText(shown.from_s + span[1] * i / count)));
-  for (const curve of shown.curves)  // its own is the last, above all
+  for (const curve of shown.curves)  // the machine's own is drawn last, on top
     svg.append(draw('path', {d: pathOf(curve, x, y), class: curve.name === name ? 'own' : ''}));
   const line = draw('line', {class: 'cursor', y1: 8, y2: height - 24, visibility: 'hidden'});
   svg.append(line);
@@ -283,7 +283,7 @@ async function showPlace(name, column, mine) {
                                ' beside ' + sisters + ' sisters', bar, chart(shown, name, column, cursor), cursor));
 }
 
-// ------------------------------------------------------------------ which of them
+// ------------------------------------------------------------------ selection
 
 let asked = 0;
 let machines = null;  // last answer

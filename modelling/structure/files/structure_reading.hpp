@@ -44,8 +44,7 @@ template <class Items>
 [[nodiscard]] Region read_region(const TomlTable& parent, std::string_view key,
                                  const std::vector<PartSpec>& parts);
 
-/// Reads [room], [coolant], [[convection]], [[heat]], [[load_case]]; after materials, parts and
-/// joints.
+/// Reads [room], [coolant], [[convection]], [[heat]], [[load_case]]; after parts and joints.
 void read_heat_sections(const TomlTable& root, StructureSpec& spec);
 
 /// Reads [placement] with its [[placement.pattern]]; requires blocks.

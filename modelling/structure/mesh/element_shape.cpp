@@ -298,7 +298,7 @@ Vec3 clamped_local(Shape shape, Vec3 local) {
     for (std::size_t d = 0; d < info.dimension; ++d) local[d] = std::clamp(local[d], -1.0, 1.0);
     return local;
   }
-  // Projection onto the simplex: clips negative coordinates and distributes the sum's excess,
+  // Projection onto the simplex: clips negative coordinates and spreads the sum's excess,
   // repeatedly.
   for (std::size_t pass = 0; pass < info.dimension; ++pass) {
     double sum = 0.0;

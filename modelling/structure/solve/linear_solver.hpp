@@ -1,5 +1,4 @@
-/// Solvers of K u = f for statics; the program thermocomp-petsc under mpirun solves systems too
-/// large for a factorisation.
+/// Solvers of K u = f for statics; thermocomp-petsc solves systems too large for a factorisation.
 #pragma once
 
 #include <filesystem>

@@ -143,8 +143,7 @@ namespace {
 constexpr double held_of_largest = 1e-9;
 constexpr Index rigid_motions = 6;
 
-/// Rigid motions of every body: three translations and three rotations about its centre, scaled by
-/// its size to similar magnitudes.
+/// Rigid motions of every body: translations and rotations about its centre, scaled by its size.
 class RigidMotions {
  public:
   explicit RigidMotions(const Mesh& mesh) : mesh_(mesh), body_of_node_(bodies_of_nodes(mesh)) {
