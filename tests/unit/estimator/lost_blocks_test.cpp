@@ -215,7 +215,7 @@ TEST_CASE("a value given for a block that stays measured is dropped and not part
           "[lost_blocks]") {
   Bank bank(model_of(4));
   bank.step(3);
-  bank.lost.say(1, 19.0, 2.0);  // the block continues with another sensor
+  bank.lost.continue_from(1, 19.0, 2.0);  // the block continues with another sensor
   bank.step();
   StateArchive count;
   bank.lost.visit_state(count);
