@@ -1,4 +1,4 @@
-/// Chance from a seed: the same on every machine and standard library.
+/// Seeded random numbers, identical on every machine and standard library.
 #pragma once
 
 #include <cstddef>
@@ -6,7 +6,7 @@
 
 namespace thermocomp::faults {
 
-/// SplitMix64 (Steele, Lea, Flood 2014): one multiplication chain, good enough to draw faults from.
+/// SplitMix64 (Steele, Lea, Flood 2014): a short multiplication chain, sufficient to draw faults.
 [[nodiscard]] constexpr std::uint64_t scramble(std::uint64_t value) noexcept {
   value += 0x9E3779B97F4A7C15u;
   value = (value ^ (value >> 30)) * 0xBF58476D1CE4E5B9u;
@@ -17,7 +17,7 @@ namespace thermocomp::faults {
 class Chance {
  public:
   explicit Chance(std::uint64_t seed) noexcept : state_(scramble(seed)) {}
-  /// A stream of its own for a part of a life, so that one part does not shift another.
+  /// A separate stream for a part of a life, so that changes in one part do not affect another.
   Chance(std::uint64_t seed, std::uint64_t part) noexcept : Chance(seed * 1000003u + part) {}
 
   [[nodiscard]] std::uint64_t next() noexcept { return scramble(state_ += 0xD1342543DE82EF95u); }

@@ -46,7 +46,7 @@ constexpr std::array<std::string_view, fault_kinds> names{"sensor_open",
                                                           "history_disk_full",
                                                           "history_files_removed"};
 
-/// Shortest and longest time of a fault [s].
+/// Shortest and longest duration of a fault [s].
 std::pair<double, double> duration_s(FaultKind kind) {
   switch (kind) {
     case FaultKind::cycle_overrun:
@@ -57,10 +57,10 @@ std::pair<double, double> duration_s(FaultKind kind) {
       return {3.0, 40.0};
     case FaultKind::daemon_killed:
       return {2.0, 60.0};
-    // Longer than the watchdog allows it is a kill.
+    // Beyond the watchdog's timeout it becomes a kill.
     case FaultKind::main_stands_still:
       return {0.5, 10.0};
-    // They last longer than any band that widens with time can stay below them.
+    // Long enough for any band that widens with time to include the false value.
     case FaultKind::unit_in_fahrenheit:
     case FaultKind::unit_tenfold_too_low:
       return {60.0, 900.0};

@@ -1,4 +1,4 @@
-/// Which faults a life has, and when: drawn from its seed before it begins, then only looked up.
+/// The faults of a life and their times, drawn from its seed in advance.
 #pragma once
 
 #include <array>
@@ -66,7 +66,7 @@ enum class FaultKind : std::uint8_t {
   history_files_removed
 };
 inline constexpr std::size_t fault_kinds = 40;
-/// Unordered, a kind with itself (another subject or time) among them.
+/// Unordered pairs, including a kind with itself (another subject or time).
 inline constexpr std::size_t fault_pairs = fault_kinds * (fault_kinds + 1) / 2;
 
 [[nodiscard]] std::string_view name_of(FaultKind kind) noexcept;
@@ -76,26 +76,26 @@ inline constexpr std::size_t fault_pairs = fault_kinds * (fault_kinds + 1) / 2;
 struct FaultEvent {
   FaultKind kind{};
   nanoseconds begin{};
-  nanoseconds end{};        ///< what happens at once lasts for as long as its consequences may
-  std::size_t subject{0};   ///< sensor, line or unit; the user takes it modulo what there is
+  nanoseconds end{};        ///< for an instantaneous fault: end of its consequences
+  std::size_t subject{0};   ///< sensor, line or unit, modulo their count
   double strength{0.0};     ///< 0..1
-  std::uint64_t number{0};  ///< of its own in the life
+  std::uint64_t number{0};  ///< unique in the life
 
   [[nodiscard]] bool on_at(nanoseconds time) const noexcept { return begin <= time && time < end; }
 };
 
-/// Faults that begin close together; nothing else happens until the next one.
+/// Faults that begin close together; no other fault begins before the next episode.
 struct Episode {
   nanoseconds begin{};
-  nanoseconds end{};  ///< of its last fault
+  nanoseconds end{};  ///< end of its last fault
   std::vector<FaultEvent> faults;
 };
 
 struct ScheduleOptions {
   nanoseconds start{};
   nanoseconds length{};
-  double seconds_scale{1.0};        ///< shorter for campaigns at a higher rate
-  std::size_t directed_pair{0};     ///< the first two faults of each episode take the pairs in turn
+  double seconds_scale{1.0};        ///< below 1 for campaigns at a higher rate
+  std::size_t directed_pair{0};     ///< the first two faults of each episode run through all pairs
   std::optional<FaultKind> only{};  ///< no other fault happens
 };
 
@@ -104,16 +104,16 @@ class FaultSchedule {
   FaultSchedule(std::uint64_t seed, const ScheduleOptions& options);
 
   [[nodiscard]] const std::vector<Episode>& episodes() const noexcept { return episodes_; }
-  /// The fault of this kind (and subject, out of `subjects`) in force at a time, or nullptr.
-  /// Quick where the times asked for run forwards.
+  /// The fault of this kind (and subject, out of `subjects`) active at a time, or nullptr.
+  /// Efficient if times increase from call to call.
   [[nodiscard]] const FaultEvent* find(FaultKind kind, nanoseconds time) const noexcept;
   [[nodiscard]] const FaultEvent* find(FaultKind kind, nanoseconds time, std::size_t subject,
                                        std::size_t subjects) const noexcept;
-  /// The episode under way or next; nullptr after the last.
+  /// The current or next episode; nullptr after the last.
   [[nodiscard]] const Episode* episode_at(nanoseconds time) const noexcept;
-  /// Whether this kind, and no other, has been in force for all of `since`.
+  /// True if this kind, and no other, was active during all of the last `since`.
   [[nodiscard]] bool alone(FaultKind kind, nanoseconds time, nanoseconds since) const noexcept;
-  /// End of the last fault at or before `time`; `start` where there was none.
+  /// End of the last fault at or before `time`; `start` if there was none.
   [[nodiscard]] nanoseconds quiet_since(nanoseconds time) const noexcept;
   [[nodiscard]] std::bitset<fault_pairs> pairs() const;
   [[nodiscard]] std::array<std::uint64_t, fault_kinds> counts() const;

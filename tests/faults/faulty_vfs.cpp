@@ -26,7 +26,7 @@ sqlite3_file* real_of(sqlite3_file* file) {
   return file_of(file).real;
 }
 
-/// Whether a change of the disk may happen.
+/// True if the disk may still be changed.
 bool alive(DiskState* disk) {
   if (disk == nullptr || !disk->dying) return true;
   if (disk->writes_left == 0) return false;
@@ -51,7 +51,7 @@ int truncate(sqlite3_file* file, sqlite3_int64 size) {
   if (!alive(file_of(file).disk)) return SQLITE_IOERR_TRUNCATE;
   return real_of(file)->pMethods->xTruncate(real_of(file), size);
 }
-/// The disk is memory: what was written is there for whoever opens it next.
+/// The disk is memory: written data are visible to the next open().
 int sync(sqlite3_file* /*file*/, int /*flags*/) {
   return SQLITE_OK;
 }

@@ -1,5 +1,5 @@
 #!/bin/bash
-# Every planted bug must break an invariant, and without one none may be broken.
+# Every planted bug must break an invariant; without a bug no invariant may break.
 #   find_planted.sh PROGRAM
 set -euo pipefail
 program=$1
@@ -12,7 +12,7 @@ if ! "$program" --seeds 0:16 "${lives[@]}" >/dev/null 2>&1; then
 fi
 printf '%-34s %-30s %5s %14s\n' "planted bug" "broken invariant" "seed" "machine hours"
 while read -r _ bug; do
-  # What asks for three things at once is rare: then ten times as many lives are looked at.
+  # Bugs that need three simultaneous events are rare: search ten times as many lives.
   for seeds in 0:400 400:4000; do
     out=$("$program" --planted "$bug" --expect-found --seeds "$seeds" "${lives[@]}" 2>/dev/null) || true
     if grep -q '^FOUND' <<<"$out"; then break; fi
@@ -24,7 +24,7 @@ while read -r _ bug; do
   fi
   printf '%-34s %-30s %5s %14s\n' "$bug" "$invariant" "$seed" "$hours"
 done < <("$program" --list | grep '^planted ')
-# Each way of lying alone is enough to find a bug of what guards against it.
+# Each kind of false read-back alone must find a bug in the check against it.
 while read -r lie bug; do
   out=$("$program" --planted "$bug" --only "$lie" --expect-found --seeds 0:200 "${lives[@]}" \
     2>/dev/null) || true

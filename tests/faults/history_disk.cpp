@@ -15,7 +15,7 @@ namespace {
 
 constexpr nanoseconds wall_at_begin = std::chrono::seconds(1'780'000'000);  // in 2026
 
-/// Cycles of one run that were in the file when a commit had succeeded.
+/// Cycles of one run that the file contained after a successful commit.
 struct Committed {
   nanoseconds grid_start{};
   std::uint64_t from{0};
@@ -30,8 +30,8 @@ struct HistoryDisk::Parts {
   Chance chance;
   DiskState disk;
   nanoseconds now{};
-  nanoseconds wrong_for_good{};          ///< of the wall clock
-  std::uint64_t files_removed_event{0};  ///< the last one that was carried out
+  nanoseconds wrong_for_good{};          ///< permanent error of the wall clock
+  std::uint64_t files_removed_event{0};  ///< the last removal carried out
   Grid grid;
   std::unique_ptr<HistoryWriter> writer;
   std::vector<ReplaySetup> setups;
@@ -39,14 +39,14 @@ struct HistoryDisk::Parts {
   std::uint64_t commits_seen{0};
   std::uint64_t commits_all{0};
   std::uint64_t lost_seen{0};
-  std::uint64_t next_cycle{0};                              ///< first one that no commit has seen
+  std::uint64_t next_cycle{0};                              ///< first cycle not yet committed
   std::uint64_t last_step{0};                               ///< the cycle stepped last
-  std::map<std::int64_t, std::set<std::uint64_t>> skipped;  ///< by an overrun; of each run
+  std::map<std::int64_t, std::set<std::uint64_t>> skipped;  ///< by overruns, per run
 
   Parts(std::uint64_t seed, const FaultSchedule& fault_schedule)
       : schedule(fault_schedule), chance(seed, 11) {}
 
-  /// Every other step that is wide is never set right again, nor stepped again.
+  /// Every other large step is permanent; no further steps follow it.
   [[nodiscard]] nanoseconds wall() {
     if (wrong_for_good != nanoseconds{}) return wall_at_begin + now + wrong_for_good;
     const FaultEvent* step = schedule.find(FaultKind::wall_clock_stepped, now);
@@ -62,7 +62,7 @@ struct HistoryDisk::Parts {
     }
     return wall_at_begin + now + stepped;
   }
-  /// Somebody tidies up.
+  /// Somebody deletes SQLite's auxiliary files.
   void remove_files() {
     const FaultEvent* event = schedule.find(FaultKind::history_files_removed, now);
     if (event == nullptr || event->number == files_removed_event) return;
@@ -75,7 +75,7 @@ struct HistoryDisk::Parts {
     HistoryConfig history;
     history.file = folder / "history.db";
     history.size_MB_max = 64.0;
-    history.offsets_period_s = 3.0;  // some cycles, as in RecordedTwin
+    history.offsets_period_s = 3.0;  // several cycles, as in RecordedTwin
     history.commit_s = 9.0;
     history.segment_h = 0.5;
     return history;
@@ -133,7 +133,7 @@ void HistoryDisk::work(nanoseconds now) {
   const HistoryStatistics statistics = parts.writer->statistics();
   const bool lost = statistics.lost != parts.lost_seen;
   if (statistics.commits == parts.commits_seen && !lost) return;
-  // The recorder says once a second up to where it is whole.
+  // The recorder reports once a second the cycle up to which records are complete.
   const auto lag = static_cast<std::uint64_t>(std::chrono::seconds(1) / parts.grid.period);
   const auto cycle = static_cast<std::uint64_t>((now - parts.grid.start) / parts.grid.period);
   const std::uint64_t whole = cycle + 1 >= lag ? cycle + 1 - lag : 0;
@@ -150,7 +150,7 @@ void HistoryDisk::kill(nanoseconds now) {
   Parts& parts = *parts_;
   parts.disk.dying = true;
   parts.disk.writes_left = parts.chance.below(12);
-  if (parts.chance.one_in(2)) {  // in the middle of a commit, which is due at the latest by then
+  if (parts.chance.one_in(2)) {  // during a commit, which is due by then
     parts.now = now + std::chrono::minutes(2);
     parts.writer->work();
   }

@@ -1,5 +1,5 @@
-/// The real history writer and its file on a disk that fills up, and a daemon that dies in the
-/// middle of a write: what was committed must be there afterwards, and replay to the same bits.
+/// The real history writer on a disk that fills up, with a daemon killed during writes: committed
+/// records must be present afterwards and replay bit for bit.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ namespace thermocomp::faults {
 
 class HistoryDisk {
  public:
-  /// @param folder  a new folder in it is used, and removed at the end
+  /// @param folder  parent of a new folder, which is removed at the end
   HistoryDisk(const std::filesystem::path& folder, std::uint64_t seed,
               const FaultSchedule& schedule);
   HistoryDisk(const HistoryDisk&) = delete;
@@ -24,12 +24,11 @@ class HistoryDisk {
   void boot(const Grid& grid, nanoseconds now);
   [[nodiscard]] std::unique_ptr<CycleRecorder> make_recorder(const Estimator& estimator);
   void work(nanoseconds now);
-  /// The process is gone, perhaps in the middle of a commit. The recorder must not be used again.
+  /// The process dies, possibly during a commit. The recorder must not be used again.
   void kill(nanoseconds now);
-  /// As a service manager ends the daemon, once the recorder has said where it ends: everything is
-  /// written, if the disk takes it.
+  /// Orderly end, after the recorder's last cycle: everything is written if the disk accepts it.
   void end(std::uint64_t last_cycle, nanoseconds now);
-  /// @return what is missing or different in the file; empty: nothing
+  /// @return description of missing or different records; empty: none
   [[nodiscard]] std::string verify();
   [[nodiscard]] std::uint64_t commits() const noexcept;
 

@@ -22,7 +22,7 @@ Invariants::Invariants(const MachineShape& shape, const FaultSchedule& schedule,
   for (const UnitPlace& place : unit_places()) {
     const double timeout_s = 1e-3 * shape.buses[place.bus].line.timeout_ms;
     for (const std::size_t sensor : place.sensors) {
-      // A serial answer carries no number: one to the same question may be up to 3 s old.
+      // Serial answers have no transaction number: one to the same request may be up to 3 s old.
       slack_[sensor] = from_s(timeout_s + (place.bus == 0 ? 0.05 : 3.1));
       const ScreeningConfig& screening = shape.estimator.sensors[sensor].screening;
       stale_after_[sensor] = from_s(screening.stale_after_s);
@@ -47,7 +47,7 @@ Invariants::Invariants(const MachineShape& shape, const FaultSchedule& schedule,
 void Invariants::booted(nanoseconds now, double leap_um) {
   boot_ = now;
   for (std::size_t i = 0; i < axes_count; ++i) {
-    // What a start before this one went by still holds where it has sent nothing.
+    // An axis that has sent nothing keeps the allowance of its last start.
     leap_um_[i] = has_moved_[i] ? leap_um : std::max(leap_um_[i], leap_um);
   }
   wanted_before_um_ = wanted_um_;
@@ -78,7 +78,7 @@ void Invariants::reloaded(const MachineShape& shape) {
     const LimiterConfig& limiter = shape.estimator.axes[i].limiter;
     bound_um_[i] = limiter.offset_um_max;
     largest_bound_um_[i] = std::max(largest_bound_um_[i], limiter.offset_um_max);
-    // What was computed before may still be under way.
+    // An offset computed with the previous rate may still be in transit.
     rate_um_per_s_[i] = std::max(rate_um_per_s_[i], limiter.rate_um_per_s_max);
   }
 }
@@ -90,7 +90,7 @@ void Invariants::restored(const PersistentState& saved, const Report& report,
     const std::string name(1, static_cast<char>('x' + axis));
     const auto learned = RunningCorrection::persistent(report.axes[axis].correction);
     for (const auto& [key, value] : saved.correction) {
-      // An uncertainty may be greater than before: drift has been added to it.
+      // A restored standard deviation may be larger: drift was added.
       if (!key.starts_with(name + ".") || key.ends_with("_sd")) continue;
       const auto found = learned.find(key.substr(name.size() + 1));
       demand(found != learned.end() && found->second == value, "state_survives_restart", now,
@@ -116,7 +116,7 @@ void Invariants::restored(const PersistentState& saved, const Report& report,
   for (std::size_t axis = 0; axis < axes_count; ++axis) {
     offset_um_[axis] = report.axes[axis].offset_um;
     const auto found = saved.offset_um.find(std::string(1, static_cast<char>('x' + axis)));
-    // Of an earlier, larger bound it is not taken; of a record there is a later one.
+    // An offset beyond the bound is not restored; without read-back a newer record may exist.
     demand(found == saved.offset_um.end() || found->second == offset_um_[axis] || !reads_back_ ||
                std::abs(found->second) > bound_um_[axis],
            "state_survives_restart", now, "offset of an axis");
@@ -174,8 +174,8 @@ void Invariants::check_command(const CycleSeen& seen) {
   }
 }
 
-/// Not driven: what would be sent first is zero. A driven axis goes there only where an operator
-/// has set it to zero, and nothing has been sent since.
+/// Not driven, with an initial offset of zero. A driven axis starts at zero only after an operator
+/// has set it to zero, until a value has been sent.
 bool Invariants::is_released(const CycleSeen& seen, std::size_t axis) const {
   const double step_um = rate_um_per_s_[axis] * period_s_ + tiny_um;
   return !reads_back_ && std::abs(seen.command->offset_um[axis]) <= step_um &&
@@ -186,7 +186,7 @@ bool Invariants::is_released(const CycleSeen& seen, std::size_t axis) const {
 void Invariants::check_hold(const CycleSeen& seen) {
   const CompensationConfig& policy = seen.shape->estimator.compensation;
   const Report& report = *seen.report;
-  // With a covariance a lost block is estimated.
+  // With a covariance, lost blocks are estimated.
   const bool lost = seen.shape->model.covariance_K2.empty() && any_block_lost(seen.now);
   check_suspicion(report, seen.now);
   const bool twice = lost && lost_before_;
@@ -218,7 +218,7 @@ void Invariants::check_hold(const CycleSeen& seen) {
     if (!twice || resynced) continue;
     const bool may_ramp = policy.on_loss == LossPolicy::ramp_to_zero && held_s >= policy.hold_s;
     const bool inwards = std::abs(seen.command->offset_um[i]) < std::abs(offset_um_[i]);
-    // At a new epoch the offset starts from the read-back.
+    // A new epoch starts from the read-back.
     const bool at_applied = std::abs(seen.command->offset_um[i] - seen.reported->applied_um[i]) <=
                             register_rounding_um + rate_um * (may_ramp && !cutting ? 1.0 : 0.0);
     demand(at_applied || (may_ramp && inwards && !cutting), "hold_policy_kept", seen.now, [&] {
@@ -238,7 +238,7 @@ void Invariants::note_learned(const Report& report) {
   for (const InputReport& input : report.inputs) held_degC_.push_back(input.held_degC);
 }
 
-/// Probings and cycle ends.
+/// Checks corrections from probings and the values held between cycle ends.
 void Invariants::check_correction(const CycleSeen& seen) {
   const MachineShape& shape = *seen.shape;
   const Report& report = *seen.report;
@@ -270,7 +270,7 @@ void Invariants::check_correction(const CycleSeen& seen) {
   referenced_ = false;
 }
 
-/// What a node of the travel is moved by is the model's with the slide there, wherever it stands.
+/// A travel node's displacement is the model's with the slide at the node, wherever the slide is.
 void Invariants::check_node(const CycleSeen& seen, std::size_t axis) {
   const ThermalModel& model = seen.shape->model;
   const std::vector<double>& row =
@@ -301,9 +301,9 @@ void Invariants::check_learning(const CycleSeen& seen, std::size_t axis) {
     change_um += (now.gain[g] - before.gain[g]) * learned_[axis].contribution_um[g];
     used_changed = used_changed || now.gain_used[g] != before.gain_used[g];
   }
-  if (referenced_) return;  // the bias was one from the reference before
+  if (referenced_) return;  // the bias belonged to the previous reference
   const double allowed_um = config.step_um_max * static_cast<double>(probings_[axis]) + 1e-6;
-  // Without a prediction it is not known here what the contributions were.
+  // The contributions are known only if displacement was predicted.
   if (learned_[axis].predicted && !first_)
     demand(std::abs(change_um) <= allowed_um, "probing_step_bounded", seen.now, [&] {
       return fmt::format("axis {}: the estimate moves by {:.4f} um, {:.4f} allowed", axis,
@@ -320,15 +320,15 @@ void Invariants::check_cycle_hold(const CycleSeen& seen) {
   for (std::size_t i = 0; same && i < inputs.size(); ++i)
     same = inputs[i].held_degC == held_degC_[i] ||
            (std::isnan(inputs[i].held_degC) && std::isnan(held_degC_[i]));
-  // A new reference is a new beginning.
+  // A new reference resets the held temperatures.
   const bool may_change = seen.report->cycle_ends > ends_at_hold_ || referenced_ || first_;
   demand(same || may_change, "held_between_cycle_ends", seen.now,
          [] { return std::string("the held temperatures change without a cycle end"); });
-  // In the first cycle there is nothing yet that could have been held.
+  // The first cycle has no previous held values.
   if (!same && !referenced_ && !first_) ends_at_hold_ = seen.report->cycle_ends;
 }
 
-/// What is held are temperatures: the displacement is theirs, by the matrix and gains of now.
+/// Temperatures are held: their displacement uses the current matrix and gains.
 void Invariants::check_held_displacement(const CycleSeen& seen, std::size_t axis) {
   const MachineShape& shape = *seen.shape;
   const AxisReport& report = seen.report->axes[axis];
@@ -377,7 +377,7 @@ void Invariants::check_recovery(const CycleSeen& seen, SimulatedController& cont
   }
 }
 
-/// Within the link's patience, and the turn and the cycles in which it comes to be known.
+/// Allowed time: patience and turn of the link, and the cycles until it is reported.
 void Invariants::check_written(const CycleSeen& seen, const SimulatedController& controller) {
   const double allowed_s = patience_s_ + turn_s_ + 3.0 * period_s_;
   const double since_s = to_s(seen.now - controller.written_at());

@@ -1,4 +1,4 @@
-// What is demanded of readings and of the sensors that are used.
+// Invariants of readings and of the sensors in use.
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
@@ -20,7 +20,7 @@ void Invariants::check_readings(const CycleSeen& seen) {
                          reading.temp_degC != before.temp_degC || reading.fault != before.fault;
     if (!new_one) continue;
     before = reading;
-    // What no thermocouple can be is the screening's to refuse.
+    // Implausible values are left to screening.
     const bool believable = std::abs(reading.temp_degC) < 200.0 && reading.temp_degC > -30.0;
     if (reading.fault != Fault::none || !(believable || std::isnan(reading.temp_degC))) continue;
     demand(reading.taken_at <= seen.now, "reading_is_what_was_given", seen.now, [&] {
@@ -42,7 +42,7 @@ bool Invariants::fresh(std::size_t sensor, nanoseconds now) const {
   return given_at >= nanoseconds{0} && now - given_at <= stale_after_[sensor] + slack_of(sensor);
 }
 
-/// As long as every block has a sensor that is not faulted, no suspicion ends the compensation.
+/// While each block has a sensor without fault, suspicion must not end compensation.
 void Invariants::check_suspicion(const Report& report, nanoseconds now) {
   const bool all_there = std::all_of(blocks.begin(), blocks.end(), [&](const auto& block) {
     return std::any_of(block.begin(), block.end(), [&](std::size_t sensor) {
@@ -81,7 +81,7 @@ void Invariants::check_sensors_used(const CycleSeen& seen) {
       return;
     }
     constexpr double believable_after_s = 90.0;
-    // The very first value has nothing to be compared with; the second may not leave it standing.
+    // The first value cannot be compared; the second may contradict it.
     if (first_used_[i] < nanoseconds{0}) first_used_[i] = seen.now;
     const bool first = to_s(seen.now - first_used_[i]) < 4.0;
     if (sample->impossible && !first && to_s(seen.now - last_used_[i]) < believable_after_s)
@@ -91,8 +91,7 @@ void Invariants::check_sensors_used(const CycleSeen& seen) {
   }
 }
 
-/// A daemon that starts beside a false reading has no past to tell it by; what it read while the
-/// sensor settled is none.
+/// A daemon started during a false reading cannot detect it; values during settling do not count.
 void Invariants::check_truth(const CycleSeen& seen) {
   for (std::size_t i = 0; i < sensors_count; ++i) {
     const SensorReport& sensor = seen.report->sensors[i];

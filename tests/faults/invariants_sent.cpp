@@ -1,4 +1,4 @@
-// What is demanded of what reaches the controller.
+// Invariants of the values written to the controller.
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
@@ -8,9 +8,9 @@
 namespace thermocomp::faults {
 namespace {
 
-/// What was sent so long ago does not explain a read-back any more [s].
+/// Older sent offsets no longer explain a read-back [s].
 constexpr double window_s = 10.0;
-/// The window of comparison, and the read-back and the command that are under way at its end.
+/// Comparison window, and the read-back and command in transit at its end.
 constexpr nanoseconds settling = std::chrono::seconds(8);
 
 }  // namespace
@@ -18,9 +18,8 @@ constexpr nanoseconds settling = std::chrono::seconds(8);
 void Invariants::check_move(const CycleSeen& seen, const Move& move,
                             const SimulatedController& controller) {
   demand(std::isfinite(move.to_um), "only_finite_numbers", seen.now, "register of the controller");
-  // In the time that answers are waited for a controller can restart: what is written was looked at
-  // just before.
-  // The rest of an answer that has begun may take as long again.
+  // The controller may restart during a timeout, so values are written right after a read. The rest
+  // of an answer that has begun may take as long again.
   const double looked_s_max = 2.0 * (link_timeout_s_ + std::min(link_timeout_s_, 0.7)) + 0.05;
   demand(to_s(move.at - move.looked_at) <= looked_s_max, "looked_before_written", seen.now, [&] {
     return fmt::format("axis {}: written {:.3f} s after the last look, {:.3f} allowed", move.axis,
@@ -33,16 +32,16 @@ void Invariants::check_move(const CycleSeen& seen, const Move& move,
   budget.um = std::min(budget.um + rate_um * elapsed_s, rate_um * stall_s);
   budget.at = move.at;
   const double change_um = std::abs(move.to_um - move.from_um);
-  // Offsets move on the cycle's grid, writes come when the link has its turn: one cycle besides.
+  // Offsets change per cycle, writes follow the link's period: one more cycle is allowed.
   const double since_seen_um = rate_um * to_s(move.at - move.seen_at);
   double allowed_um = (move.disturbed ? std::min(budget.um, since_seen_um) : budget.um) +
                       rate_um * period_s_ + 2.0 * resolution_um_ +
                       (has_moved_[move.axis] ? 0.0 : leap_um_[move.axis]);
-  // An operator may have released an axis on the word of a controller that has stopped lying since.
+  // A release may rely on read-backs that were false until 4 s ago.
   const bool lies = controller.lies(move.at) || controller.lies(move.at - from_s(4.0));
   if (move.disturbed || lies) budget.disturbed_at = move.at;
   if (move.at - budget.disturbed_at < settling) {
-    // What lies among the offsets sent of late cannot be told from obedience.
+    // Any applied offset within the range sent recently is taken for an obeyed one.
     const auto end = budget.reported_um.begin() +
                      static_cast<std::ptrdiff_t>(std::min<std::size_t>(budget.count, 16));
     const auto [low, high] = std::minmax_element(budget.reported_um.begin(), end);
@@ -64,9 +63,8 @@ void Invariants::check_move(const CycleSeen& seen, const Move& move,
          });
 }
 
-/// Without read-back nothing moves before a write is confirmed: what is sent first is what the
-/// registers held or, where they cannot be read, what was wanted last. An axis that is released
-/// goes on from 0 while others are written.
+/// Without read-back no axis moves before a write is confirmed: the first value is the register's
+/// content or, if unreadable, the last wanted offset. A released axis continues from 0.
 void Invariants::check_first(const CycleSeen& seen, const Move& move) {
   const double rounding_um = 2.0 * resolution_um_ + tiny_um;
   const double slack_um =
@@ -84,9 +82,8 @@ void Invariants::check_first(const CycleSeen& seen, const Move& move) {
          });
 }
 
-/// Two values sent one after the other differ by no more than the slew allows, whatever was read
-/// back between them. A link that is new begins from what is applied: between zero and what was
-/// sent lately.
+/// Consecutive values differ by at most the slew limit, whatever was read back between them. A new
+/// link starts from the applied offset: between zero and the values sent recently.
 void Invariants::check_sent(const CycleSeen& seen, const Move& move) {
   Sent& sent = sent_[move.axis];
   const double rate_um_per_s = rate_um_per_s_[move.axis];
@@ -133,7 +130,7 @@ std::pair<double, double> Invariants::Sent::range_um(double with_um) const {
   return range;
 }
 
-/// Read-backs that nothing sent explains, one after the other: the axis is not driven.
+/// Repeated read-backs that nothing sent explains: the axis is not driven.
 void Invariants::check_unexplained(const CycleSeen& seen, std::size_t axis) {
   Sent& sent = sent_[axis];
   const double reported_um = seen.reported->applied_um[axis];
@@ -146,8 +143,8 @@ void Invariants::check_unexplained(const CycleSeen& seen, std::size_t axis) {
   sent.latched = latched;
   if (!reads_back_ || !seen.reported->online || sent.lately.empty() || !std::isfinite(reported_um))
     return;
-  // What the cycle wants explains a read-back as well as what reached the controller: after a
-  // release or on a new link it starts from what is read back, and the write may be refused.
+  // Wanted offsets explain a read-back as well: after a release or on a new link they start from
+  // the read-back, and the write may be refused.
   const double wanted_um = seen.command->offset_um[axis];
   if (seen.command->valid[axis] &&
       (sent.wanted.empty() || seen.now - sent.wanted.back().first > from_s(0.5)))
@@ -162,7 +159,7 @@ void Invariants::check_unexplained(const CycleSeen& seen, std::size_t axis) {
   const double slack_um = seen.shape->estimator.compensation.mismatch_um + 2.0 +
                           rate_um_per_s_[axis] * (link_period_s_ + 2.0 * period_s_);
   const bool unexplained = reported_um < low_um - slack_um || reported_um > high_um + slack_um;
-  // What has been latched, or was before a release, counts from here.
+  // The count restarts after a reported mismatch.
   const bool is_reported =
       latched || has_reason(seen.report->reasons, Reason::applied_out_of_bound);
   if (!unexplained || is_reported) sent.unexplained = 0;

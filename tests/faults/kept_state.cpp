@@ -84,7 +84,7 @@ void KeptState::write(const PersistentState& state) {
 }
 
 void KeptState::kill() {
-  // What is being written goes on without the process, or never began.
+  // A write in progress either completes or never began.
   if (writing_ && chance_.one_in(2)) write(writing_->state);
   record_.reset();
 }
@@ -105,7 +105,7 @@ bool KeptState::is_behind(const PersistentState& then, const std::string& axis) 
 void KeptState::end(const PersistentState& state) {
   if (writing_) write(writing_->state);
   PersistentState last = state;
-  last.controller = on_disk_.controller;  // once it has run there is a file
+  last.controller = on_disk_.controller;  // exists since the first run
   write(last);
   record_.reset();
 }

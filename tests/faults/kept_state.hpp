@@ -1,5 +1,5 @@
-/// What outlives a daemon whose controller shows nothing: its real state file and last-sent record,
-/// on a disk that takes its time and fills up.
+/// State that survives a daemon without read-back: its real state file and last-sent record, on a
+/// disk that is slow and fills up.
 #pragma once
 
 #include <filesystem>
@@ -19,28 +19,27 @@ namespace thermocomp::faults {
 
 class KeptState {
  public:
-  /// @param folder  of this life alone; removed at its end
+  /// @param folder  used by this life only; removed at its end
   KeptState(std::filesystem::path folder, std::uint64_t seed, const FaultSchedule& schedule);
   ~KeptState();
   KeptState(const KeptState&) = delete;
   KeptState& operator=(const KeptState&) = delete;
 
-  /// What the daemon starts with.
+  /// The state at the daemon's start.
   [[nodiscard]] StartState boot(const MachineShape& shape);
   [[nodiscard]] LastSent* record() noexcept { return record_.get(); }
-  /// Main's turn: what has been written, and what must be.
-  /// @return the commands that tell the estimator what is on disk
-  /// @param is_waited_for  an axis would go on if it were told
+  /// Work of the main thread: note completed writes, begin necessary ones.
+  /// @return commands that report the saved state to the estimator
+  /// @param is_waited_for  an axis is waiting for this report
   [[nodiscard]] std::vector<Command> note(const PersistentState& state, const MachineShape& shape,
                                           nanoseconds now, bool is_waited_for);
-  /// The process ends: killed, or with the system, which leaves the file as it was flushed last and
-  /// nothing of the record.
+  /// Ends the process by a kill.
   void kill();
   void cut_power();
-  /// Whether the file says something else of an axis than the state then: another offset than its
-  /// corridor allows, or an offset that is not known any more.
+  /// True if the file contradicts the state for an axis: its offset is outside the corridor, or it
+  /// has an offset that is no longer known.
   [[nodiscard]] bool is_behind(const PersistentState& then, const std::string& axis) const;
-  /// In order: what the state is at the end is saved.
+  /// Orderly end: the final state is saved.
   void end(const PersistentState& state);
 
  private:

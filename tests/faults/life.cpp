@@ -20,7 +20,7 @@ namespace {
 
 constexpr nanoseconds life_begin = std::chrono::hours(1);
 constexpr nanoseconds saved_every = std::chrono::seconds(10);
-/// Of the service: WatchdogSec and RestartSec.
+/// WatchdogSec and RestartSec of the service.
 constexpr nanoseconds watchdog = std::chrono::seconds(5);
 constexpr nanoseconds restarted_after = std::chrono::seconds(2);
 
@@ -84,7 +84,7 @@ class Life {
     judge_.demand(refused.empty(), "state_survives_restart", world_.now, "a reference was refused");
     report_ = parts->estimator.make_report();
     judge_.booted(world_.now, leap_um);
-    // The very first value becomes the reference; a later start has one already.
+    // The first value becomes the reference; later starts already have one.
     if (!restarted_) world_.thermocouples.no_spikes_before(world_.now + std::chrono::seconds(15));
     if (restarted_)
       judge_.restored(saved_, report_, shape_.model.temperature_columns(), world_.now);
@@ -140,7 +140,7 @@ class Life {
     }
   }
 
-  /// What main does between two cycles.
+  /// Work of the main thread between two cycles.
   void serve() {
     operate();
     release();
@@ -149,14 +149,14 @@ class Life {
     if (!reload()) release_model();
   }
 
-  /// Main stands still; the service manager has ended what came before its last kill.
+  /// The current stall of the main thread, except one already ended by a watchdog kill.
   [[nodiscard]] const FaultEvent* stall() const {
     const FaultEvent* found = schedule_.find(FaultKind::main_stands_still, world_.now);
     return found != nullptr && found->number != last_stall_ ? found : nullptr;
   }
 
   [[nodiscard]] bool killed() {
-    // Where only the state file knows the offset, kills are too rare to show much of it.
+    // With offsets only in the state file, kills alone are too rare: add power cuts.
     power_was_cut_ =
         kept_ && power_cuts_.one_in(static_cast<std::uint64_t>(900 * options_.cycle_hz));
     if (power_was_cut_) return true;
@@ -181,7 +181,7 @@ class Life {
                  power_was_cut_ ? " after a power cut" : "");
   }
 
-  /// Every other kill is a service manager's, which the daemon takes as an order to end.
+  /// Every other kill is an orderly end by the service manager.
   void finish() {
     const std::optional<std::uint64_t> ended =
         last_kill_ % 2 == 0 && !power_was_cut_ && !watchdog_bit_
@@ -191,7 +191,7 @@ class Life {
       disk_->end(*ended, world_.now);
     } else if (disk_) {
       disk_->kill(world_.now);
-    } else if (!judge_.broken()) {  // a twin that has come out different goes on no further
+    } else if (!judge_.broken()) {  // a twin that differs is not continued
       if (const auto different = twin_->finish())
         judge_.demand(
             false, "replay_is_exact", world_.now,
@@ -207,7 +207,7 @@ class Life {
     if (in_order) return kept_->end(then);
     if (!power_was_cut_) return kept_->kill();
     kept_->cut_power();
-    // While an axis is driven the file is never behind.
+    // The file of a driven axis is never outdated.
     for (std::size_t i = 0; i < axes_count; ++i)
       if (!report_.axes[i].driven && kept_->is_behind(then, shape_.estimator.axes[i].name))
         judge_.lost(i);
@@ -230,8 +230,7 @@ class Life {
     static_cast<void>(daemon_->cycle().send(command));
   }
 
-  /// An operator who has looked into a mismatch releases the axis some time after all is well; now
-  /// and then one who has not does so at once.
+  /// An operator releases a latched axis after the faults have ended, sometimes during them.
   void release() {
     const Episode* episode = schedule_.episode_at(world_.now);
     const bool well = episode == nullptr || world_.now < episode->begin;
@@ -242,13 +241,13 @@ class Life {
         continue;
       const Command command{CommandKind::release, static_cast<std::uint32_t>(axis), 0.0};
       if (!daemon_->cycle().send(command)) continue;
-      // Nodes of a travel are released together.
+      // The nodes of a travel are released together.
       const AxisSpan released = span_of(shape_.estimator.axes, axis);
       for (std::size_t i = released.first; i < released.end(); ++i) judge_.released(i);
     }
   }
 
-  /// An operator who sees that a sensor is right, though nothing in the machine confirms it.
+  /// An operator accepts a sensor that is right but unconfirmed.
   void accept() {
     for (std::size_t i = 0; i < sensors_count; ++i) {
       const double shown_degC = report_.sensors[i].raw_degC;
@@ -262,8 +261,8 @@ class Life {
     }
   }
 
-  /// Where nothing tells what was sent last, or more than the bound is applied: the operator sets
-  /// the offset at the controller to zero and says so.
+  /// If the last sent offset is unknown, or the applied one exceeds the bound, the operator zeroes
+  /// the offset at the controller and releases the axis.
   void set_to_zero(std::size_t axis, bool well) {
     const bool unknown = report_.axes[axis].start_unknown;
     const bool beyond =
@@ -282,9 +281,8 @@ class Life {
     return probings_.one_in(static_cast<std::uint64_t>(period_s * options_.cycle_hz));
   }
 
-  /// Cycle ends, displacements measured at the tool and new references, at random times. None can
-  /// be relied on: cycle ends come twice or long not at all; probings are far off, from minutes
-  /// ago, no number, sent twice or never.
+  /// Random, unreliable cycle ends, probings and new references: cycle ends are doubled or missing
+  /// for long; probings are far off, minutes old, not numbers, doubled or missing.
   void probe() {
     if (!corrects_itself(options_.seed)) return;
     if (once_in(45.0)) {
@@ -323,7 +321,7 @@ class Life {
     judge_.probed(axis);
   }
 
-  /// What the indicator shows at a machine whose groups of inputs have gains of their own.
+  /// Indicated displacement of a machine whose input groups have gains of their own.
   [[nodiscard]] double measured_um(std::size_t axis) {
     double total_um = report_.displacement_um[axis] + probings_.between(-1.0, 1.0);
     const std::array<double, 2> part_um = contributions_um(shape_, report_, axis);
@@ -332,7 +330,7 @@ class Life {
     return total_um + shape_.estimator.axes[axis].sign * world_.controller.applied_um(axis);
   }
 
-  /// At the begin of the fault another configuration and model; a broken one is refused.
+  /// A new configuration and model at the beginning of the fault; a broken model is refused.
   bool reload() {
     const FaultEvent* fault = schedule_.find(FaultKind::model_reload, world_.now);
     if (fault == nullptr || fault->number == last_reload_) return false;
@@ -352,8 +350,8 @@ class Life {
     daemon_->cycle().hand_over(std::move(parts));
   }
 
-  /// A model from elsewhere at random times, a step each: it runs beside the one in use, is
-  /// promoted, and taken back; or given up, where the daemon was started or reloaded meanwhile.
+  /// Release of another model at random times, one step each: it runs as candidate, is promoted,
+  /// and taken back; or dropped if the daemon was restarted or reloaded meanwhile.
   void release_model() {
     if (!offers_.one_in(static_cast<std::uint64_t>(600.0 * options_.cycle_hz))) return;
     const bool runs_beside = daemon_->cycle().parts().candidate != nullptr;
@@ -398,7 +396,7 @@ class Life {
     }
   }
 
-  /// As the daemon does: switches and references at once, offsets every 10 s.
+  /// Like the daemon: switches and references at once, offsets every 10 s.
   void save_state() {
     const PersistentState state = daemon_->cycle().parts().estimator.persistent_state(report_);
     if (kept_) {
@@ -432,7 +430,7 @@ class Life {
                report_.axes[1].offset_um, report_.axes[2].offset_um);
   }
 
-  /// One cycle in a line: told, applied and sent; kept so that what led to a break can be shown.
+  /// One cycle per line: reported, applied, sent; printed with a broken invariant.
   void remember(const CycleSeen& seen) {
     std::string line =
         fmt::format("{:>10.2f} s  {:<15} epoch {}{}", life_s(), to_string(report_.mode),
@@ -467,24 +465,24 @@ class Life {
   Chance releases_;
   Chance power_cuts_;
   Chance offers_;
-  std::array<double, 2> gains_;                 ///< of the machine, where the model's are 1
-  std::array<double, axes_count> probed_um_{};  ///< measured last
+  std::array<double, 2> gains_;                 ///< of the machine; those of the model are 1
+  std::array<double, axes_count> probed_um_{};  ///< last measurement
   std::array<nanoseconds, sensors_count> unconfirmed_since_{};
   Invariants judge_;
   nanoseconds end_;
   Grid grid_;
   std::unique_ptr<RecordedTwin> twin_;
   std::unique_ptr<HistoryDisk> disk_;
-  std::unique_ptr<KeptState> kept_;  ///< none: the controller shows what it applies
+  std::unique_ptr<KeptState> kept_;  ///< none: the controller has read-back
   bool power_was_cut_{false};
-  bool watchdog_bit_{false};  ///< main has stood still for too long
+  bool watchdog_bit_{false};  ///< the main thread stalled for too long
   SimulatedDaemon* daemon_{nullptr};
   Report report_;
   PersistentState saved_;
   bool restarted_{false};
   nanoseconds next_save_{};
   std::uint64_t last_kill_{0};
-  std::uint64_t last_stall_{0};  ///< that the service manager has ended
+  std::uint64_t last_stall_{0};  ///< the last one ended by the service manager
   std::uint64_t last_reload_{0};
   std::optional<ThermalModel> model_before_;  ///< since a promotion
   std::uint64_t said_{0};

@@ -1,4 +1,4 @@
-/// A life of the daemon beside a machine, in virtual time and from one seed.
+/// A life of the daemon with a simulated machine, in virtual time, from one seed.
 #pragma once
 
 #include <array>
@@ -16,19 +16,19 @@ struct LifeOptions {
   std::uint64_t seed{0};
   double hours{4.0};
   double cycle_hz{1.0};
-  /// Where the history is really written, with a disk that fills up and writes cut off by a kill;
-  /// empty: it goes through the codec in memory, into a second estimator.
+  /// Folder for a real history, on a disk that fills up and with writes cut off by kills; empty:
+  /// history passes through the codec in memory into a second estimator.
   std::filesystem::path history_folder;
-  /// Where a life writes a state file, of which nothing is left at its end.
+  /// Parent folder of the state file; empty again at the end.
   std::filesystem::path state_folder;
   std::optional<FaultKind> only{};  ///< no other fault happens
-  bool verbose{false};              ///< the faults and what becomes of them, on standard output
+  bool verbose{false};              ///< print faults and their effects
 };
 
 struct LifeResult {
   std::uint64_t cycles{0};
   double machine_hours{0.0};
-  std::uint64_t replayed{0};  ///< cycles that a second estimator took again
+  std::uint64_t replayed{0};  ///< cycles repeated by a second estimator
   std::uint64_t restarts{0};
   std::uint64_t reloads{0};
   std::uint64_t promotions{0};

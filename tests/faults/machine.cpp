@@ -9,7 +9,7 @@ namespace thermocomp::faults {
 namespace {
 
 constexpr nanoseconds conversion_period = std::chrono::milliseconds(500);
-/// Between the requests for a value and for its status, where they are two.
+/// Longest time between separate requests for a value and its status.
 constexpr nanoseconds status_apart_max = std::chrono::seconds(12);
 
 }  // namespace
@@ -29,7 +29,7 @@ double Thermocouples::true_degC(std::size_t sensor, nanoseconds time) const noex
          course.swing_K * std::sin(course.rate_per_s * to_s(time) + course.phase);
 }
 
-/// It works loose at a rate that screening lets through, and is pressed back.
+/// Sensor that comes loose at a rate that screening accepts, and is pressed back.
 double Thermocouples::lie_K(std::size_t sensor, nanoseconds time) const noexcept {
   constexpr double rate_K_per_s = 0.3;
   constexpr double lie_K_max = 4.0;
@@ -50,7 +50,7 @@ double Thermocouples::plausible_degC(std::size_t sensor, nanoseconds time) const
   return true_degC(sensor, time) + creep_K(sensor, time);
 }
 
-/// A module set to another unit or decimal point, or one that answers before it has converted.
+/// A module with a wrong unit or decimal point, or one that answers before its first conversion.
 double Thermocouples::through_unit(std::size_t sensor, double temp_degC,
                                    nanoseconds time) const noexcept {
   const auto has = [&, unit = unit_of(sensor)](FaultKind kind) {
@@ -66,7 +66,7 @@ Sample Thermocouples::convert(std::size_t sensor, nanoseconds time) const noexce
   sample.given_at = time;
   const FaultEvent* stuck = schedule_.find(FaultKind::sensor_stuck, time, sensor, sensors_count);
   const nanoseconds at = stuck != nullptr ? stuck->begin : time;
-  std::size_t seen = sensor;  // the wire that is connected where this one should be
+  std::size_t seen = sensor;  // the wire connected to this channel
   const FaultEvent* swapped = schedule_.find(FaultKind::sensors_swapped, at);
   if (swapped != nullptr) {
     const std::size_t a = swapped->subject % sensors_count;
@@ -81,16 +81,16 @@ Sample Thermocouples::convert(std::size_t sensor, nanoseconds time) const noexce
                      0.04 * (static_cast<double>(noise >> 11) * 0x1p-53 - 0.5);
   sample.temp_degC += creep_K(sensor, at);
   const FaultEvent* spikes = schedule_.find(FaultKind::sensor_spiking, at, sensor, sensors_count);
-  // One that is stuck at a spike would be a step, too.
+  // A value stuck at a spike would be a step.
   if (spikes != nullptr && stuck == nullptr && at >= spikes_from_ && noise % 3 == 0) {
-    // Each of another height than the ones near it: two that agree would be a step, not spikes.
+    // Consecutive spikes differ in height: two equal ones would be a step.
     sample.temp_degC += (spikes->strength < 0.5 ? 55.0 : 300.0) +
                         3.0 * static_cast<double>(conversion % 13) +
                         0.01 * static_cast<double>(noise % 100);
     sample.impossible = true;
   }
   const double shown_degC = through_unit(sensor, sample.temp_degC, time);
-  // Of 330 degC a unit in tenths shows 33, which may be.
+  // A unit in tenths shows 33 for 330 degC, which is possible.
   sample.impossible = sample.impossible && shown_degC == sample.temp_degC;
   sample.temp_degC = shown_degC;
   sample.good = whole(sensor, time);
@@ -139,7 +139,7 @@ void Thermocouples::read(std::size_t unit, std::size_t address, std::span<std::u
       put(place, value, {.temp_degC = open ? 3000.0 : -3000.0});
     else if (!sample.good && !place.has_status)
       value[0] = open ? 0x7FFF : 0x8000;
-    // A status asked for by itself may be from before the fault, or from after it.
+    // A separately requested status may be from before or after the fault.
     if (place.has_status && address + words.size() <= at + 2)
       sample.good = sample.good || whole(sensor, time - status_apart_max) ||
                     whole(sensor, time + status_apart_max);
@@ -205,7 +205,7 @@ bool SimulatedController::lies(nanoseconds time) const noexcept {
                      [&](FaultKind kind) { return schedule_.find(kind, time) != nullptr; });
 }
 
-/// A fault of this kind of one axis, or of all.
+/// The active fault of this kind for this axis or all axes.
 const FaultEvent* SimulatedController::lie(FaultKind kind, std::size_t axis,
                                            nanoseconds time) const {
   const FaultEvent* found = schedule_.find(kind, time);
@@ -213,7 +213,7 @@ const FaultEvent* SimulatedController::lie(FaultKind kind, std::size_t axis,
                                                                                      : nullptr;
 }
 
-/// What the controller says it applies.
+/// The read-back of an axis.
 double SimulatedController::shown_um(std::size_t axis, nanoseconds time) {
   double shown = applied_um_[axis];
   if (const FaultEvent* scaled = lie(FaultKind::read_back_scaled, axis, time))
@@ -263,7 +263,7 @@ void SimulatedController::advance(nanoseconds time) {
   on_ = on;
   const FaultEvent* rehoming = schedule_.find(FaultKind::controller_rehomed, time);
   if (rehoming == nullptr || rehoming->number == last_rehoming_) return;
-  // Every other one comes when it is least convenient: right after a new link's first reading.
+  // Every other one occurs at the worst time: right after the first read of a new link.
   if (rehoming->subject / 4 % 2 == 1 && reads_since_break_ != 1) return;
   last_rehoming_ = rehoming->number;
   for (std::size_t axis = 0; axis < axes_count; ++axis) {
@@ -300,8 +300,7 @@ bool SimulatedController::read(std::size_t address, std::span<std::uint16_t> wor
     if (at >= 100 && at < 100 + image.size()) words[i] = image[at - 100];
     if (at >= 200 && at < 200 + written_.size()) words[i] = written_[at - 200];
   }
-  // A restart is recognised by registers, or by having been away for long since the daemon was
-  // there.
+  // A restart is visible in registers, or as a long absence since the last contact with the daemon.
   const bool tells =
       reads_back(seed_) || of_written || (!shows_registers(seed_) && restart_is_noticed_);
   is_in_contact_ = true;
@@ -313,7 +312,7 @@ bool SimulatedController::read(std::size_t address, std::span<std::uint16_t> wor
   return true;
 }
 
-/// By its valid bit; the nodes of a travel by that of their axis, and only as a whole set.
+/// True if the valid bit is set; for travel nodes the bit of their axis, with a complete set.
 bool SimulatedController::is_ordered(std::size_t axis) const noexcept {
   const bool is_node = interpolates(seed_) && axis > 0;
   const std::size_t begin = words_an_offset();
@@ -329,7 +328,7 @@ bool SimulatedController::write(std::size_t address, std::span<const std::uint16
   if (address < 200 || address + words.size() > 216) return false;
   std::copy(words.begin(), words.end(),
             written_.begin() + static_cast<std::ptrdiff_t>(address - 200));
-  if (address + words.size() <= 200 + valid_at()) return true;  // the mark of validity comes later
+  if (address + words.size() <= 200 + valid_at()) return true;  // valid bits follow
   written_at_ = time;
   for (std::size_t axis = 0; axis < axes_count; ++axis) {
     if (!is_ordered(axis)) continue;

@@ -1,5 +1,5 @@
-/// A small machine as it truly is: temperatures, the units that read them, the controller. All of
-/// it a function of time and seed, and a memory of what was really given out.
+/// The true state of a small machine: temperatures, their measuring units, the controller. A
+/// function of time and seed, with a record of the values given out.
 #pragma once
 
 #include <array>
@@ -21,41 +21,40 @@ inline constexpr std::size_t buses_count = 2;
 inline constexpr std::size_t units_count = 4;
 inline constexpr std::size_t axes_count = 3;
 
-/// Whether the model of this life learns from probings. Every other life stays without, so that
-/// what the rarest bugs need does not become rarer still.
+/// True if the model of this life learns from probings. Every other life does not, so that rare
+/// bugs do not become rarer.
 [[nodiscard]] constexpr bool corrects_itself(std::uint64_t seed) noexcept {
   return seed % 2 == 1;
 }
 
-/// Whether the model of this life has a covariance, so that sensors are judged by their neighbours;
-/// then one of them lies plausibly for an hour of two.
+/// True if the model of this life has a covariance, so that sensors are checked against their
+/// neighbours; one sensor then has a plausible error during one of every two hours.
 [[nodiscard]] constexpr bool judges_sensors(std::uint64_t seed) noexcept {
   return seed % 3 == 1;
 }
 
-/// Whether the controller of this life interpolates by itself: the second and third axis are then
-/// two nodes of one travel, and their offsets a set of registers. Not where the model corrects
-/// itself.
+/// True if the controller of this life interpolates: the second and third axis are two nodes of one
+/// travel, with their offsets in one register set. Excludes corrects_itself().
 [[nodiscard]] constexpr bool interpolates(std::uint64_t seed) noexcept {
   return seed % 8 == 2;
 }
 
-/// Whether the controller of this life may take seconds for an answer, and is waited for.
+/// True if the controller of this life may take seconds to answer, with a matching timeout.
 [[nodiscard]] constexpr bool waits_long(std::uint64_t seed) noexcept {
   return seed % 8 == 5;
 }
 
-/// Whether the controller of this life shows what it applies. Where it does not, nothing but its
-/// restart changes that by itself.
+/// True if the controller of this life has read-back. Without it, its applied offset changes by
+/// itself only at a restart.
 [[nodiscard]] constexpr bool reads_back(std::uint64_t seed) noexcept {
   return seed % 8 != 6 && seed % 32 != 10;
 }
-/// Whether the registers that are written can be read. Of a set they must.
+/// True if the written registers can be read; required for a set.
 [[nodiscard]] constexpr bool shows_registers(std::uint64_t seed) noexcept {
   return seed % 16 != 6;
 }
 
-/// The configuration of a life, drawn from its seed.
+/// Configuration of a life, drawn from its seed.
 struct MachineShape {
   MachineShape(std::uint64_t seed, double cycle_hz);
 
@@ -65,14 +64,14 @@ struct MachineShape {
   ThermalModel model;
   bool offsets_are_float{false};
 
-  /// What an operator might change while the daemon runs: bounds, slew, matrix, policy.
+  /// Changes that an operator might make by a reload: bounds, slew, matrix, policy.
   void change_for_reload(Chance& chance);
-  /// The model in use with another matrix.
+  /// The active model with another matrix.
   [[nodiscard]] ThermalModel offered_model(Chance& chance) const;
 };
 
-/// How the registers of one simulated unit are laid out; the same as in MachineShape, told apart so
-/// that what the drivers decode is checked against another encoder than theirs.
+/// Register layout of a simulated unit; equal to MachineShape but defined separately, so that the
+/// drivers' decoding is checked against an independent encoder.
 struct UnitPlace {
   std::size_t bus{0};
   int unit{1};
@@ -85,12 +84,12 @@ struct UnitPlace {
 [[nodiscard]] const std::array<UnitPlace, units_count>& unit_places();
 [[nodiscard]] std::size_t unit_of(std::size_t sensor);
 
-/// A value that a unit gave out for a sensor.
+/// A sensor value given out by a unit.
 struct Sample {
   nanoseconds given_at{-1};
   nanoseconds converted_at{-1};
   double temp_degC{0.0};
-  bool good{false};        ///< not marked as a fault by the unit
+  bool good{false};        ///< not marked as faulty by the unit
   bool impossible{false};  ///< a spike no structure can follow
 };
 
@@ -98,18 +97,18 @@ class Thermocouples {
  public:
   Thermocouples(std::uint64_t seed, const FaultSchedule& schedule);
 
-  /// Registers `address`.. of a unit as they stand at `time`; remembers what was given out.
+  /// Registers from `address` on at `time`; records the values given out.
   void read(std::size_t place, std::size_t address, std::span<std::uint16_t> words,
             nanoseconds time);
-  /// A daemon that has just started has nothing to tell its first value from a spike by.
+  /// No spikes until then: a daemon cannot recognise a spike in its first value.
   void no_spikes_before(nanoseconds time) noexcept { spikes_from_ = time; }
-  /// What the sensor shows where it is, with what creeps into it, and without any fault that a look
-  /// at the machine would show at once.
+  /// Temperature at the sensor's place plus creeping errors, without the faults that an inspection
+  /// of the machine shows at once.
   [[nodiscard]] double plausible_degC(std::size_t sensor, nanoseconds time) const noexcept;
   /// A good sample of the sensor with this value given out in [from, to]; nullptr: none.
   [[nodiscard]] const Sample* given(std::size_t sensor, double temp_degC, nanoseconds from,
                                     nanoseconds to) const noexcept;
-  /// When the newest good value that was given out of this sensor was converted; -1: never.
+  /// Conversion time of the sensor's newest good value; -1: none.
   [[nodiscard]] nanoseconds last_good(std::size_t sensor) const noexcept {
     return last_good_[sensor];
   }
@@ -122,7 +121,7 @@ class Thermocouples {
   [[nodiscard]] double through_unit(std::size_t sensor, double temp_degC,
                                     nanoseconds time) const noexcept;
   [[nodiscard]] Sample convert(std::size_t sensor, nanoseconds time) const noexcept;
-  /// Neither open nor short.
+  /// Neither open nor shorted.
   [[nodiscard]] bool whole(std::size_t sensor, nanoseconds time) const noexcept;
   void put(const UnitPlace& place, std::span<std::uint16_t> value, const Sample& sample) const;
   void remember(std::size_t sensor, const Sample& sample) noexcept;
@@ -142,27 +141,27 @@ class Thermocouples {
   std::array<nanoseconds, sensors_count> last_good_{};
 };
 
-/// What the controller takes and shows; a write that reaches it is one `Move` an axis.
+/// Controller registers; a write that reaches it becomes one `Move` per axis.
 struct Move {
   std::size_t axis{0};
   nanoseconds at{};
-  double from_um{0.0};  ///< applied until now
-  double to_um{0.0};    ///< told
-  /// The controller changed something by itself since our last accepted write.
+  double from_um{0.0};  ///< applied before
+  double to_um{0.0};    ///< written
+  /// The controller has changed this offset by itself since the last accepted write.
   bool disturbed{false};
-  bool seen{false};         ///< ... and has told it since (a read-back was served)
+  bool seen{false};         ///< ... and reported it in a read-back since
   std::uint64_t breaks{0};  ///< of the link, until then
-  nanoseconds looked_at{};  ///< when a read-back was served last
-  nanoseconds seen_at{};    ///< when the first that tells of the change was
+  nanoseconds looked_at{};  ///< time of the last read-back
+  nanoseconds seen_at{};    ///< time of the first read-back that showed the change
 };
 
 class SimulatedController {
  public:
   SimulatedController(std::uint64_t seed, const FaultSchedule& schedule, bool floats);
 
-  /// Registers as they stand at `time`. @return false: refused
+  /// Registers at `time`. @return false: refused
   bool read(std::size_t address, std::span<std::uint16_t> words, nanoseconds time);
-  /// A daemon starts, which knows nothing of restarts before.
+  /// A new daemon, without knowledge of earlier restarts.
   void daemon_starts() noexcept { is_in_contact_ = restart_is_noticed_ = false; }
   /// An operator sets the offset to zero.
   void set_to_zero(std::size_t axis);
@@ -170,20 +169,19 @@ class SimulatedController {
   bool write(std::size_t address, std::span<const std::uint16_t> words, nanoseconds time);
 
   [[nodiscard]] bool powered(nanoseconds time) const noexcept;
-  /// What it applies is not what it was told, or what it says is not what it applies.
+  /// True if the written, applied and read-back offsets may differ.
   [[nodiscard]] bool lies(nanoseconds time) const noexcept;
-  /// Something went wrong on the line, or it was connected anew: what comes after it may be another
-  /// controller, or the same one restarted.
+  /// A line error or new connection: the device may now be another controller, or a restarted one.
   void link_broke() noexcept {
     ++breaks_;
     reads_since_break_ = 0;
   }
   [[nodiscard]] std::uint64_t link_breaks() const noexcept { return breaks_; }
-  /// As it shows it: where the model corrects itself, wrong for two seconds now and then.
+  /// The signal as shown: wrong for two seconds at times if the model learns from probings.
   [[nodiscard]] bool says_cutting(nanoseconds time) const noexcept;
   [[nodiscard]] bool switched_off(nanoseconds time) const noexcept;
   [[nodiscard]] double applied_um(std::size_t axis) const noexcept { return applied_um_[axis]; }
-  /// When it took over the newest command it was sent.
+  /// Time of the newest accepted command.
   [[nodiscard]] nanoseconds written_at() const noexcept { return written_at_; }
   /// Moves since the last call.
   [[nodiscard]] std::vector<Move>& moves() noexcept { return moves_; }
@@ -195,7 +193,7 @@ class SimulatedController {
   [[nodiscard]] const FaultEvent* lie(FaultKind kind, std::size_t axis, nanoseconds time) const;
   [[nodiscard]] double shown_um(std::size_t axis, nanoseconds time);
   [[nodiscard]] std::size_t words_an_offset() const noexcept { return floats_ ? 2 : 1; }
-  /// Of the registers written, from 200: where an axis' offset stands, and the valid bits.
+  /// Index in the written registers (from 200) of an axis's offset, and of the valid bits.
   [[nodiscard]] std::size_t offset_at(std::size_t axis) const noexcept {
     return words_an_offset() * axis + (interpolates(seed_) && axis > 0 ? 1 : 0);
   }

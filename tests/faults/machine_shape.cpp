@@ -83,7 +83,7 @@ ModbusControllerConfig controller_of(Chance& chance, bool floats, double period_
   return config;
 }
 
-/// How the model corrects itself, and whether the offset waits for cycle ends.
+/// Correction of the model, and whether the offset waits for cycle ends.
 void draw_correction(Chance& chance, EstimatorConfig& estimator) {
   CorrectionConfig& correction = estimator.correction;
   correction.form = chance.one_in(2) ? CorrectionForm::two_phase : CorrectionForm::recursive;
@@ -100,11 +100,11 @@ void draw_correction(Chance& chance, EstimatorConfig& estimator) {
   compensation.update = UpdateRule::each_cycle;
   compensation.cycles_per_update = 1 + chance.below(3);
   compensation.cycle_ahead = chance.one_in(2) ? 1.0 : 0.0;
-  // The machine is done with a workpiece when it stops cutting.
+  // A workpiece ends when cutting stops.
   if (chance.one_in(2)) compensation.cycle_end_signal = "cutting_on";
 }
 
-/// What becomes of sensors that lie, and of blocks that are lost.
+/// Treatment of suspected sensors and lost blocks.
 void draw_suspicion(Chance& chance, EstimatorConfig& estimator, ThermalModel& model) {
   const double own_K2 = chance.between(0.01, 0.3);
   for (std::size_t i = 0; i < model.inputs.size(); ++i)
@@ -115,7 +115,7 @@ void draw_suspicion(Chance& chance, EstimatorConfig& estimator, ThermalModel& mo
   estimator.compensation.offset_sd_um_max = chance.between(0.2, 20.0);
 }
 
-/// The second and third axis as two nodes of one travel: registers, position and model.
+/// Second and third axis as two nodes of one travel: registers, position, model.
 void lay_out_travel(MachineShape& shape, Chance& chance) {
   ModbusControllerConfig& controller = shape.controller;
   const ModbusValue x = controller.axes[0].offset;

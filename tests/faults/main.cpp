@@ -1,4 +1,4 @@
-// thermocomp_faults: lives of the daemon with faults, by the thousand hours.
+// thermocomp_faults: runs many thousand hours of daemon lives with faults.
 #include <atomic>
 #include <chrono>
 #include <cstdio>
@@ -162,8 +162,7 @@ class Campaign {
     std::fflush(stdout);
   }
 
-  /// Every life with a smaller seed has been lived to its end: the same answer with any number of
-  /// threads.
+  /// All smaller seeds have been completed: the answer does not depend on the number of threads.
   int report_found() const {
     if (!found_) return 1;
     const auto& [seed, broken] = *found_;

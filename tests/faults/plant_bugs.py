@@ -1,4 +1,4 @@
-"""Bugs that whole lives of a machine must find, in copies of the product's sources.
+"""Bugs that lives of a machine must find, in copies of the product's sources.
 
     plant_bugs.py SOURCE_FOLDER OUTPUT_FOLDER
 """
@@ -8,7 +8,7 @@ import sys
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "planted"))
 from planting import write_copies, write_if_new  # noqa: E402
 
-# (name, file, what stands there, what stands there instead)
+# (name, file, original text, replacement)
 BUGS = [
     ("slew_doubled", "estimator/axes/axis_channel.cpp",
      "rate_um_per_s_ * std::min(dt_s, dt_s_max);",

@@ -1,4 +1,4 @@
-/// Bugs that can be planted in the code under test; only in the build that has them compiled in.
+/// Bugs planted in the code under test, in the builds that contain them.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@ namespace thermocomp::faults {
 extern const char* const program_name;
 
 [[nodiscard]] std::vector<std::string> plant_names();
-/// @return false: there is no such bug in this build
+/// @return false: this build has no such bug
 [[nodiscard]] bool plant(const std::string& name);
 
 }  // namespace thermocomp::faults

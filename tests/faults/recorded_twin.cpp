@@ -9,7 +9,7 @@ namespace thermocomp::faults {
 namespace {
 
 constexpr std::size_t cycles_a_chunk = 128;
-/// Some cycles long: what is noted in each cycle needs no care at an end.
+/// Several cycles, so that per-cycle records need no special case at an end.
 constexpr std::chrono::seconds offsets_period{5};
 
 bool same_command(const OffsetCommand& a, const OffsetCommand& b) {
@@ -44,7 +44,7 @@ std::optional<std::uint64_t> RecordedTwin::drain() {
   std::array<Record, 512> batch{};
   while (const std::size_t count = ring_.pop(batch)) {
     for (std::size_t i = 0; i < count; ++i) {
-      if (batch[i].kind == RecordKind::cycle_done) continue;  // the writer keeps none either
+      if (batch[i].kind == RecordKind::cycle_done) continue;  // nor does the writer keep it
       if (batch[i].kind != RecordKind::segment_begin) {
         if (!order_.admits(batch[i]) && !out_of_order_) out_of_order_ = batch[i].cycle;
         encoder_.add(batch[i]);
@@ -68,7 +68,7 @@ void RecordedTwin::begin(const Record& record) {
   order_ = RecordOrder(record.cycle);
 }
 
-/// The cycles expected before `before`, from the records encoded until now.
+/// Replays the cycles expected before `before` from the records encoded so far.
 std::optional<std::uint64_t> RecordedTwin::replay(std::uint64_t before) {
   const std::uint64_t count = encoder_.count();
   ChunkDecoder decoder(encoder_.take(), count);

@@ -1,5 +1,5 @@
-/// What the recorder hands over, through the chunk codec and back, into a second estimator: it must
-/// give the first one's offsets to the last bit in every cycle.
+/// A second estimator fed with the recorder's output through the chunk codec: its offsets must
+/// equal those of the first in every cycle, bit for bit.
 #pragma once
 
 #include <map>
@@ -20,13 +20,13 @@ class RecordedTwin {
  public:
   explicit RecordedTwin(const Grid& grid) : grid_(grid) {}
 
-  /// A recorder for an estimator that is about to be used.
+  /// A recorder for an estimator about to be used.
   [[nodiscard]] std::unique_ptr<CycleRecorder> make_recorder(const Estimator& estimator);
-  /// After each cycle: what the first estimator sent.
-  /// @return the cycle that came out different, if one did
+  /// Called after each cycle with the first estimator's command.
+  /// @return the first cycle that differs, if any
   std::optional<std::uint64_t> stepped(std::uint64_t cycle, const OffsetCommand& command);
-  /// What is left, and whether what was recorded has the order of a history.
-  /// @return the cycle that came out different or of the record out of order, if there is one
+  /// Replays the rest and checks the order of the records.
+  /// @return the first cycle that differs or of the first record out of order, if any
   std::optional<std::uint64_t> finish();
   [[nodiscard]] std::uint64_t replayed() const noexcept { return replayed_; }
 
@@ -53,7 +53,7 @@ class RecordedTwin {
   std::unique_ptr<Estimator> twin_;
   InputsInForce inputs_;
   RecordOrder order_;
-  std::optional<std::uint64_t> out_of_order_;  ///< cycle of the first record that is
+  std::optional<std::uint64_t> out_of_order_;  ///< cycle of the first such record
   std::uint64_t replayed_{0};
 };
 

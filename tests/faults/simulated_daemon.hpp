@@ -1,5 +1,5 @@
-/// One run of the daemon, from its start to its end: the real connections, polling, controller
-/// dialogue and cycle, over simulated lines and without a thread.
+/// One run of the daemon: real connections, polling, controller dialogue and cycle, with simulated
+/// lines and no threads.
 #pragma once
 
 #include <array>
@@ -14,7 +14,7 @@
 
 namespace thermocomp::faults {
 
-/// What outlives a run of the daemon.
+/// State that survives a run of the daemon.
 struct World {
   World(std::uint64_t seed, const MachineShape& shape, const FaultSchedule& fault_schedule)
       : schedule(fault_schedule),
@@ -34,11 +34,11 @@ struct World {
   ControllerUnit controller_unit;
   Chance chance;
   nanoseconds now{};                              ///< of the cycle
-  std::array<nanoseconds, lines_count> clocks{};  ///< of each line
+  std::array<nanoseconds, lines_count> clocks{};  ///< per line
 };
 
-/// A bus that runs behind the cycle and catches up when the cycle looks: what it publishes is seen
-/// from the moment at which it was published, never earlier.
+/// A bus that is processed when the cycle asks for its values; each value becomes visible at its
+/// publication time, not earlier.
 class SteppedSource final : public SensorSource {
  public:
   SteppedSource(const ModbusBusConfig& config, std::size_t line, World& world);
@@ -64,8 +64,8 @@ class SteppedLink final : public ControllerLink {
   void newest(ControllerState& state) noexcept override;
   void offer(const OffsetCommand& command) noexcept override {
     offered_ = command;
-    // While a turn of the link lasts, the cycle goes on; here the turn is over at once, and what
-    // the cycle would have left meanwhile is missing.
+    // Real cycles continue during a turn of the link. Here the turn takes no cycle; the command it
+    // would have had at its end is not simulated.
     dialogue_.offer(command, world_.now + world_.controller_unit.takes(3, world_.now));
   }
   [[nodiscard]] ControllerHealth health() const override { return dialogue_.health(); }
@@ -81,7 +81,7 @@ class SteppedLink final : public ControllerLink {
   OffsetCommand offered_;
 };
 
-/// Keeps what the cycle got from all buses, for the judge.
+/// Keeps the cycle's readings of all buses for the invariants.
 class ReadingsTap final : public SensorSource {
  public:
   explicit ReadingsTap(std::vector<Reading>& readings) : readings_(readings) {}

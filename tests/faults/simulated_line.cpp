@@ -10,8 +10,8 @@ using std::chrono::milliseconds;
 
 constexpr std::size_t head_bytes = 7;  // of a TCP frame
 
-/// Faults together make no answer later than the drivers say they can tell from a new one on a
-/// serial line (LateAnswers::lateness_max).
+/// Upper limit for the combined delay: the drivers' limit for recognising late answers on a serial
+/// line (LateAnswers::lateness_max).
 constexpr nanoseconds lateness_max = milliseconds(2900);
 
 std::uint16_t word_of(std::span<const std::uint8_t> bytes, std::size_t at) {
@@ -50,7 +50,7 @@ nanoseconds draw(Chance& chance, nanoseconds low, nanoseconds high) {
 bool SensorUnits::silent(std::size_t place, nanoseconds time) const {
   if (schedule_.find(FaultKind::unit_dead, time, place, units_count) != nullptr) return true;
   if (schedule_.find(FaultKind::unit_reboot, time, place, units_count) != nullptr) return true;
-  // Without supply first, then it answers and is not ready.
+  // No power in the first half, then answers that are not ready.
   const FaultEvent* boots = schedule_.find(FaultKind::unit_not_ready, time, place, units_count);
   return boots != nullptr && time < boots->begin + (boots->end - boots->begin) / 2;
 }
@@ -102,7 +102,7 @@ void ControllerUnit::ask(int /*unit*/, std::span<const std::uint8_t> request, na
   }
 }
 
-/// Reads alone: of a controller that looks its values up one by one.
+/// Only reads are slow, as in a controller that looks values up one by one.
 nanoseconds ControllerUnit::takes(std::uint8_t function, nanoseconds time) const {
   const bool slow = function == 3 && schedule_.find(FaultKind::controller_slow, time) != nullptr;
   return slow ? patience_ * 3 / 4 - milliseconds(20) : nanoseconds{};
@@ -144,10 +144,10 @@ void SimulatedLine::close() noexcept {
 bool SimulatedLine::send(std::span<const std::uint8_t> bytes) noexcept {
   if (!open_ || broken_) return false;
   const std::size_t head = serial_ ? 1 : head_bytes;
-  if (serial_)  // a port throws away what has come unasked
+  if (serial_)  // a port discards unsolicited bytes
     std::erase_if(frames_, [this](const Frame& frame) { return frame.arrives_at <= clock_; });
   if (!up(clock_)) {
-    // A cable that is out says nothing; a peer that restarts says so.
+    // A disconnected cable is silent; a restarted peer resets the connection.
     broken_ = !serial_ && chance_.one_in(2);
     return gone();
   }
@@ -175,12 +175,12 @@ bool SimulatedLine::send(std::span<const std::uint8_t> bytes) noexcept {
   if (hit(FaultKind::frames_truncated, 2)) {
     frame.bytes.resize(1 + chance_.below(frame.bytes.size() - 1));
     frame.cut = true;
-    mute_ = !serial_;  // nothing follows what a stream lost
+    mute_ = !serial_;  // no bytes follow lost ones in a stream
   }
   if (!mute_ && hit(FaultKind::frames_doubled, 2)) {
     Frame again = frame;
-    // On a serial line right behind the first: a gateway that keeps one for longer could pass it
-    // off as the answer to another question, and nobody could tell.
+    // On a serial line directly behind the first: if a gateway held it longer, it could not be
+    // distinguished from the answer to another request.
     again.arrives_at += serial_ ? draw(chance_, microseconds(200), milliseconds(1))
                                 : draw(chance_, milliseconds(1), milliseconds(400));
     deliver(std::move(again));
@@ -189,15 +189,14 @@ bool SimulatedLine::send(std::span<const std::uint8_t> bytes) noexcept {
   return true;
 }
 
-/// Serial: the checksum shows it. TCP protects its data itself; what a bad gateway garbles is what
-/// it composes: head, function and length.
+/// On a serial line the checksum detects it. TCP protects its data; a bad gateway damages what it
+/// writes itself: header, function and length.
 void SimulatedLine::spoil(Frame& frame) {
   if (serial_) {
     frame.bytes.back() = static_cast<std::uint8_t>(frame.bytes.back() ^ 0x40u);
     return;
   }
-  // Not the number of the transaction: another request's answer with this one's number could be
-  // told by nobody.
+  // Not the transaction number: another request's answer with this number is undetectable.
   const std::size_t at = 2 + chance_.below(std::min(frame.bytes.size(), head_bytes + 2) - 2);
   frame.bytes[at] = static_cast<std::uint8_t>(frame.bytes[at] ^ (1u << chance_.below(8)));
 }
@@ -224,7 +223,7 @@ PortBytes SimulatedLine::receive(std::span<std::uint8_t> into) noexcept {
   if (!frames_.empty() && frames_.front().arrives_at <= clock_) {
     const Frame frame = std::move(frames_.front());
     frames_.erase(frames_.begin());
-    if (!serial_ && frame.cut) frames_.clear();  // late frames do not fill up the gap either
+    if (!serial_ && frame.cut) frames_.clear();  // late frames do not fill the gap
     const std::size_t size = std::min(into.size(), frame.bytes.size());
     std::copy_n(frame.bytes.begin(), size, into.begin());
     return {PortBytes::Kind::bytes, size};

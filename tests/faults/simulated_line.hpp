@@ -1,5 +1,5 @@
-/// A Modbus line in virtual time: it carries the bytes of the real connection to simulated units
-/// and does to the frames what the schedule says. Its clock runs only while it is waited for.
+/// A Modbus line in virtual time between the real connection and simulated units; applies the
+/// scheduled faults to frames. Its clock advances only while somebody waits.
 #pragma once
 
 #include <cstdint>
@@ -14,10 +14,10 @@
 
 namespace thermocomp::faults {
 
-inline constexpr std::size_t lines_count = buses_count + 1;  ///< the controller has the last one
+inline constexpr std::size_t lines_count = buses_count + 1;  ///< the last one is the controller's
 inline constexpr std::size_t controller_line = buses_count;
 
-/// What stands at the other end of a line.
+/// The device or devices on a line.
 class LineEnd {
  public:
   LineEnd() = default;
@@ -25,14 +25,14 @@ class LineEnd {
   LineEnd& operator=(const LineEnd&) = delete;
   virtual ~LineEnd() = default;
   [[nodiscard]] virtual bool powered(nanoseconds time) const = 0;
-  /// @param answer  function and data, or left empty: no answer
+  /// @param answer  function and data; empty: no answer
   virtual void ask(int unit, std::span<const std::uint8_t> request, nanoseconds time,
                    std::vector<std::uint8_t>& answer) = 0;
-  /// How much longer than usual its answer takes.
+  /// Additional delay of its answer.
   [[nodiscard]] virtual nanoseconds takes(std::uint8_t /*function*/, nanoseconds /*time*/) const {
     return {};
   }
-  virtual void link_broke() {}  ///< connected, or an exchange went wrong on the line
+  virtual void link_broke() {}  ///< new connection or failed exchange
 };
 
 /// The units of one sensor bus.
@@ -53,7 +53,7 @@ class SensorUnits final : public LineEnd {
 
 class ControllerUnit final : public LineEnd {
  public:
-  /// @param patience  for how long its answers are waited for
+  /// @param patience  timeout for its answers
   ControllerUnit(SimulatedController& controller, const FaultSchedule& schedule,
                  nanoseconds patience)
       : controller_(controller), schedule_(schedule), patience_(patience) {}
@@ -71,7 +71,7 @@ class ControllerUnit final : public LineEnd {
 
 class SimulatedLine final : public ModbusPort {
  public:
-  /// @param clock  where the line's time is kept: it outlives connections and restarts
+  /// @param clock  time of the line; survives connections and restarts
   SimulatedLine(std::size_t line, bool serial, LineEnd& end, const FaultSchedule& schedule,
                 Chance& chance, nanoseconds& clock)
       : line_(line),
@@ -99,7 +99,7 @@ class SimulatedLine final : public ModbusPort {
   };
   [[nodiscard]] bool up(nanoseconds time) const;
   [[nodiscard]] bool hit(FaultKind kind, std::uint64_t one_in);
-  [[nodiscard]] bool gone();  ///< the answer will not come
+  [[nodiscard]] bool gone();  ///< the answer is lost
   void deliver(Frame frame);
   void spoil(Frame& frame);
 
@@ -110,8 +110,8 @@ class SimulatedLine final : public ModbusPort {
   Chance& chance_;
   nanoseconds& clock_;
   bool open_{false};
-  bool broken_{false};         ///< TCP: the peer is gone; told at the next look
-  bool mute_{false};           ///< TCP: after a frame that broke off nothing more comes
+  bool broken_{false};         ///< TCP: peer lost, reported at the next call
+  bool mute_{false};           ///< TCP: no further bytes after a truncated frame
   std::vector<Frame> frames_;  ///< by time of arrival
   std::vector<std::uint8_t> answer_;
 };

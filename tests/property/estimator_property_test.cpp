@@ -18,7 +18,7 @@ std::string text_of(const Outcome& outcome) {
          std::to_string(violation.allowed);
 }
 
-/// In how many lives of the seeds a rule notices the planted bug.
+/// Number of seeds in which an invariant detects the planted bug.
 std::size_t noticed(Planted planted, bool travel = false) {
   std::size_t count = 0;
   for (std::uint64_t seed = 0; seed < seeds; ++seed) {
@@ -30,7 +30,7 @@ std::size_t noticed(Planted planted, bool travel = false) {
   return count;
 }
 
-/// Whether a life in which all readings become useless differs from one in which they stop coming.
+/// True if useless readings have another effect than missing readings.
 bool useless_readings_matter(std::uint64_t seed, Planted planted) {
   WorldOptions useless;
   useless.planted = planted;

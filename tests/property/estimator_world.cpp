@@ -14,23 +14,23 @@ namespace {
 constexpr double step_s_usual_max = 0.5;
 constexpr double tiny_um = 1e-9;
 constexpr double register_rounding_um = 0.1;
-// Of a new link, whose first read-backs may be late or none; until then an axis may stand.
+// First read-backs of a new link may be late or missing; until then an axis may be held.
 constexpr int reads_until_written = 6;
-constexpr double nothing_um = 0.3;  // what an axis at zero may read back
+constexpr double nothing_um = 0.3;  // largest read-back counted as zero
 
 nanoseconds from_seconds(double seconds) {
   return std::chrono::duration_cast<nanoseconds>(seconds_d(seconds));
 }
 
-/// A controller and its link: obeys what is valid and of its epoch, tells what it applies.
+/// A controller with its link: applies valid offsets of its epoch and reports them.
 struct Controller {
   std::array<double, axes_count> applied_um{};
-  std::array<double, axes_count> told_um{};  ///< last read-back of the epoch told, NaN: none
+  std::array<double, axes_count> told_um{};  ///< last read-back in the epoch; NaN: none
   std::uint32_t epoch{0};
   bool connected{false};
   bool exchanging{false};  ///< reads and writes in this step
   bool rejecting{false};
-  /// What is applied may differ from what is sent by as much as counts as agreement.
+  /// Axes whose applied offset may differ from the sent one by the tolerance.
   std::array<bool, axes_count> disturbed{};
 };
 
@@ -85,7 +85,7 @@ class World {
     if (time_.one_in(30)) step_s = time_.between(1.0, 15.0);
     now_ += from_seconds(step_s);
     busy_s_ += std::min(step_s, step_s_usual_max);
-    // In whole nanoseconds, as the estimator sees it.
+    // Rounded to nanoseconds, as in the estimator.
     dt_s_ = estimator_stepped_ ? 1e-9 * static_cast<double>(from_seconds(step_s).count()) : 0.0;
     for (double& temp_degC : temps_degC_) temp_degC += heat_.between(-0.05, 0.06);
   }
@@ -127,7 +127,7 @@ class World {
     report_ = estimator_->make_report();
   }
 
-  /// And the next time back. The offset's bound and slew are those of the same configuration.
+  /// Promotes another model, alternately back to the first; bound and slew limit are unchanged.
   void promote() {
     ThermalModel next_model = model_;
     for (auto& row : next_model.matrix_um_per_K)
@@ -137,7 +137,7 @@ class World {
     go_over();
   }
 
-  /// The daemon comes back with what its state file held, perhaps of a while ago; its link is new.
+  /// Restarts the daemon with its state file, possibly an old one, and a new link.
   void restart() {
     ++outcome_.restarts;
     PersistentState state = estimator_->persistent_state(report_);
@@ -158,7 +158,7 @@ class World {
   }
 
   void operate() {
-    // Nobody else ends a latched mismatch; now and then before its cause has gone.
+    // Only an operator releases a latched axis, sometimes before the cause has ended.
     for (std::uint32_t axis = 0; axis < axes_count; ++axis)
       if (report_.axes.size() > axis && report_.axes[axis].latched && operator_.one_in(8)) {
         estimator_->apply({CommandKind::release, axis, 0.0});
@@ -183,7 +183,7 @@ class World {
     for (std::size_t i = 0; i < sensors_count; ++i) {
       if (lost) {
         if (!options_.lost_are_withheld) readings_[i] = useless_reading(i);
-      } else if (!sensors_.one_in(5)) {  // else: no news
+      } else if (!sensors_.one_in(5)) {  // else: no new reading
         readings_[i] = random_reading(i);
       }
     }
@@ -203,7 +203,7 @@ class World {
     return reading;
   }
 
-  /// What no estimator may believe, whatever it has seen before.
+  /// Readings that no estimator may accept, whatever came before.
   Reading useless_reading(std::size_t sensor) {
     Reading reading{temps_degC_[sensor] + sensors_.between(-50, 50), now_, Fault::none};
     switch (sensors_.below(6)) {
@@ -232,11 +232,11 @@ class World {
   void connect() {
     ++controller_.epoch;
     controller_.connected = true;
-    // A read-back that agrees is taken for a late one, as on a link that is not new.
+    // A read-back that agrees is taken for a late one, as on an existing link.
     controller_.disturbed.fill(true);
   }
 
-  /// What happens at the controller, and what its link reads of it in this step.
+  /// Changes at the controller and the link's reads in this step.
   void exchange() {
     if (link_.one_in(40)) {
       if (controller_.connected)
@@ -251,7 +251,7 @@ class World {
     controller_.exchanging = controller_.connected && !link_.one_in(15);
     if (!controller_.exchanging || controller_.rejecting) controller_.disturbed.fill(true);
     if (controller_.exchanging) read_controller();
-    // A new epoch is published together with what was read back in it, not before.
+    // A new epoch is published together with its first read-back.
     state_.online = controller_.connected && state_.link_epoch == controller_.epoch;
     state_.written = state_.online;
   }
@@ -272,8 +272,8 @@ class World {
     for (std::size_t i = 0; i < axes_count; ++i) {
       state_.applied_um[i] = controller_.applied_um[i];
       if (is_first && !controller_.rejecting && std::abs(controller_.applied_um[i]) <= nothing_um)
-        controller_.disturbed[i] = false;  // restarted: it starts from there
-      // Whoever is re-homed and cannot be read at the same moment cannot be noticed in time.
+        controller_.disturbed[i] = false;  // restarted: starts from there
+      // No nonsense right after re-homing, which could then not be noticed in time.
       if (link_.one_in(60) && !controller_.disturbed[i]) {
         const std::array<double, 5> nonsense{not_a_number, 1e30, -700.0, 501.0,
                                              std::numeric_limits<double>::infinity()};
@@ -311,7 +311,7 @@ class World {
 
   void check_offsets() {
     sent_.push_back({busy_s_, command_.offset_um, command_.offset_um});
-    // An offset that starts from the read-back counts as having been there.
+    // An offset started from a read-back counts as having been applied.
     for (std::size_t i = 0; i < axes_count; ++i)
       if (std::abs(command_.offset_um[i] - state_.applied_um[i]) <=
           step_um_max(i) + register_rounding_um)
@@ -347,7 +347,7 @@ class World {
              axis.offset_sd_um, most_um);
   }
 
-  /// Leaving the domain and coming back; that neither is a leap, check_offset() sees.
+  /// Leaving and re-entering the domain; check_offset() checks the slew limit.
   void check_domain() {
     const bool outside = model_.made_from && report_.domain.outside;
     if (outside) ++outcome_.steps_outside;
@@ -382,17 +382,16 @@ class World {
     demand("offset_within_bound", "no axis beyond what any configuration allows",
            std::abs(offset_um) <= offset_um_max_of_any_axis, offset_um, offset_um_max_of_any_axis);
     const bool may_start = state_.link_epoch != started_on_[axis] || released_[axis];
-    // The one leap that is none: the axis already stands where the controller says. A read-back is
-    // believed so far on a new link only, or when somebody has looked into it.
+    // Exception: the offset starts from the read-back, only on a new link or after a release.
     if (!(std::abs(offset_um - before_um) <= step_um) ||
         !(std::abs(offset_um) <= std::max(bound_um, std::abs(before_um)))) {
-      // What a state file holds beyond this bound is no evidence: 0, and nothing is sent yet.
+      // A saved offset beyond the bound is ignored: offset 0, not yet sent.
       if (offset_um == 0.0 && !command_.valid[axis] && std::abs(before_um) > bound_um) return;
       ++outcome_.resyncs;
       const double from_applied_um = std::abs(offset_um - state_.applied_um[axis]);
       demand("slew_kept_by_command",
              "offset changes at the slew rate, or starts from the read-back",
-             // While another node must stand nothing is sent, wherever this one starts from.
+             // While another node must be held nothing is sent, wherever this node starts from.
              state_.online && (command_.valid[axis] || is_node(axis)) && may_start &&
                  from_applied_um <= step_um + register_rounding_um,
              offset_um - before_um, step_um);
@@ -432,7 +431,7 @@ class World {
            offset_um_max_of_any_axis);
   }
 
-  /// The link writes the offsets - unless it has just lost its connection and has a new one.
+  /// The link writes the offsets, unless it has just been lost and reconnected.
   void deliver() {
     const bool reconnected = controller_.connected && link_.one_in(50);
     if (reconnected) {
@@ -454,10 +453,10 @@ class World {
     }
   }
 
-  /// A controller that does not obey is not noticed while what it applies lies, a tolerance apart,
-  /// among what was sent within the window of comparison (or in the last slots of it).
+  /// Largest unnoticed difference [um]: the applied offset is within tolerance of the range sent
+  /// within the comparison window (or its last slots).
   [[nodiscard]] double undetected_um(std::size_t axis) const {
-    // The window's five slots end with a step each; a long step counts as an ordinary one.
+    // Each of the window's five slots ends with a step; a long step counts as an ordinary one.
     constexpr std::size_t slots = 8;
     const double window_s = 1.25 * window_s_ + 5 * step_s_usual_max;
     double low_um = before_um_[axis];
@@ -471,7 +470,7 @@ class World {
     return tolerance_um_ + high_um - low_um;
   }
 
-  /// After a reload the comparison may still be that of the configuration before.
+  /// After a reload the comparison may still use the previous configuration.
   void remember_comparison() {
     const CompensationConfig& compensation = config_.compensation;
     window_s_ = std::max(window_s_, compensation.mismatch_after_s);
@@ -497,7 +496,7 @@ class World {
   bool estimator_stepped_{false};
   Report report_;
   std::size_t step_{0};
-  double busy_s_{0.0};  ///< time passed, long steps counted as ordinary ones
+  double busy_s_{0.0};  ///< elapsed time with long steps counted as ordinary ones
   nanoseconds now_{std::chrono::hours(1)};
   double dt_s_{0.0};
   std::array<double, sensors_count> temps_degC_{20, 20, 21, 21, 21, 22};

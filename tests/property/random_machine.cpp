@@ -18,7 +18,7 @@ SmoothingConfig random_smoothing(Chance& chance) {
   return smoothing;
 }
 
-/// Three inputs that mostly move together; at times exactly.
+/// Three inputs that mostly change together, at times exactly.
 void add_covariance(Chance& chance, ThermalModel& model) {
   const double own_K2 = chance.one_in(4) ? 0.0 : chance.between(0.0, 1.0);
   std::array<double, 3> together_K{};
@@ -32,7 +32,7 @@ void add_covariance(Chance& chance, ThermalModel& model) {
   if (chance.one_in(2)) model.covariance_growth.scatter_factor = {0.5, 0.0, 2.0};
 }
 
-/// A domain that the drifting readings leave and return to.
+/// A domain that drifting readings leave and re-enter.
 void add_domain(Chance& chance, ThermalModel& model) {
   MadeFrom& made_from = model.made_from.emplace();
   made_from.columns = model.inputs;
@@ -61,7 +61,7 @@ EstimatorConfig random_config(Chance& chance) {
     sensor.screening.stale_after_s = chance.between(0.5, 5.0);
     sensor.screening.rate_K_per_s_max = chance.between(0.1, 5.0);
     sensor.screening.stuck_after_s = chance.one_in(3) ? chance.between(5.0, 50.0) : 0.0;
-    // Half of the machines count a first value at once.
+    // Half of the machines accept the first value at once.
     sensor.screening.settle_s = chance.one_in(2) ? 0.0 : chance.between(0.5, 5.0);
     sensor.module = std::string("m").append(1, static_cast<char>('1' + i / 2));
     config.sensors.push_back(sensor);

@@ -1,4 +1,4 @@
-/// What the machine is in a random life of the estimator: its configuration and its model.
+/// Random configuration and model of the machine in a life of the estimator.
 #pragma once
 
 #include <cstddef>
@@ -13,12 +13,12 @@ namespace thermocomp::property {
 inline constexpr std::size_t axes_count = 3;
 inline constexpr std::size_t sensors_count = 6;
 
-/// A stream of chance of its own for each part of the world, so that withholding readings does not
-/// change what the controller or the operator does.
+/// A random stream for each part of the world, so that withholding readings does not change the
+/// controller's or operator's actions.
 class Chance {
  public:
   Chance(std::uint64_t seed, std::uint64_t part) : engine_(seed * 1000003u + part) {}
-  // Not std::uniform_*_distribution: their results differ between standard libraries.
+  // std::uniform_*_distribution differs between standard libraries.
   double between(double low, double high) {
     return low + (high - low) * static_cast<double>(engine_() >> 11) * 0x1p-53;
   }
@@ -31,7 +31,7 @@ class Chance {
 
 [[nodiscard]] EstimatorConfig random_config(Chance& chance);
 [[nodiscard]] ThermalModel random_model(Chance& chance);
-/// The controller interpolates z itself: what was y is the node at the other end.
+/// The controller interpolates z: the y axis becomes the node at the other end.
 void lay_out_travel(Chance& chance, EstimatorConfig& config, ThermalModel& model);
 
 }  // namespace thermocomp::property

@@ -1,6 +1,6 @@
-// 10,000 cycles of the real cycle, with a real Modbus source, history and a reload under way: on
-// its thread nothing is allocated, locked or paged in and nothing but the sleep is asked of the
-// kernel. With --plant it does one such thing on purpose, and must then say so (exit status 1).
+// 10,000 real cycles with a real Modbus source, history and a reload: the cycle thread must not
+// allocate, lock, page-fault or make system calls except the sleep. With --plant it does one of
+// these on purpose, which must be detected (exit status 1).
 #include <array>
 #include <atomic>
 #include <chrono>
@@ -33,8 +33,8 @@ constexpr std::size_t sensors = 16;
 
 enum class Plant { nothing, allocation, lock, fault, system_call };
 
-/// An estimator whose time runs 12 s a cycle: sensors are judged by their neighbours each minute,
-/// and one of four lies for three hours of six.
+/// Estimator with 12 s per cycle: sensors are compared with their neighbours every minute; one of
+/// four is wrong in three of every six hours.
 class LiedTo {
  public:
   LiedTo() : estimator_(config(), model()), report_(estimator_.make_report()) {
@@ -93,8 +93,8 @@ class LiedTo {
   std::atomic<bool> weighed_down_{false};
 };
 
-/// Called by the cycle like any other source: begins and ends the watch, gives readings that
-/// change, and does what is planted.
+/// A source called by the cycle: begins and ends the watch, gives changing readings, and carries
+/// out the planted violation.
 class ProbeSource final : public SensorSource {
  public:
   explicit ProbeSource(Plant plant) : plant_(plant) {}
@@ -114,7 +114,7 @@ class ProbeSource final : public SensorSource {
     for (std::size_t i = 0; i + 1 < all.size(); ++i)
       all[i] = {20.0 + 1e-3 * static_cast<double>((cycle_ + i) % 100), nanoseconds(now()),
                 Fault::none};
-    // Blocks come and go: both sensors of the third, and all but the last two blocks.
+    // Blocks are lost and return: both sensors of the third, and all but the last two blocks.
     if (cycle_ / 700 % 3 == 1) lose(all.subspan(4, 2));
     if (cycle_ / 700 % 3 == 2) lose(all.first(sensors - 4));
   }
@@ -139,7 +139,7 @@ class ProbeSource final : public SensorSource {
   Plant plant_;
   std::uint64_t cycle_{0};
   std::mutex mutex_;
-  // Mapped before memory is locked, and nobody has touched it yet.
+  // Mapped before memory is locked, and not yet touched.
   volatile char* fresh_page_{static_cast<volatile char*>(
       mmap(nullptr, 4096, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0))};
 };
@@ -166,7 +166,7 @@ EstimatorConfig make_config() {
     sensor.screening.settle_s = 0.05;
     sensor.smoothing.form = i % 2 == 0 ? SmoothingForm::sliding_line : SmoothingForm::line_of_lines;
     config.sensors.push_back(sensor);
-    // The last sensor is on the Modbus line, where nobody answers; it shares a block.
+    // The last sensor is on the unanswered Modbus line; it shares a block.
     if (i % 2 == 1) config.blocks.push_back({numbered("b", i / 2), input_name(i / 2), {i - 1, i}});
   }
   config.axes.push_back({"x", "x_um", 1.0, {}});
@@ -232,7 +232,7 @@ int main(int argc, char** argv) {
     parts->recorder = history.make_recorder({"", "", ""}, parts->estimator);
     return parts;
   };
-  // In memory, as /run is.
+  // In memory, like /run.
   const std::string record = "/dev/shm/cycle_purity_" + std::to_string(getpid());
   LastSent last_sent(record, "none", make_config().axes);
   Cycle cycle(grid, {&probe, line.get()}, controller, sensors, make_cycle_parts(2.0), &last_sent);
@@ -245,7 +245,7 @@ int main(int argc, char** argv) {
   const std::string no_fifo = thread.start({60, -1}, [&] { cycle.run(); });
   if (!no_fifo.empty()) std::printf("note: %s\n", no_fifo.c_str());
 
-  // Main does its part meanwhile: commands, a reload, reading reports.
+  // Meanwhile the main thread sends commands, reloads, and reads reports.
   std::this_thread::sleep_for(2s);
   bool sent = cycle.send({CommandKind::disable, 0, 0.0}).has_value();
   auto next = make_cycle_parts(3.0);

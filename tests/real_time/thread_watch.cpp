@@ -48,7 +48,7 @@ void on_forbidden_call(int, siginfo_t*, void*) {
   count(system_calls);
 }
 
-/// Every system call of this thread but a few raises SIGSYS, which counts it.
+/// Other system calls of this thread raise SIGSYS and are counted.
 void forbid_system_calls() {
   struct sigaction action {};
   action.sa_sigaction = on_forbidden_call;
@@ -58,7 +58,7 @@ void forbid_system_calls() {
   sigemptyset(&set);
   sigaddset(&set, SIGSYS);
   pthread_sigmask(SIG_UNBLOCK, &set, nullptr);
-  // What the cycle may do, what this watch itself does, and what ends a thread.
+  // Allowed calls: those of the cycle, of this watch, and at the thread's end.
   static const unsigned allowed[] = {SYS_clock_nanosleep, SYS_clock_gettime, SYS_getrusage,
                                      SYS_rt_sigreturn,    SYS_exit,          SYS_exit_group,
                                      SYS_madvise,         SYS_rt_sigprocmask};
@@ -130,7 +130,7 @@ int pthread_rwlock_wrlock(pthread_rwlock_t* lock) {
 namespace thermocomp::test {
 
 void begin_watch() {
-  // Resolved now: looking a symbol up is no business of the watched time.
+  // Resolved now: looking up symbols must not occur in the watched time.
   pthread_mutex_t mutex = PTHREAD_MUTEX_INITIALIZER;
   pthread_mutex_lock(&mutex);
   pthread_mutex_unlock(&mutex);

@@ -1,4 +1,4 @@
-/// Watches one thread from within: what it allocates, locks, faults in and asks of the kernel.
+/// Counts a thread's allocations, locks, page faults and system calls.
 #pragma once
 
 #include <cstdint>
@@ -12,9 +12,9 @@ struct ThreadCounts {
   std::int64_t page_faults{0};
 };
 
-/// From here on the calling thread is counted. Once a process.
+/// Starts counting for the calling thread. Once per process.
 void begin_watch();
-/// Ends the count; by the same thread.
+/// Stops counting; on the same thread.
 [[nodiscard]] ThreadCounts end_watch();
 
 }  // namespace thermocomp::test
