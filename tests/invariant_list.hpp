@@ -1,6 +1,6 @@
-/// What must hold, whatever happens: one list for the random lives of the estimator (property), the
-/// daemon's code beside a simulated machine (faults) and the attacks on the running daemon
-/// (attack/rig.py reads it here). Each judges those that it can see, by what reached the machine.
+/// The invariants of random estimator lives (property), of the daemon's code with a simulated
+/// machine (faults) and of attacks on the running daemon (attack/rig.py reads this file). Each
+/// suite checks those that it can observe, by the values that reached the machine.
 #pragma once
 
 #include <algorithm>
@@ -49,7 +49,7 @@ inline constexpr std::array<Invariant, 28> all{{
     {"no_committed_history_lost", "no committed row of the history is lost"},
 }};
 
-/// An invariant of the list: another name does not compile.
+/// An invariant of the list; other names do not compile.
 class Rule {
  public:
   consteval Rule(const char* name) : name_(name) {  // NOLINT(google-explicit-constructor)

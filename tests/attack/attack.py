@@ -1,12 +1,12 @@
 #!/usr/bin/python3
-"""Attacks the running daemon from outside: by configuration files, sockets and buses, without any
-knowledge of its code. docs/robustness.md tells what is attacked and what must hold.
+"""Attacks the running daemon through configuration files, sockets and buses, without using its
+code. docs/robustness.md lists the attacks and the required behaviour.
 
-  attack.py [--bin DIR] [--seed N] [--links tcp,rtu,...] [--only TEXT]... [--minutes M] [--jobs N]
-  attack.py --list
+    attack.py [--bin DIR] [--seed N] [--links tcp,rtu,...] [--only TEXT]... [--minutes M] [--jobs N]
+    attack.py --list
 
-Prints the seed, a line a try as it ends, and at the end a table of the attacks. Exit status: 0
-nothing was broken, 1 something was, 2 bad use.
+Prints the seed, one line per finished try, and a table of the attacks. Exit status: 0 nothing was
+broken, 1 something was, 2 bad use.
 """
 
 import argparse
@@ -37,7 +37,7 @@ LAYOUT = "{:36} {:7} {:>5} {:>8} {:>7} {:>8} {:>6} {:>5} {:>9} {:>6} {:>9} {:>7}
 
 
 def run_one(name, link, seed, programs, keep):
-    """In a process of its own: one try, its result as the last line."""
+    """Runs one try in this process and prints its result as the last line."""
     attack = ALL[name]
     result = None
     rig = rig_module.Rig(programs, link, seed, **attack.choices)
@@ -55,11 +55,11 @@ def run_one(name, link, seed, programs, keep):
     rig_module.print_result(result)
 
 
-one_bus = threading.Lock()  # all tries on CAN have the same two interfaces
+one_bus = threading.Lock()  # all CAN tries share two interfaces
 
 
 def start_try(name, link, seed, given):
-    """The result of a try in a process of its own, with everything it started ended."""
+    """Result of a try in a child process, with all its processes ended."""
     command = [sys.executable, str(pathlib.Path(__file__)), "--one", name, "--links", link,
                "--seed", str(seed), "--bin", given.bin] + (["--keep"] if given.keep else [])
     limit_s = ALL[name].limit_s + 4 * rig_module.PATIENCE_S
@@ -148,7 +148,7 @@ def run_all(given):
     with concurrent.futures.ThreadPoolExecutor(given.jobs) as pool:
         first = True
         while first or time.monotonic() < end:
-            # The long ones first, then in any order.
+            # Long ones first, then in random order.
             chooser.shuffle(tries)
             tries.sort(key=lambda each: -ALL[each[0]].limit_s)
             jobs = {}
@@ -165,7 +165,7 @@ def run_all(given):
 
 
 def repeat_broken(table, given):
-    """What broke beside other attacks must break once more on a machine that does nothing else."""
+    """An attack that failed beside others must fail again on an idle machine."""
     for (name, link), row in table.rows.items():
         if not row["broken"]:
             continue
@@ -177,14 +177,14 @@ def repeat_broken(table, given):
 
 
 def stopped_early(table):
-    """Asked to end: what is known is told."""
+    """Interrupted: print the results so far."""
     table.print()
     print("stopped before the end", flush=True)
     os._exit(1)
 
 
 def run_try(name, link, seed, first, end, given):
-    """Every attack is tried once; after that, while there is time."""
+    """Tries every attack once, then further ones until the time is over."""
     if not first and time.monotonic() > end:
         return None
     with one_bus if link.startswith("can") else contextlib.nullcontext():

@@ -1,4 +1,4 @@
-"""The process itself: signals, stops, reloads at the wrong moment, clocks."""
+"""Attacks on the process: signals, stops, reloads at the wrong time, clocks."""
 
 import pathlib
 import struct
@@ -19,7 +19,7 @@ def moves(rig):
 
 @attack(links=("tcp", "bridge"))
 def hang_ups_by_the_thousand(rig):
-    """SIGHUP 200 times a second, the bound and slew rate in the file changing meanwhile."""
+    """SIGHUP 200 times a second while bound and slew limit in the file change."""
     if not rig.start(BEFORE_UM):
         return
     moves(rig)
@@ -37,7 +37,7 @@ def hang_ups_by_the_thousand(rig):
 
 @attack(links=("tcp",))
 def smaller_bound_by_reload(rig):
-    """An offset that is outside of the new bound comes in at the slew rate."""
+    """An offset outside a new, smaller bound returns at the slew limit."""
     if not rig.start(-6.0):
         return
     rig.daemon.write_config(bound=2.0)
@@ -51,7 +51,7 @@ def smaller_bound_by_reload(rig):
 
 @attack(links=("tcp", "rtu"), limit_s=60.0)
 def stopped_for_seconds(rig):
-    """SIGSTOP and SIGCONT at any moment while the axis is on its way."""
+    """SIGSTOP and SIGCONT at random times while the axis moves."""
     if not rig.start(BEFORE_UM):
         return
     for _ in range(5):
@@ -63,7 +63,7 @@ def stopped_for_seconds(rig):
 
 
 class Clocks:
-    """The daemon's clocks by a library that is preloaded (clocks.cpp)."""
+    """Controls the daemon's clocks through a preloaded library (clocks.cpp)."""
 
     def __init__(self, rig):
         library, shared = rig.folder / "clocks.so", rig.folder / "clocks"
@@ -82,7 +82,7 @@ class Clocks:
 
 @attack(links=("tcp",))
 def clock_jumps(rig):
-    """The wall clock jumps by decades, forth and back, while rows are committed."""
+    """The wall clock jumps by decades, forwards and back, while rows are committed."""
     clocks = Clocks(rig)
     if not rig.start(BEFORE_UM):
         return
@@ -105,7 +105,7 @@ def clock_jumps(rig):
 
 @attack(links=("tcp",))
 def sleeps_that_fail(rig):
-    """The kernel refuses the cycle's sleep: no spinning on a whole processor, and it is told."""
+    """The cycle's sleep fails: the daemon must not use a whole processor, and must report it."""
     clocks = Clocks(rig)
     if not rig.start(BEFORE_UM):
         return

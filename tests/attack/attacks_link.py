@@ -1,4 +1,4 @@
-"""Links on which the other side answers wrongly, late, in halves, or before it is asked."""
+"""Links with wrong, late, partial or unsolicited answers."""
 
 import functools
 import struct
@@ -13,7 +13,7 @@ LOOKED_AT_S = 3.0
 
 
 def spoiled(rig, spoil, slave=None, follows=True):
-    """The link is spoiled while the axis is on its way, then good again."""
+    """The link is faulty while the axis moves, then good again."""
     if not rig.start(BEFORE_UM):
         return
     slave = slave or rig.machine.slave
@@ -51,7 +51,7 @@ def late_answers(rig):
 
 
 def answers_before_the_question(rig):
-    """An answer that says another position stands in the line when the question is asked."""
+    """An unsolicited answer with another position is in the buffer when the request is sent."""
     def spoil(frame_of, request, answer):
         lie = struct.pack(">BB2H", 4, 4, *struct.unpack(">2H", struct.pack(
             ">i", rig.random.choice((-40000, 30000, 0)))))
@@ -66,7 +66,7 @@ def answers_twice(rig):
 
 
 def answers_of_another_question(rig):
-    rig.axis.lied = True  # some of them say where it stands
+    rig.axis.lied = True  # some contain another position
 
     def other(frame_of, request, _answer):
         pdu = rig.random.choice((struct.pack(">BB2H", 4, 4, 0, 7000), bytes([4, 200]) + bytes(200),
@@ -122,7 +122,7 @@ for _name, _links, _spoil in (
 
 @attack(links=("tcp", "rtu"))
 def noise_on_the_thermocouples(rig):
-    """Late, doubled, spoiled and refused answers of the sensors' module."""
+    """Late, doubled, corrupted and refused answers of the sensor module."""
     makers = (exceptions, half_answers, late_answers, answers_twice, answers_of_another_question)
     spoilers = [make(rig) for make in makers]
     spoiled(rig, lambda *args: rig.random.choice(spoilers)(*args),
@@ -131,7 +131,7 @@ def noise_on_the_thermocouples(rig):
 
 @attack(links=("tcp",))
 def greets_before_it_is_asked(rig):
-    """Every new connection begins with an answer to a question that nobody has asked yet."""
+    """Every new connection begins with an unsolicited answer."""
     lie = struct.pack(">BB2H", 4, 4, 0xFFFF, 0x63C0)  # -40 um
 
     def greet(link):
@@ -168,7 +168,7 @@ def connection_is_lost_again_and_again(rig):
 
 @attack(links=("tcp", "rtu", "can", "can_travel", "bridge"))
 def goes_silent_and_comes_back(rig):
-    """The cable is out for moments and for longer than anybody's patience."""
+    """The cable is disconnected for moments and for longer than any timeout."""
     if not rig.start(BEFORE_UM):
         return
     rig.machine.wants_um(WANTED_UM)
@@ -182,7 +182,7 @@ def goes_silent_and_comes_back(rig):
 
 @attack(links=("can",))
 def strange_frames(rig):
-    """Frames of all identifiers, lengths and kinds, error frames, and offsets of another sender."""
+    """Frames of all identifiers, lengths and kinds, error frames, offsets of another sender."""
     import can_nodes
     if not rig.start(BEFORE_UM):
         return
@@ -207,7 +207,7 @@ def strange_frames(rig):
 
 
 def losses(rig):
-    """Some frames do not come, some twice, some only after the next one."""
+    """Randomly loses, repeats and delays frames."""
     held_back = []
 
     def spoil(frames):
@@ -238,8 +238,8 @@ def loses_nothing(controller):
 
 @attack(links=("can_travel",), limit_s=90.0)
 def frames_of_sets_are_lost(rig):
-    """What interpolates along the travel gets and shows only some of the frames, then those of one
-    node alone for longer than the numbers take to come round."""
+    """An interpolating controller loses frames in both directions, then those of one node for
+    longer than the set numbers take to repeat."""
     if not rig.start(BEFORE_UM):
         return
     controller = rig.machine.controller
@@ -259,9 +259,8 @@ def frames_of_sets_are_lost(rig):
 
 @attack(links=("can_travel",), limit_s=150.0)
 def killed_between_frames_of_a_set(rig):
-    """kill -9 while one node's frames no longer come, beside a controller that forgets no frame; of
-    the next daemon the other node's do not come at first. What it sends must not complete what was
-    broken off."""
+    """kill -9 while one node's frames are lost, with a controller that keeps all frames; the next
+    daemon at first loses the other node's. Its frames must not complete the interrupted set."""
     if not rig.start(BEFORE_UM):
         return
     controller = rig.machine.controller
@@ -274,7 +273,7 @@ def killed_between_frames_of_a_set(rig):
         controller.spoil = without(near)
         time.sleep(rig.random.uniform(0.0, 0.1))
         rig.daemon.kill()
-        time.sleep(0.1)  # until what it sent has come
+        time.sleep(0.1)  # until frames in transit have arrived
         controller.spoil = without(far)
         rig.machine.wants_um(-way * WANTED_UM)
         seen = controller.nodes[near][1]
@@ -292,7 +291,7 @@ def killed_between_frames_of_a_set(rig):
 
 @attack(links=("bridge",))
 def bridge_takes_and_does_not(rig):
-    """Switched off and on many times a second; LinuxCNC clears its offset when it goes off."""
+    """Switched off and on many times a second; LinuxCNC clears its offset when switched off."""
     if not rig.start(BEFORE_UM):
         return
     bridge = rig.machine.slave
@@ -313,7 +312,7 @@ def bridge_takes_and_does_not(rig):
 
 @attack(links=("bridge",))
 def two_bridges(rig):
-    """A second one reports at the same time, of another session, that the axis stands elsewhere."""
+    """A second bridge with another session reports another position at the same time."""
     from rogue_bridge import RogueBridge
     if not rig.start(BEFORE_UM):
         return
@@ -329,7 +328,7 @@ def two_bridges(rig):
 
 @attack(links=("bridge",))
 def session_changes_with_each_report(rig):
-    """As a bridge that is restarted for ever; the axis stays where it stands."""
+    """Like a bridge that restarts continually; the axis keeps its position."""
     if not rig.start(BEFORE_UM):
         return
     bridge = rig.machine.slave
@@ -346,7 +345,7 @@ def session_changes_with_each_report(rig):
 
 @attack(links=("bridge",))
 def reports_of_any_kind(rig):
-    """Wrong types, missing and unknown keys, huge and absent numbers among the good reports."""
+    """Wrong types, missing and unknown keys, huge and missing numbers among good reports."""
     if not rig.start(BEFORE_UM):
         return
     bridge = rig.machine.slave

@@ -1,4 +1,4 @@
-"""Controllers that tell what is not so: wrong scales and signs, second writers, re-homing."""
+"""False read-backs: wrong scales and signs, second writers, re-homing."""
 
 import functools
 import math
@@ -13,12 +13,12 @@ BUSES = ("tcp", "rtu", "can", "bridge")
 BEFORE_UM, WANTED_UM = -3.0, -24.0
 SEEN_WITHIN_S = 6.0
 LOOKED_AT_S = 3.0
-EXPLAINED_UM = 1.0  # WriteGate::unexplained_um: nearer to what was sent lately no other writer is seen
+EXPLAINED_UM = 1.0  # WriteGate::unexplained_um: closer offsets of other writers are not detected
 
 
 def seen_within_s(rig):
-    """While the offset moves, what differs by less than it moves within the controller's allowed lag
-    looks like that lag: it is seen at the latest when the offset has arrived."""
+    """Time limit of detection: while the offset moves, a difference within the controller's allowed
+    lag looks like lag; it is detected at the latest when the offset has arrived."""
     return SEEN_WITHIN_S + abs(WANTED_UM - BEFORE_UM) / rig.axis.rate_um_per_s
 
 
@@ -34,8 +34,8 @@ def not_driven_from_now_on(rig, seconds=0.6):
 
 
 def must_latch(rig, likely):
-    """Two unexplained read-backs are enough: the axis is left alone and somebody is told why.
-    `likely`: words of which the reason must have one; empty: it must have any."""
+    """Repeated unexplained read-backs must latch the axis and give a reason. `likely`: words of
+    which the reason must contain one; empty: any reason."""
     status = eventually(lambda: latched(rig.daemon) or not rig.daemon.alive(), seen_within_s(rig))
     if not rig.must(status and status is not True, "a mismatch is not latched"):
         return
@@ -50,7 +50,7 @@ def must_latch(rig, likely):
 
 
 def must_not_drive(rig):
-    """An axis that was found beyond its bound has never been driven."""
+    """An axis found beyond its bound must never be driven."""
     time.sleep(1.0)
     status = rig.daemon.status()
     rig.must(not rig.axis.writes and not status["axes"][0]["driven"] and status["reasons"],
@@ -63,8 +63,8 @@ def release_is_needed(rig):
 
 
 def run_lie(rig, make, likely):
-    """A mistake of commissioning is there from the start; or it begins while the axis is on its
-    way: then nobody can tell a factor from something that is added."""
+    """The read-back is false from the start, as after wrong commissioning, or from a time when the
+    axis moves: then a factor cannot be distinguished from an additive error."""
     from_the_start = rig.random.random() < 0.5 and rig.machine.link != "piezo"
     if from_the_start:
         rig.axis.lie = make(rig)
@@ -91,7 +91,7 @@ def run_lie(rig, make, likely):
     rig.follows_again()
 
 
-LIES = {  # name: (how it is made, what the reason must name one of; None: need not be latched)
+LIES = {  # name: (constructor, words of which the reason must contain one; None: not latched)
     "reads back twice what is sent": (lambda rig: lies.factor(2.0), ("twice", "scale")),
     "reads back half of what is sent": (lambda rig: lies.factor(0.5), ("half", "scale")),
     "reads back the opposite sign": (lambda rig: lies.factor(-1.0), ("sign",)),
@@ -113,7 +113,7 @@ for _name, (_make, _likely) in LIES.items():
 
 @attack(links=BUSES)
 def takes_nothing(rig):
-    """Every write is answered as good, none is carried out."""
+    """Every write is acknowledged, none is carried out."""
     if not rig.start(BEFORE_UM):
         return
     rig.axis.obeys = False
@@ -127,7 +127,7 @@ def takes_nothing(rig):
 
 @attack(links=("tcp", "rtu", "can"), shown_as="float32", shown_scale=1.0)
 def reads_back_no_numbers(rig):
-    """NaN, infinities and the ends of a float32."""
+    """NaN, infinities and the ends of float32."""
     if not rig.start(BEFORE_UM):
         return
     rig.machine.wants_um(WANTED_UM)
@@ -140,7 +140,7 @@ def reads_back_no_numbers(rig):
 
 @attack(links=("tcp", "rtu"))
 def two_daemons_on_one_controller(rig):
-    """Both are honest, and want different offsets: nobody may leap, somebody must be told."""
+    """Two correct daemons want different offsets: neither may leap; one must report it."""
     if not rig.start(BEFORE_UM):
         return
     second = rig.another_daemon("two", unit=2)
@@ -164,8 +164,7 @@ def two_daemons_on_one_controller(rig):
 
 @attack(links=("tcp", "bridge"))
 def late_on_a_link_that_is_lost(rig):
-    """An honest controller whose readings are half a second old, on a link that begins anew while
-    the axis is on its way."""
+    """A correct controller with readings half a second old, on a link lost while the axis moves."""
     if not rig.start(BEFORE_UM):
         return
     rig.axis.lie = lies.late(0.5)
@@ -183,7 +182,7 @@ def late_on_a_link_that_is_lost(rig):
 
 @attack(links=("tcp", "rtu"))
 def restarts_while_a_write_is_said_again(rig):
-    """The answer to a write is lost, and the controller begins anew at 0 before the next."""
+    """The answer to a write is lost, and the controller restarts at 0 before the retry."""
     if not rig.start(-6.0):
         return
 
@@ -197,7 +196,7 @@ def restarts_while_a_write_is_said_again(rig):
     for attempt in range(3):
         rig.tries += 1
         rig.machine.wants_um(WANTED_UM if attempt % 2 == 0 else -18.0)
-        # One that moves the axis by less than `mismatch_um` looks like the controller's own lag.
+        # An axis that moved by less than `mismatch_um` looks like the controller's lag.
         rig.must(eventually(lambda: rig.release() or abs(rig.axis.position_um) > 8.0, 15.0),
                  "the axis is not driven")
         rig.machine.slave.spoil = lose_one
@@ -207,7 +206,7 @@ def restarts_while_a_write_is_said_again(rig):
 
 @attack(links=BUSES)
 def lies_when_it_is_released(rig):
-    """Whoever releases a latched axis is told something else the next moment."""
+    """Another false read-back begins right after a latched axis is released."""
     if not rig.start(BEFORE_UM):
         return
     for _ in range(3):
@@ -231,8 +230,8 @@ def lies_when_it_is_released(rig):
 
 @attack(links=BUSES)
 def adds_from_now_on_and_is_released(rig):
-    """Something is added from some moment on, and whoever releases the axis does not mend it: that
-    it stands elsewhere may be believed once, as after another writer, but it must not walk away."""
+    """A constant error begins, and the axis is released without correcting it. The shifted position
+    may be accepted once, as after another writer, but the axis must not walk away."""
     if not rig.start(BEFORE_UM):
         return
     stood_um, added_um = rig.axis.position_um, rig.random.choice((6.0, -6.0))
@@ -240,10 +239,10 @@ def adds_from_now_on_and_is_released(rig):
     rig.must(eventually(lambda: latched(rig.daemon), 8.0), "a mismatch is not latched")
     for _ in range(5):
         rig.tries += 1
-        time.sleep(1.2 * abs(added_um) / rig.axis.rate_um_per_s)  # it could have gone there
+        time.sleep(1.2 * abs(added_um) / rig.axis.rate_um_per_s)  # time to move by the error
         rig.release()
         time.sleep(0.5)
-    # It is also on its way to its target until it is latched again.
+    # The axis also moves towards its target until it is latched again.
     rig.must(abs(rig.axis.position_um - stood_um) < 1.5 * abs(added_um),
              f"walks from {stood_um:.1f} to {rig.axis.position_um:.1f} um, release by release")
     rig.axis.lie = None
@@ -252,7 +251,7 @@ def adds_from_now_on_and_is_released(rig):
 
 @attack(links=("tcp", "rtu", "can"))
 def another_writer_now_and_then(rig):
-    """A program of the controller's own sets the offset to something else at times."""
+    """Another program of the controller changes the offset at times."""
     if not rig.start(BEFORE_UM):
         return
     rig.machine.wants_um(WANTED_UM)
@@ -267,8 +266,8 @@ def another_writer_now_and_then(rig):
             if rig.random.random() < 0.5:
                 rig.axis.position_um = other
     with rig.axis.lock:
-        # Put back to what was sent a few periods ago it stands where the daemon may have taken it,
-        # and the daemon goes on from what it sent last; from anywhere else it must begin there.
+        # Put back near a recently sent offset, the axis may count as obedient: the daemon continues
+        # from its last sent offset. From any other position it must restart there.
         if abs(rig.axis.position_um - rig.axis.writes[-1].value_um) > EXPLAINED_UM:
             rig.axis.stands_at(rig.axis.position_um)
     rig.follows_again()
@@ -276,7 +275,7 @@ def another_writer_now_and_then(rig):
 
 @attack(links=("tcp", "rtu", "can", "can_travel"))
 def re_homes(rig):
-    """The controller forgets the offset between two readings, link and registers alive."""
+    """The controller loses the offset between two reads; link and registers stay alive."""
     if not rig.start(-6.0):
         return
     rig.machine.wants_um(WANTED_UM)
@@ -289,7 +288,7 @@ def re_homes(rig):
 
 
 def home_when_read(axis):
-    """At the moment of a reading: what was under way before cannot be blamed on anybody."""
+    """Homes at the time of a read, so that no write in transit is judged."""
     def home():
         axis.before_shown = lambda: None
         axis.stands_at(0.0)
@@ -299,7 +298,7 @@ def home_when_read(axis):
 
 @attack(links=("tcp", "rtu", "can", "can_travel"))
 def controller_restarts(rig):
-    """Switched off and on: registers 0, a new link."""
+    """Power cycle: registers 0, a new link."""
     if not rig.start(-6.0):
         return
     rig.machine.wants_um(WANTED_UM)
@@ -314,7 +313,7 @@ def controller_restarts(rig):
 
 @attack(links=("tcp", "rtu"))
 def applied_cannot_be_read(rig):
-    """Without knowing where the axis stands nothing may be sent to it."""
+    """Without a read-back nothing may be sent."""
     registers = rig.machine.controller.registers
     registers.refused = lambda function, *_: 2 if function == 4 else 0
     if not rig.must(rig.daemon.start(), "the daemon does not start"):

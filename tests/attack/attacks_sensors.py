@@ -1,4 +1,4 @@
-"""Thermocouples that tell anything, and commands with any number: the axis keeps slew and bound."""
+"""Arbitrary thermocouple values and command parameters: bound and slew limit are kept."""
 
 import math
 import struct
@@ -14,7 +14,7 @@ LOOKED_AT_S = 4.0
 
 @attack(links=("tcp", "rtu", "can", "piezo"))
 def hostile_thermocouples(rig):
-    """Every raw word there is, jumps from end to end of the range, values that toggle."""
+    """Every raw word, jumps over the whole range, toggling values."""
     if not rig.start(BEFORE_UM):
         return
     end = time.monotonic() + LOOKED_AT_S
@@ -68,8 +68,8 @@ inputs = ["spindle_degC"]
 
 @attack(links=("tcp",), more=CORRECTED)
 def measured_without_end(rig):
-    """`measured z 1e308` and the like, with a model that corrects itself: the estimate may move by
-    `step_um_max` with each, and nothing becomes infinite."""
+    """`measured z 1e308` and similar, with a model that corrects itself: each changes the estimate
+    by at most `step_um_max`, and nothing becomes infinite."""
     if not rig.start(BEFORE_UM):
         return
     values = (1e308, -1e308, 1e300, 1e39, -1e17, 900.0, -400.0, 3.0 * rig.axis.bound_um)
@@ -96,8 +96,8 @@ def measured_without_end(rig):
 
 @attack(links=("tcp", "bridge"))
 def operator_gone_mad(rig):
-    """Reference, switch, proving moves and cycle ends in any order, as fast as they are answered;
-    what was answered last is what a restart finds."""
+    """Reference, switch, proving moves and cycle ends in random order, as fast as they are
+    answered; a restart must restore what was acknowledged last."""
     if not rig.start(BEFORE_UM):
         return
     end = time.monotonic() + LOOKED_AT_S
@@ -111,7 +111,7 @@ def operator_gone_mad(rig):
             rig.daemon.operate(method, **params)
     rig.machine.wants_um(0.0)
     time.sleep(0.3)
-    rig.told_reference = None  # the last answer may be older than the last reference
+    rig.told_reference = None  # acknowledged reference may have been replaced
     rig.daemon.operate(rig.random.choice(("disable", "enable")))
     rig.daemon.operate("reference")
     rig.daemon.kill()
@@ -120,7 +120,7 @@ def operator_gone_mad(rig):
 
 @attack(links=("tcp",))
 def commands_and_kills(rig):
-    """kill -9 right after an answer "done": the command is there after the restart."""
+    """kill -9 right after an answer "done": the command is still in effect after the restart."""
     rig.start(BEFORE_UM)
     for _ in range(6):
         rig.tries += 1

@@ -1,5 +1,5 @@
-"""The axis at the controller's side: where it stands, who wrote what and when, and what the
-controller says of it, which need not be true."""
+"""The axis at the controller's side: position, writes with writer and time, and the read-back,
+which may be false."""
 
 import collections
 import dataclasses
@@ -8,18 +8,18 @@ import threading
 import time
 
 
-# The same value after so long is the same request once more: its answer was late or lost.
+# The same value after this time is a retry: its answer was late or lost.
 SENT_AGAIN_AFTER_S = 0.15
-# A cycle that the machine has stopped for a moment leaves its value to be sent again by the link
-# meanwhile: so long counts the time from when the value was sent first.
+# If the machine stalls the daemon's cycle, the link sends the value again. A repetition within this
+# time of the first write keeps the first one's reference time.
 RENEWED_AFTER_S = 0.1
 
 
 @dataclasses.dataclass
 class Write:
-    """A value that was written to the axis as valid."""
+    """A valid value written to the axis."""
     at_s: float  # CLOCK_MONOTONIC, before it was answered
-    since_s: float  # the value that it is compared with was not computed before
+    since_s: float  # earliest time at which before_um can have been computed
     before_um: float
     value_um: float
     writer: int
@@ -33,16 +33,16 @@ class Write:
 
 @dataclasses.dataclass
 class Writer:
-    """What one daemon has written last. Its next value is compared with `value_um`; that one was
-    computed after the answer to the write before it, at `since_s`."""
+    """Last write of one daemon. The next value is compared with `value_um`, which was computed
+    after the answer to the previous write, at `since_s`."""
     value_um: float
     since_s: float
     at_s: float
-    first_at_s: float = -math.inf  # of `value_um`
+    first_at_s: float = -math.inf  # first write of `value_um`
 
 
 class Axis:
-    """`shown_um()` is what is read back: where the axis stands, unless a lie was told to it."""
+    """`shown_um()` is the read-back: the position, unless `lie` is set."""
 
     def __init__(self, bound_um, rate_um_per_s):
         self.lock = threading.RLock()
@@ -54,8 +54,8 @@ class Axis:
         self.lied = False
         self.writes = []
         self.writers = {}
-        self.told = {}  # before its first write; writer: (when it read first, its last readings)
-        self.under_way = set()  # writers of which one value may come that knows of no new beginning
+        self.told = {}  # before the first write; writer: (time of the first read, last readings)
+        self.under_way = set()  # writers with possibly one value in transit from before a restart
         self.before_shown = lambda: None
 
     def written(self, value_um, writer=1, at_s=None):
@@ -68,11 +68,11 @@ class Axis:
                     return
                 told_at, readings_um = self.told.get(writer, (now, [self.position_um]))
                 if now < told_at:
-                    return  # was on its way when the controller began anew, which drops its queue
-                # It starts from one of its readings.
+                    return  # sent before the restart, which drops the controller's queue
+                # The first write starts from one of the readings.
                 stood_um = min(readings_um, key=lambda um: abs(value_um - um))
                 if abs(value_um - self.position_um) < abs(value_um - stood_um):
-                    stood_um = self.position_um  # a lie that changes: the truth is right too
+                    stood_um = self.position_um  # a variable error: the true position is right too
                 last = Writer(stood_um, told_at, told_at)
             self.under_way.discard(writer)
             self.writes.append(Write(now, last.since_s, last.value_um, value_um, writer,
@@ -97,9 +97,8 @@ class Axis:
             return shown_um
 
     def stands_at(self, position_um):
-        """The controller has moved by itself, or whoever wrote before is gone: the next value is
-        compared with where the axis stands then, from its next reading on. Who wrote just this
-        value has nothing to begin anew."""
+        """The controller has moved by itself, or the previous writer is gone: the next value is
+        compared with the position at its next read. A writer of this value continues."""
         with self.lock:
             self.position_um = position_um
             for writer in {**self.writers, **self.told}:
@@ -137,7 +136,7 @@ def frozen(at_um):
 
 
 def jumps(by_um, readings):
-    """Wrong for so many readings, then true for as many."""
+    """Alternately wrong and right for this number of readings."""
     count = 0
 
     def shown(axis, _now):
@@ -152,7 +151,7 @@ def anything(random, most_um):
 
 
 def late(by_s):
-    """True, but of some time ago."""
+    """The position of some time ago."""
     def shown(axis, now):
         older = [write.value_um for write in axis.writes[-400:] if write.at_s <= now - by_s]
         return older[-1] if older else 0.0

@@ -1,4 +1,4 @@
-"""A controller and a node of thermocouples on CAN interfaces, by raw frames."""
+"""A controller and a thermocouple node on CAN interfaces, with raw frames."""
 
 import contextlib
 import math
@@ -21,7 +21,7 @@ def open_bus(interface):
 
 
 def wall_less_monotonic_s():
-    """Of the two clocks, read with the least between them."""
+    """Difference of the clocks, from the reading with the shortest interval."""
     def read():
         before, wall, after = time.monotonic(), time.time(), time.monotonic()
         return after - before, wall - 0.5 * (before + after)
@@ -32,7 +32,7 @@ CLOCKS_APART_S = wall_less_monotonic_s()
 
 
 def receive(bus):
-    """A frame and the CLOCK_MONOTONIC at which the kernel got it."""
+    """A frame and the CLOCK_MONOTONIC of its reception by the kernel."""
     data, ancillary, _, _ = bus.recvmsg(16, 64)
     for level, kind, stamp in ancillary:
         if level == socket.SOL_SOCKET and kind == SO_TIMESTAMPNS:
@@ -51,7 +51,7 @@ class CanThermocouples:
 
     def __init__(self, interface):
         self.temps_degC = (20.0, 20.0)
-        self.data = None  # raw, where a test wants something else there
+        self.data = None  # payload that replaces the temperatures
         self.ending = threading.Event()
         self.bus = open_bus(interface)
         self.thread = threading.Thread(target=self.run, daemon=True)
@@ -74,8 +74,8 @@ class CanThermocouples:
 
 
 class CanController:
-    """Takes offset frames whose valid bit is set and shows what it applies after each, and at
-    least so often."""
+    """Applies offset frames with the valid bit set; reports the applied offset after each and at
+    least once per PERIOD_S."""
 
     def __init__(self, axis, interface, shown_as, shown_scale):
         self.axis = axis
@@ -132,15 +132,14 @@ class CanController:
         self.bus.close()
 
 
-NODES = (0x201, 0x202)  # of a travel; each with the number of its set
+NODES = (0x201, 0x202)  # of a travel; each with its set number
 NODES_APPLIED = (0x301, 0x303)
 POSITION = 0x302
 
 
 class CanTravelController(CanController):
-    """Interpolates between two nodes, whose offsets are the same here: where they differ, the set is
-    a mixture. `spoil` may lose, repeat and hold back the frames of the nodes, `spoil_shown` those
-    that show what is applied."""
+    """Interpolates between two nodes with equal offsets: different ones are a mixture of sets.
+    `spoil` may lose, repeat and delay the nodes' frames, `spoil_shown` those of the read-back."""
 
     FORGOTTEN_AFTER_S = 1.0
 
@@ -172,7 +171,7 @@ class CanTravelController(CanController):
             self.take_over()
 
     def take_over(self):
-        """At each frame, as soon as a set seems to be whole."""
+        """Called for each frame; applies the set once it seems complete."""
         if not self.valid or len(self.nodes) < len(NODES):
             return
         near, far = (self.nodes[identifier] for identifier in NODES)

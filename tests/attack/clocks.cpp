@@ -1,6 +1,6 @@
-// Preloaded into the daemon by attacks_daemon.py: its wall clock is off by what stands in the file
-// THERMOCOMP_CLOCKS, and its sleeps fail while that file says so. The file holds two 64-bit
-// numbers: nanoseconds to add to CLOCK_REALTIME, and not 0 for sleeps that fail.
+// Preloaded into the daemon by attacks_daemon.py: falsifies the wall clock and fails sleeps, as
+// given in the file THERMOCOMP_CLOCKS. It holds two 64-bit numbers: nanoseconds added to
+// CLOCK_REALTIME, and a flag for failing sleeps.
 
 #include <cerrno>
 #include <cstdint>

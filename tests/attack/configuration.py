@@ -1,4 +1,4 @@
-"""The configurations that a commissioning engineer would write for the machine of these attacks."""
+"""Configurations of the attacked machine as a commissioning engineer would write them."""
 
 MODEL = """format = 1
 inputs = ["column_degC", "spindle_degC"]
@@ -101,7 +101,7 @@ rate_um_per_s_max = {rate}
 offset = {{ id = 0x200, start_bit = 0, length_bits = 32, scale = 0.001 }}
 applied = {{ id = 0x300, start_bit = 0, length_bits = 32, {can_float}scale = {shown_scale} }}
 """
-# Along the travel nothing changes: both nodes have the same offset.
+# The displacement is constant along the travel: both nodes have the same offset.
 TRAVEL_MODEL = MODEL + """[guideway.bed]
 axis = "y_mm"
 positions_mm = [0.0, 500.0]

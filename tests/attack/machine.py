@@ -1,5 +1,5 @@
-"""A machine that knows the daemon only by its buses: thermocouples that show what a test says, and
-a controller that may lie."""
+"""A machine connected to the daemon only through its buses: thermocouples showing a test's values and
+a controller with possibly false read-backs."""
 
 import math
 import pathlib
@@ -23,7 +23,7 @@ PIEZO_BOUND_UM = 20.0
 
 
 def encoded(value, kind, scale):
-    """Registers, high word first; what does not fit stands at its end."""
+    """Registers, high word first; saturates."""
     if kind == "float32":
         return struct.unpack(">2H", struct.pack(">f", value / scale))
     if not math.isfinite(value):
@@ -33,7 +33,7 @@ def encoded(value, kind, scale):
 
 
 class Thermocouples:
-    """Registers with two temperatures; a test may put other words there."""
+    """Registers with two temperatures; a test may write other words."""
 
     def __init__(self, encoding="int32", scale=0.001):
         self.encoding, self.scale = encoding, scale
@@ -46,7 +46,7 @@ class Thermocouples:
 
 
 class ModbusController:
-    """Registers in front of an Axis."""
+    """Registers of an Axis."""
 
     def __init__(self, axis, shown_as="int32", shown_scale=RESOLUTION_UM):
         self.axis = axis
@@ -66,19 +66,19 @@ class ModbusController:
             self.axis.written(RESOLUTION_UM * counts, self.registers.writer)
 
     def restart(self):
-        """As a controller that was switched off and on: all registers 0."""
+        """Power cycle: all registers 0."""
         with self.registers.lock:
             self.registers.clear()
             self.axis.stands_at(0.0)
 
 
 class PiezoAmplifier:
-    """The amplifier's registers; the axis stands where the curve says for its voltage."""
+    """Registers of the amplifier; the axis position follows from the curve and its voltage."""
 
     def __init__(self, axis):
         self.axis = axis
-        self.volts = []  # each that differs from the one before
-        self.hysteresis = 0  # voltages that were not reached from 0 V
+        self.volts = []  # without repetitions
+        self.hysteresis = 0  # voltages not approached from 0 V
         self.registers = Registers()
         self.registers.before_read = self.show
         self.registers.after_write = self.written
@@ -101,7 +101,7 @@ class PiezoAmplifier:
             self.hysteresis += 1
         if not self.volts or volts != self.volts[-1]:
             self.volts.append(volts)
-        if volts > 0.0:  # 0 V is the way to every voltage, not an offset
+        if volts > 0.0:  # 0 V precedes every voltage and is not an offset
             self.axis.written(displacement_um(volts))
 
     def restart(self):
@@ -117,8 +117,8 @@ def displacement_um(volts):
 
 
 class Machine:
-    """`link`: one of LINKS. The thermocouples are on the same kind of bus, but where a controller
-    is no bus: then on Modbus TCP."""
+    """`link`: one of LINKS. The thermocouples use the same kind of bus, or Modbus TCP for
+    controllers without a bus."""
 
     def __init__(self, folder, link, shown_as="int32", shown_scale=RESOLUTION_UM, **choices):
         self.folder = pathlib.Path(folder)
@@ -194,13 +194,13 @@ class Machine:
         return text.MODBUS_CONTROLLER.format(kind="modbus_" + self.link, **choices)
 
     def config(self, folder, socket, unit=1, **other):
-        """The text of a daemon's configuration whose files are in `folder`."""
+        """A daemon configuration with its files in `folder`."""
         choices = self.choices | {"folder": folder, "socket": socket, "unit": unit} | other
         return (text.HEAD.format(**choices) + self.sensor_text() + text.REST.format(**choices) +
                 self.controller_text(choices) + text.TAIL.format(**choices))
 
     def wants_um(self, offset_um):
-        """The column is so warm that this is the offset (with the reference of the start)."""
+        """Sets the column temperature for this offset (with the reference of the start)."""
         self.thermocouples.show(REFERENCE_degC - offset_um / UM_PER_K)
 
     def close(self):

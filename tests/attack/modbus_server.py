@@ -1,5 +1,5 @@
-"""Modbus slaves in plain bytes, over TCP and over a pseudo-terminal: registers that a test sets,
-and a place where every answer can be spoiled before it goes out."""
+"""Modbus servers in plain bytes, over TCP and a pseudo-terminal: registers set by a test, and a
+hook that may falsify every answer."""
 
 import contextlib
 import os
@@ -21,7 +21,7 @@ ANSWERS_AGAIN_S = 0.02
 
 class Registers:
     """The tables of one unit. `before_read(function, address, count)` runs before a read is
-    answered, `after_write()` once a write is in, both with the lock held; `refused(...)` gives an
+    answered, `after_write()` after a write, both with the lock held; `refused(...)` returns an
     exception code or 0."""
 
     def __init__(self):
@@ -30,7 +30,7 @@ class Registers:
         self.before_read = lambda function, address, count: None
         self.after_write = lambda: None
         self.refused = lambda function, address, count: 0
-        self.writer = 1  # number of the unit under which the present request came
+        self.writer = 1  # unit number of the current request
 
     def clear(self):
         with self.lock:
@@ -47,7 +47,7 @@ class Registers:
             return [self.tables[table].get(address + i, 0) for i in range(count)]
 
     def answer(self, pdu, unit=1):
-        """The answer's PDU."""
+        """PDU of the answer."""
         if len(pdu) < 5:
             return bytes([pdu[0] | 0x80 if pdu else 0x80, 3])
         function, address, count = struct.unpack(">BHH", pdu[:5])
@@ -77,7 +77,7 @@ class Registers:
 
 
 class Hold:
-    """What a spoiler may put among the bytes of an answer: a pause, or the end of the link."""
+    """Element of a falsified answer: a pause, or the end of the connection."""
 
     def __init__(self, seconds=0.0, close=False):
         self.seconds = seconds
@@ -85,7 +85,7 @@ class Hold:
 
 
 class Sender:
-    """Sends answers in order, with their pauses, while questions go on being taken."""
+    """Sends answers in order, with their pauses, while requests are still received."""
 
     def __init__(self, send, close):
         self.send = send
@@ -113,8 +113,8 @@ def as_it_is(_frame_of, _request, answer):
 
 
 class TcpSlave:
-    """One unit on 127.0.0.1. `spoil(frame_of, request, answer)` returns what goes out instead of
-    `answer`, a list of bytes and Holds; frame_of(pdu, transaction=None) frames bytes of its own."""
+    """One unit on 127.0.0.1. `spoil(frame_of, request, answer)` returns the bytes and Holds sent
+    instead of `answer`; frame_of(pdu, transaction=None) builds other frames."""
 
     def __init__(self, registers, name):
         self.registers = registers
@@ -135,7 +135,7 @@ class TcpSlave:
         threading.Thread(target=self.accept, args=(self.server,), daemon=True).start()
 
     def stop(self):
-        """As a device that is switched off."""
+        """Like a device that is switched off."""
         server, self.server = self.server, None
         if server is not None:
             with contextlib.suppress(OSError):
@@ -188,7 +188,7 @@ def crc16(frame):
 
 
 def request_length(frame):
-    """Of the RTU request that begins here; 0: not to be told yet, -1: none begins here."""
+    """Length of the RTU request at the beginning; 0: incomplete, -1: not a request."""
     if len(frame) < 2:
         return 0
     if frame[1] in (*READ_BITS, *READ_WORDS, 5, WRITE_ONE):
@@ -219,7 +219,7 @@ class RtuSlaves:
         return f'device = "{self.device}"\nbaud = 115200\nparity = "none"\n'
 
     def stop(self):
-        """As a cable that is out."""
+        """Like a disconnected cable."""
         self.silent = True
 
     def start(self):

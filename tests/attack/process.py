@@ -1,4 +1,4 @@
-"""A thermocompd under attack: its process, its files, its socket."""
+"""The attacked thermocompd: process, files, socket."""
 
 import contextlib
 import os
@@ -15,7 +15,7 @@ WATCHDOG_S = 5.0  # WatchdogSec of thermocompd.service
 
 
 def eventually(check, patience_s=PATIENCE_S):
-    """Polls until check() gives something true, and returns it; a false value if it never does."""
+    """Polls check() until it is true; returns its last value."""
     end = time.monotonic() + patience_s
     while True:
         value = check()
@@ -25,7 +25,7 @@ def eventually(check, patience_s=PATIENCE_S):
 
 
 class Daemon:
-    """A process of thermocompd with its files in `folder`."""
+    """A thermocompd process with its files in `folder`."""
 
     def __init__(self, rig, folder, socket, unit=1, **other):
         self.rig = rig
@@ -40,7 +40,7 @@ class Daemon:
         self.other = other
         self.process = None
         self.ends_expected = False
-        self.running = []  # [from, until or None] in which the watchdog must be fed
+        self.running = []  # [from, until or None]: the watchdog must be fed
         self.environment = {}
         self.write_config()
 
@@ -54,7 +54,7 @@ class Daemon:
         return text
 
     def start(self, may_refuse=False):
-        """Until it says that it is ready; False when it ends before."""
+        """Starts it and waits until it is ready; False if it ends first."""
         self.rig.manager.ready.clear()
         environment = os.environ | {"NOTIFY_SOCKET": str(self.rig.manager.path),
                                     "WATCHDOG_USEC": str(int(1e6 * WATCHDOG_S))}
@@ -80,7 +80,7 @@ class Daemon:
         return watch.call(self.socket, method, **params)
 
     def status(self):
-        """Of a daemon that answers; else an empty one."""
+        """Status; empty if the daemon does not answer."""
         with contextlib.suppress(OSError, ValueError, watch.Refused):
             return self.call("status")
         return {"mode": "", "reasons": [], "axes": [{"driven": False}], "enabled": None,
@@ -94,8 +94,8 @@ class Daemon:
             and self.alive()
 
     def operate(self, method, **params):
-        """An operator's command; whether it was answered "done", which is noted. The machines here
-        warm in seconds, and a reference is wanted all the same."""
+        """Sends an operator's command and notes it; True if answered "done". References are forced,
+        since these machines warm in seconds."""
         if method == "reference":
             params["force"] = True
         try:
@@ -115,7 +115,7 @@ class Daemon:
         self.process.send_signal(signal.SIGHUP)
 
     def stop_for(self, seconds):
-        """As if the whole machine stood still."""
+        """Like a stall of the whole machine."""
         self.pause_watch()
         self.process.send_signal(signal.SIGSTOP)
         time.sleep(seconds)
@@ -134,7 +134,7 @@ class Daemon:
         self.rig.machine.axis.begin_anew(self.unit)
 
     def end(self):
-        """As systemd would. False: it did not end with status 0 in time."""
+        """Ends it as systemd would. False: no exit with status 0 in time."""
         self.pause_watch()
         if not self.alive():
             return False
@@ -150,7 +150,7 @@ class Daemon:
         return good
 
     def cpu_s(self):
-        """Processor time used."""
+        """Consumed processor time."""
         fields = pathlib.Path(f"/proc/{self.process.pid}/stat").read_text().rpartition(")")[2]
         return sum(map(int, fields.split()[11:13])) / os.sysconf("SC_CLK_TCK")
 

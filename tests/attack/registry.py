@@ -1,4 +1,4 @@
-"""All attacks by name. An attack is a function that takes a Rig and does one try."""
+"""All attacks by name. An attack is a function that makes one try with a Rig."""
 
 import dataclasses
 import typing
@@ -17,7 +17,7 @@ class Attack:
 
 
 def attack(links=("tcp",), limit_s=60.0, name=None, **choices):
-    """`choices`: of the Rig's machine. `limit_s`: a try that takes longer has failed."""
+    """`choices`: for the Rig's machine. `limit_s`: longer tries have failed."""
     def note(run):
         called = name or run.__name__.replace("_", " ")
         assert called not in ALL, called

@@ -1,8 +1,8 @@
-"""The daemon under attack, its machine, and everything that is noted about both.
+"""The attacked daemon, its machine, and all records of both.
 
-A Rig is given to an attack. The attack uses it and says with `must()` what has to be true beside
-the invariants; judge() then looks at what was noted: the axis at the controller's side, processes,
-rows of the history, operator's commands, the service manager's mailbox, a polite client's waits."""
+An attack uses a Rig and states with `must()` its conditions besides the invariants; judge() then
+checks the records: the axis at the controller's side, processes, history rows, operator's commands,
+watchdog notifications, response times of a client."""
 
 import contextlib
 import json
@@ -35,7 +35,7 @@ def is_database(path):
 
 
 class Rig:
-    """`link` and `choices`: those of Machine."""
+    """`link` and `choices`: see Machine."""
 
     def __init__(self, programs, link, seed, **choices):
         self.bin = pathlib.Path(programs).resolve()
@@ -59,14 +59,14 @@ class Rig:
         self.daemon = self.another_daemon("one")
 
     def another_daemon(self, name, unit=1, **other):
-        """Not started yet; with files of its own unless `other` names them."""
+        """A daemon, not yet started, with its own files unless `other` names them."""
         socket = other.pop("socket", self.folder / (name + ".sock"))
         made = Daemon(self, self.folder / name, socket, unit, **other)
         self.daemons.append(made)
         return made
 
     def start(self, offset_um=None):
-        """The first daemon, until it compensates (and has been there)."""
+        """Starts the first daemon and waits until it compensates (and has reached the offset)."""
         if not self.daemon.start():
             self.broke("the daemon does not start")
             return False
@@ -86,7 +86,7 @@ class Rig:
         return True
 
     def restart(self):
-        """After a kill or an end: what was told to an operator must be what it starts with."""
+        """Starts it after a kill or an end: acknowledged commands must still be in effect."""
         if not self.daemon.start():
             self.broke("the daemon does not start again")
             return False
@@ -107,13 +107,13 @@ class Rig:
         return self.must(holds, f"{name}: {what}")
 
     def must(self, holds, what):
-        """What has to be true in this attack beside the invariants."""
+        """A condition of this attack besides the invariants."""
         if not holds:
             self.broke(what)
         return holds
 
     def tool(self, *arguments, patience_s=60.0):
-        """thermocomp: (exit status, output of both kinds); negative: a signal; None: hangs."""
+        """Runs thermocomp: (exit status, stdout and stderr); negative: a signal; None: timeout."""
         try:
             done = subprocess.run([str(self.bin / "thermocomp"), *map(str, arguments)],
                                   stdin=subprocess.DEVNULL, capture_output=True,
@@ -126,8 +126,7 @@ class Rig:
         return done.returncode, (done.stdout + done.stderr).decode(errors="replace")
 
     def note_rows(self):
-        """What a reader sees committed now, in whatever files the daemon has put it; counts what
-        is gone since the last time."""
+        """Reads committed rows from all history files; counts those lost since the last call."""
         seen = set()
         for history in {self.daemon.history, *self.daemon.folder.glob("*history*")}:
             if not is_database(history):
@@ -143,12 +142,12 @@ class Rig:
         return len(seen)
 
     def wait_for_rows(self, more=5):
-        """So many more than there are, so that something is committed to lose."""
+        """Waits for this number of further committed rows."""
         wanted = len(self.rows) + more
         return self.must(eventually(lambda: self.note_rows() >= wanted), "nothing is committed")
 
     def follows_again(self, patience_s=PATIENCE_S):
-        """With an honest controller, and after what an operator can do, the axis goes on."""
+        """With true read-backs and an operator's releases, the axis must follow again."""
         stands_um = self.axis.position_um
         offset_um = stands_um - math.copysign(1.0, stands_um)
         self.machine.wants_um(offset_um)
@@ -217,8 +216,8 @@ class Rig:
         return longest
 
     def allowed_um(self, write):
-        """For one step: the time from when its predecessor can have been computed, one cycle
-        because the offset moves on the cycle's grid, and what this machine was late."""
+        """Allowed step of a write: elapsed time since its predecessor can have been computed, one
+        cycle for the cycle's grid, and the delays of this machine."""
         grid_s = 1.0 / self.machine.choices["rate_hz"]
         late_s = self.metronome.NOTED_FROM_S + self.metronome.lateness_s(write.since_s - 1.0,
                                                                          write.at_s)
@@ -226,7 +225,7 @@ class Rig:
             2 * RESOLUTION_UM
 
     def judge(self):
-        """Everything in one dictionary for the table."""
+        """Ends everything; the results of the table as a dictionary."""
         self.end_all()
         largest = {"step_um": 0.0, "allowed_um": 0.0, "beyond": 0, "value_um": 0.0, "writes": 0}
         worst = -math.inf

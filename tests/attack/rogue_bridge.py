@@ -1,4 +1,4 @@
-"""A bridge that calls `controller_state` as the one of LinuxCNC does, and may tell anything."""
+"""A bridge that calls `controller_state` like LinuxCNC's, with arbitrary reports."""
 
 import json
 import math
@@ -17,7 +17,7 @@ class RogueBridge:
         self.taking = True
         self.silent = False
         self.period_s = self.PERIOD_S
-        self.raw = None  # makes the params, where they are to be wrong
+        self.raw = None  # function that replaces the params
         self.ending = threading.Event()
         self.path = None
         self.thread = None
@@ -35,7 +35,7 @@ class RogueBridge:
         self.silent = False
 
     def restart(self):
-        """LinuxCNC off and on: another session, nothing applied."""
+        """LinuxCNC restarted: another session, offset 0."""
         self.session += 1
         self.axis.stands_at(0.0)
 

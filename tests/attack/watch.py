@@ -1,4 +1,4 @@
-"""What is noted beside the daemon while it is attacked, by clocks that are not the daemon's."""
+"""Observers beside the attacked daemon, with clocks of their own."""
 
 import bisect
 import contextlib
@@ -9,8 +9,8 @@ import time
 
 
 class Metronome:
-    """Wakes every few milliseconds and notes when it was late: so late has this machine been with
-    waking anybody. What the daemon may be late for is measured with it."""
+    """Wakes every few milliseconds and records its delays: the machine's latency, which is deducted
+    from the daemon's."""
 
     PERIOD_S = 0.005
     NOTED_FROM_S = 0.002
@@ -33,7 +33,7 @@ class Metronome:
             due = max(due + self.PERIOD_S, now)
 
     def lateness_s(self, since_s, until_s):
-        """The largest that was under way in that time."""
+        """Largest delay in this time."""
         first = bisect.bisect_left(self.at_s, since_s)
         late = 0.0
         for at, lateness in zip(self.at_s[first:], self.late_s[first:]):
@@ -48,7 +48,7 @@ class Metronome:
 
 
 class ServiceManager:
-    """Listens as systemd would: NOTIFY_SOCKET of every daemon of this rig."""
+    """Receives notifications like systemd: NOTIFY_SOCKET of all daemons of this rig."""
 
     def __init__(self, path):
         self.path = path
@@ -74,7 +74,7 @@ class ServiceManager:
 
 
 class Refused(Exception):
-    """The answer was an error."""
+    """The answer is an error."""
 
 
 def connect(path, timeout_s=30.0):
@@ -93,7 +93,7 @@ def request(method, **params):
 
 
 def call(path, method, timeout_s=30.0, **params):
-    """The result, over a connection of its own. @raises OSError, Refused, ValueError (no JSON)."""
+    """Result of a call on its own connection. Raises OSError, Refused, ValueError (no JSON)."""
     with connect(path, timeout_s) as link:
         link.sendall(request(method, **params) + b"\n")
         with link.makefile("rb") as lines:
@@ -107,7 +107,7 @@ def call(path, method, timeout_s=30.0, **params):
 
 
 class Client:
-    """A polite one that asks for the status four times a second, and how long it waits."""
+    """Asks for the status four times a second and records the response times."""
 
     PAUSE_S = 0.25
 
@@ -131,7 +131,7 @@ class Client:
             self.asking_since_s = None
 
     def all_waits(self):
-        """Also the one that still waits."""
+        """Response times including a pending one."""
         since = self.asking_since_s
         return self.waited + ([(since, time.monotonic())] if since else [])
 

@@ -1,4 +1,4 @@
-"""A headless LinuxCNC with a simulated mill, the bridge in it, and the daemon beside it."""
+"""A headless LinuxCNC with a simulated mill and the bridge, beside the daemon."""
 
 import contextlib
 import json
@@ -16,7 +16,7 @@ EXAMPLE = SOURCE / "linuxcnc" / "example"
 
 
 def sampler_file():
-    """Everything but positions in um: the recorder writes six digits after the point."""
+    """All channels except positions in um: the recorder writes six decimals."""
     lines = ["loadrt sampler depth=60000 cfg=ffffffffffffbs",
              "loadrt sum2 names=" + ",".join(f"rec-{n}-{a}" for n in ("asked", "added", "applied")
                                              for a in AXES)]
@@ -29,7 +29,7 @@ def sampler_file():
                       f"net {part} {part}.out => sampler.0.pin.{3 + 3 * k + i}"]
         lines += [f"net tc-asked-{a} => rec-asked-{a}.in0",
                   f"net tc-applied-{a} => rec-applied-{a}.in0",
-                  # What the drive is told less what LinuxCNC shows.
+                  # Difference between drive command and LinuxCNC's displayed position.
                   f"net {a}-cmd => rec-added-{a}.in0",
                   f"net tc-position-{a} => rec-added-{a}.in1"]
     lines += ["net tc-enabled motion.motion-enabled => sampler.0.pin.12",
@@ -49,12 +49,12 @@ def hal_file(way, *options):
 
 
 class LinuxCnc:
-    """One run of LinuxCNC; its operator's methods are this object's."""
+    """One run of LinuxCNC; methods of its operator are available on this object."""
 
     def __init__(self, folder, way, daemon_socket):
         self.folder = folder
         self.way = way
-        # A second is enough to see that a warning comes, and that it does not come at once.
+        # 1 s: long enough to show that the warning comes, and that it does not come at once.
         self.bridge_arguments = f"--socket {daemon_socket} --mismatch-after-s 1.0"
         self.process = None
 
@@ -116,7 +116,7 @@ class LinuxCnc:
         return call
 
     def quit(self):
-        """As an operator would close the screen; LinuxCNC ends after it."""
+        """Closes it as an operator would; LinuxCNC then ends."""
         self.lines.write('["quit"]\n')
         self.lines.flush()
         self.process.wait(PATIENCE_S)

@@ -1,4 +1,4 @@
-"""The helpers of the daemon's tests are these tests' too."""
+"""Uses the helpers of the daemon's tests."""
 
 import pathlib
 import sys

@@ -1,8 +1,8 @@
 #!/bin/bash
-# in_private_namespaces.sh FOLDER INI PROGRAMS: LinuxCNC in FOLDER as the user nobody, with networks,
-# processes, shared memory and /tmp of its own: nothing of it meets another LinuxCNC, and nothing
-# is left when it ends. It refuses root, and its own server would listen on every network.
-# FOLDER and the folder PROGRAMS may be below the /tmp that this hides; PROGRAMS keeps its path.
+# in_private_namespaces.sh FOLDER INI PROGRAMS: runs LinuxCNC in FOLDER as user nobody with private
+# networks, processes, shared memory and /tmp, isolated from any other LinuxCNC, and leaves nothing behind.
+# LinuxCNC refuses root, and its server would listen on all networks. FOLDER and PROGRAMS may be below the
+# hidden /tmp; PROGRAMS keeps its path.
 set -euo pipefail
 export FOLDER=$1 INI=$2 PROGRAMS=$3
 # shellcheck disable=SC2016  # expanded inside

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""Stands where LinuxCNC's screen would be: does what a test says, over a Unix socket, one JSON
-list [method, arguments...] a line, and answers [true, result] or [false, what went wrong]."""
+"""Replaces LinuxCNC's screen: executes a test's commands from a Unix socket, one JSON list [method,
+arguments...] per line, and answers [true, result] or [false, error]."""
 
 import json
 import os
@@ -78,7 +78,7 @@ class Operator:
                 status.exec_state == linuxcnc.EXEC_DONE and status.queue == 0)
 
     def mdi(self, *lines):
-        """Each line carried out to its end."""
+        """Executes each line to its end."""
         self.mode(linuxcnc.MODE_MDI)
         for line in lines:
             self.command.mdi(line)
@@ -88,7 +88,7 @@ class Operator:
         return True
 
     def run(self, program):
-        """Starts it."""
+        """Starts the program."""
         self.mode(linuxcnc.MODE_AUTO)
         self.command.program_open(program)
         self.wait(lambda s: s.file.endswith(program), "the program is loaded")
@@ -115,7 +115,7 @@ class Operator:
         return self.wait(lambda s: s.inpos, "jog")
 
     def messages(self):
-        """What LinuxCNC would have shown since the last time."""
+        """Messages of LinuxCNC since the last call."""
         said = []
         while True:
             one = self.errors.poll()
@@ -127,7 +127,7 @@ class Operator:
         return [hal.get_value(name) for name in names]
 
     def halcmd(self, *arguments):
-        """[status, output]. Into a file: what loadusr starts would keep a pipe open."""
+        """[status, output]. Output to a file: processes of loadusr would keep a pipe open."""
         with tempfile.TemporaryFile("w+") as said:
             status = subprocess.run(["halcmd", *arguments], stdout=said, stderr=said,
                                     timeout=PATIENCE_S, check=False).returncode
@@ -135,7 +135,7 @@ class Operator:
             return [status, said.read()]
 
     def end_bridge(self, how, name):
-        """A signal to the process of that HAL component, as seen from here."""
+        """Sends a signal to the process of this HAL component, found from within the namespaces."""
         for process in pathlib.Path("/proc").glob("[0-9]*"):
             words = (process / "cmdline").read_bytes().split(b"\0")
             if words[0].endswith(b"thermocomp-linuxcnc") and name.encode() in words:
@@ -144,7 +144,7 @@ class Operator:
         raise RuntimeError("no such process")
 
     def record(self, file):
-        """Every servo period from now on into a file, until recorded()."""
+        """Records every servo period to a file until recorded()."""
         with open(file, "w", encoding="ascii") as out:
             self.recorder = subprocess.Popen(["halsampler"], stdout=out)
         return self.halcmd("setp", "sampler.0.enable", "1")
@@ -171,7 +171,7 @@ def main():
                     return
                 try:
                     answer = [True, getattr(operator, method)(*arguments)]
-                except Exception as error:  # whatever it is, the test is told
+                except Exception as error:  # whatever it is, the test gets it
                     answer = [False, f"{method}{arguments}: {error!r}"]
                 lines.write(json.dumps(answer) + "\n")
                 lines.flush()

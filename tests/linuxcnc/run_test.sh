@@ -1,5 +1,5 @@
 #!/bin/bash
-# run_test.sh FILE.py: the test, or exit status 77 and why it cannot be run here.
+# run_test.sh FILE.py: runs the test, or exits with status 77 and the reason why it cannot run.
 set -euo pipefail
 skip() {
   echo "skipped: $1"

@@ -1,5 +1,5 @@
-"""What operators and breakdowns do to a machine with thermal offsets in effect, and how far its
-drives are from command plus wanted offset after the next absolute move."""
+"""Operator actions and failures with thermal offsets in effect: difference of the drives from
+command plus wanted offset after the next absolute move."""
 
 import contextlib
 import os
@@ -25,13 +25,13 @@ class Scenario:
         self.rows = []
 
     def check(self, event):
-        """In step again, the error after an absolute move, and the offset that is in effect."""
+        """Waits until settled; checks the error after an absolute move and the offset in effect."""
         self.mill.in_step()
         errors, axes = self.mill.errors_um(**PLACE_mm)
         doubled = max(abs(axes[a]["applied"] - expected_um(a)) for a in AXES)
         self.rows.append((event, largest(errors), doubled))
         print(f"{event:48} {largest(errors):9.3f} {doubled:9.3f}")
-        assert doubled < 1.0, axes  # neither missing nor there twice
+        assert doubled < 1.0, axes  # neither missing nor doubled
         assert largest(errors) <= FOLLOWS_um, errors
 
 
@@ -50,7 +50,7 @@ def test_offsets_that_are_there_before_homing(scenario):
     cnc = scenario.mill.cnc
     cnc.on()
     wanted_um = scenario.mill.daemon.status()["axes"][0]["displacement"]
-    assert abs(wanted_um + expected_um("x")) < 0.2  # it would be there
+    assert abs(wanted_um + expected_um("x")) < 0.2  # the offset to be applied
     time.sleep(0.3)
     assert cnc.pins("thermocomp.offset-x", "thermocomp.applied-x") == [0.0, 0.0]
     cnc.home()
@@ -118,12 +118,12 @@ def test_soft_limit(scenario):
     drive_mm = mill.drives_mm()["x"]
     beyond_um = 1000 * (drive_mm - SOFT_LIMIT_mm)
     print(f"at the soft limit of x, wanted {expected_um('x'):.1f} um beyond: {beyond_um:.3f} um")
-    # External offsets obey the limit, an offset at the joint passes it.
+    # External offsets obey the soft limit; an offset at the joint passes it.
     assert (abs(beyond_um) < 0.2) == (WAY == "external")
-    # Away from it first: there, what is applied can never be what the daemon wants.
+    # Move away first: at the limit the applied offset can never equal the wanted one.
     mill.cnc.mdi(f"G53 G0 X{PLACE_mm['x']}")
     if WAY == "external":
-        # 30 um could not be applied there, and it is for a person to see why.
+        # 30 um could not be applied at the limit: a mismatch is latched for an operator.
         mismatch = mill.daemon.axis("x")["mismatch"]
         assert abs(mismatch["sent_um"] - expected_um("x")) < 1.0, mismatch
         assert mill.daemon.cli("release", "x")[0] == 0
@@ -131,7 +131,7 @@ def test_soft_limit(scenario):
 
 
 def assert_held(mill, what):
-    """No drive gets anything else."""
+    """Checks that the offsets of all drives are unchanged."""
     with recording(mill.cnc) as held:
         time.sleep(1.0)
     assert abs(held[0].applied_um[:, 0] - expected_um("x")).max() < 1.0, what

@@ -1,5 +1,5 @@
-"""A G-code program moves all axes while the machine warms: the drives get the programmed positions
-plus the wanted offsets, smoothly; and when the data are lost in the middle, the offsets stay."""
+"""A G-code program moves all axes while the machine warms: the drives follow position plus wanted
+offset smoothly; when the data are lost during the program, the offsets are held."""
 
 import contextlib
 import os
@@ -13,7 +13,7 @@ from recording import SMOOTH, recording
 from warm_mill import AXES, FOLLOWS_um, SWINGING, WarmMill
 
 WAY = os.environ["THERMOCOMP_WAY"]
-# Slow and patient: a busy computer that lets the bridge wait must not look like a bad follower.
+# Slow and tolerant: delays of the bridge on a busy computer must not look like a mismatch.
 RATE_um_per_s = 5.0
 SILENT_AFTER_s = 4.0
 START = "X50 Y50 Z-20"
@@ -31,12 +31,12 @@ G0 {START}
 M5
 M2
 """
-CORNERS_mm = ([20.0, 20.0, -40.0], [130.0, 80.0, -10.0])  # least and greatest of an axis
+CORNERS_mm = ([20.0, 20.0, -40.0], [130.0, 80.0, -10.0])  # minimum and maximum per axis
 
 
 @pytest.fixture(scope="module")
 def mill():
-    """One machine for all tests, in their order; the last one takes it apart."""
+    """One machine for all tests in order; the last test disturbs it."""
     with contextlib.closing(WarmMill(WAY, SWINGING, 25, RATE_um_per_s, SILENT_AFTER_s)) as made:
         made.daemon.start()
         made.cnc.start()
@@ -71,12 +71,12 @@ def test_the_drives_follow_while_a_program_moves_all_axes(mill):
     print(f"step_um_per_ms {seen.largest_step_um():.5f}")
     print(f"acceleration_mm_per_s2 {seen.largest_acceleration_mm_per_s2():.4f}")
     assert len(apart_um) > 10
-    assert np.ptp(seen.position_mm, axis=0).min() > 25  # it did move
-    assert np.ptp(seen.asked_um, axis=0).max() > 0.5  # and so did the offsets
+    assert np.ptp(seen.position_mm, axis=0).min() > 25  # the axes moved
+    assert np.ptp(seen.asked_um, axis=0).max() > 0.5  # and the offsets changed
     assert seen.follow_error_um() <= FOLLOWS_um
     assert max(apart_um) <= FOLLOWS_um
     assert SMOOTH[WAY].holds(seen)
-    # What LinuxCNC commands is the program's, to a nanometre.
+    # LinuxCNC's commands equal the program to a nanometre.
     end_mm = mill.cnc.pins(*(f"axis.{a}.pos-cmd" for a in AXES))
     assert np.allclose(end_mm, [50.0, 50.0, -20.0], rtol=0, atol=1e-6)
     low, high = CORNERS_mm
@@ -95,7 +95,7 @@ def test_lost_data_in_mid_program_hold_the_offset_and_warn(mill):
     eventually(lambda: not signals_true(mill, "tc-warning"), "no warning before it")
     mill.cnc.messages()
 
-    mill.simulator.kill()  # no thermocouple answers any more
+    mill.simulator.kill()  # no thermocouple answers
     status = mill.daemon.wait_for_mode("holding")
     held_um = [a["offset"] for a in status["axes"]]
     eventually(lambda: signals_true(mill, "tc-warning"), "the warning, of the daemon's mode")
@@ -108,7 +108,7 @@ def test_lost_data_in_mid_program_hold_the_offset_and_warn(mill):
         time.sleep(1.0)
     assert mill.cnc.running()
     for seen in held + alone:
-        assert np.ptp(seen.position_mm, axis=0).max() > 1.0  # in mid-program
+        assert np.ptp(seen.position_mm, axis=0).max() > 1.0  # during the program
         assert np.abs(seen.applied_um - held_um).max() <= 0.1
     print(f"\n{WAY}: without thermocouples, then without the daemon, the drives keep their offsets"
           f" within {max(np.abs(s.applied_um - held_um).max() for s in held + alone):.3f} um")

@@ -1,5 +1,5 @@
-"""The simulated mill of these tests: thermocomp-sim warms it and shows its thermocouples over
-Modbus, thermocompd compensates it, and its controller is a real LinuxCNC."""
+"""The simulated mill: thermocomp-sim warms it and serves its thermocouples over Modbus, thermocompd
+compensates it, and a real LinuxCNC is its controller."""
 
 import contextlib
 import pathlib
@@ -11,9 +11,9 @@ from cnc import AXES, LinuxCnc
 from lab import Lab, eventually
 
 ROOM_degC = 21.0
-UM_PER_K = {"x": -3.0, "y": 2.0, "z": 2.5}  # the body's column; the offset is the negative
+UM_PER_K = {"x": -3.0, "y": 2.0, "z": 2.5}  # displacement per column rise; offset: the negative
 STEADY_K = 10.0
-FOLLOWS_um = 1.0  # what is asked of it
+FOLLOWS_um = 1.0  # required accuracy
 
 MACHINE = """format = 1
 [plant]
@@ -54,7 +54,7 @@ name = "column"
 device = "module"
 address = 0
 """
-# Warms to 10 K above the room and stays there; or goes up and down for ever.
+# Warms to 10 K above ambient and stays there; or cycles for ever.
 STEADY = MACHINE.format(times="0", values="6000", repeat_s=1e6)
 SWINGING = MACHINE.format(times="0, 500", values="6000, 0", repeat_s=1000)
 
@@ -118,12 +118,12 @@ commit_s = 1.0
 
 
 def expected_um(axis):
-    """The offset of the machine in the steady state."""
+    """The offset in the steady state."""
     return -UM_PER_K[axis] * STEADY_K
 
 
 class WarmMill:
-    """All three of them. The daemon's socket lies where LinuxCNC's private view has it too."""
+    """LinuxCNC, daemon and simulator. The daemon's socket is visible in LinuxCNC's namespaces."""
 
     def __init__(self, way, machine, time_factor, rate_um_per_s, silent_after_s):
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="tc"))
@@ -141,7 +141,7 @@ class WarmMill:
                            ("@RATE@", float(rate_um_per_s)), ("@SILENT@", float(silent_after_s))):
             config = config.replace(key, str(value))
         self.daemon = self.lab.daemon(config)
-        # LinuxCNC runs as nobody: it may report because of its group, and only because of it.
+        # LinuxCNC runs as nobody: only its group lets it report.
         with self.daemon.config.open("a") as config:
             config.write('bridge_group = "nogroup"\n')
         self.cnc = LinuxCnc(self.folder / "cnc", way, "/mnt/run/status.sock")
@@ -162,7 +162,7 @@ class WarmMill:
         return dict(zip(AXES, self.cnc.pins(*(f"drive-{a}.out" for a in AXES))))
 
     def settled(self, tolerance_um=0.2):
-        """The axes of the daemon's status when it compensates and LinuxCNC applies what it wants,
+        """The status of the axes if the daemon compensates and LinuxCNC applies the wanted offsets,
         else nothing."""
         status = self.daemon.status()
         axes = {axis["name"]: axis for axis in status["axes"]}
@@ -175,14 +175,14 @@ class WarmMill:
         return eventually(self.settled, "LinuxCNC applies what the daemon wants")
 
     def errors_um(self, **target_mm):
-        """After an absolute move there: drive less command less wanted offset, an axis each; and
-        the daemon's axes of that moment."""
+        """Moves to an absolute position: drive less command less wanted offset per axis, and the
+        axes' status."""
         self.cnc.mdi("G53 G0 " + " ".join(f"{a.upper()}{mm}" for a, mm in target_mm.items()))
         return self.errors_here_um(**target_mm)
 
     def errors_here_um(self, **target_mm):
         def look():
-            # Drives and daemon are asked one after the other: nothing may have moved meanwhile.
+            # Drives and daemon are queried in turn: the offsets must not change meanwhile.
             before = self.settled()
             time.sleep(0.15)  # longer than the daemon's report and the bridge's exchange
             drives = self.drives_mm()

@@ -1,9 +1,8 @@
-"""Every bug planted in a suite's sources must be found by an assertion of that suite; without one
-none may fail.
+"""Every bug planted in a suite's sources must fail an assertion of it; without a bug none may fail.
 
     find_planted.py PROGRAM SUITE
 
-Whatever else ends the program - a signal, a time-out, a test that throws - is not "found".
+A signal, a timeout or an unexpected exception does not count as found.
 """
 import os
 import re
@@ -26,7 +25,7 @@ def run(program, number):
 
 
 def found_by(result):
-    """The test case whose assertion failed; None where none did."""
+    """Name of the test case whose assertion failed, or None."""
     if result is None or result.returncode <= 0 or not FAILED.search(result.stdout):
         return None
     if "due to unexpected exception" in result.stdout or "due to a fatal error" in result.stdout:

@@ -1,15 +1,14 @@
-"""Copies of the product's sources with bugs planted in them, each switched on by its number.
+"""Copies of the product's sources with planted bugs, each enabled by its number.
 
-The product's own files have no trace of this. A place that is not found exactly once is an error,
-so that the bugs stay where they were meant to be when the code changes. {P} stands for "this bug
-is switched on".
+The product's own files are not changed. A text that is not found exactly once is an error, so that
+the bugs stay at their places when the code changes. {P} stands for "this bug is enabled".
 """
 
 DECLARATION = "namespace thermocomp {\nextern int planted_bug;\n}\n"
 
 
 def with_bugs(bugs, file, text):
-    """The text of `file` with its bugs. bugs: (name, file, what stands there, what instead)."""
+    """The text of `file` with its bugs. bugs: (name, file, original text, replacement)."""
     for number, (name, of_file, old, new) in enumerate(bugs, start=1):
         if of_file != file:
             continue

@@ -1,12 +1,12 @@
-"""Bugs that the unit tests must find: smoothing, lost blocks, what is applied, terms, cycle, the
-dialogue with the controller, CAN. (Those of tests/faults are found by whole lives of a machine.)
+"""Bugs that the unit tests must find: smoothing, lost blocks, read-back, terms, cycle, controller
+dialogue, CAN. (Lives of a machine find those of tests/faults.)
 
-    unit_bugs.py write SOURCE_FOLDER OUTPUT_FOLDER SUITE   the copies, and the switch
-    unit_bugs.py files SUITE                               which sources have bugs
+    unit_bugs.py write SOURCE_FOLDER OUTPUT_FOLDER SUITE   the copies and the switch
+    unit_bugs.py files SUITE                               sources with bugs
     unit_bugs.py names SUITE                               the bugs, by number
 
-A suite is a test program of tests/unit; the variable THERMOCOMP_PLANTED_BUG has the number of the
-bug that is switched on.
+A suite is a test program of tests/unit; the variable THERMOCOMP_PLANTED_BUG holds the number of the
+enabled bug.
 """
 import pathlib
 import sys
@@ -30,7 +30,7 @@ NODE = "drivers/can/canopen/canopen_node.cpp"
 J1939 = "drivers/can/j1939/j1939_message.cpp"
 TRANSPORT = "drivers/can/j1939/j1939_message.cpp"
 
-# Suite: (name, file, what stands there, what stands there instead)
+# Suite: (name, file, original text, replacement)
 SUITES = {
     "estimator_tests": [
         ("jump_widens_what_the_past_allows", SCREENING,
