@@ -1,5 +1,4 @@
-/// What the LinuxCNC bridge makes of a daemon's answer, whatever comes, and what it tells whatever
-/// LinuxCNC shows.
+/// The LinuxCNC bridge with arbitrary answers of the daemon, and its reports of arbitrary states.
 #include <cmath>
 #include <string>
 
@@ -29,7 +28,7 @@ void check_answer(std::string_view line) {
   }
 }
 
-/// One line; what is no number is not known.
+/// One line; values that are not numbers are reported as unknown.
 void check_request(fuzz::ByteFeed& feed) {
   MachineView view;
   const std::uint8_t flags = feed.u8();

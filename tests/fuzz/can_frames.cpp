@@ -1,7 +1,7 @@
-/// What a CAN socket hands out, error frames and time stamps included, what is decoded from it, and
-/// sets of values that it is put together to.
+/// Messages of a CAN socket with error frames and time stamps, their decoding, and their assembly
+/// into sets of values.
 ///
-/// Input: signals, then the messages as the kernel would deliver them.
+/// Input: signals, then the messages as delivered by the kernel.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -52,7 +52,7 @@ std::vector<CanSignal> signals_from(fuzz::ByteFeed& feed) {
   return signals;
 }
 
-/// Appends a control message where it fits. @return bytes used
+/// Appends a control message if it fits. @return bytes used
 std::size_t put_control(const msghdr& header, std::size_t used, int type, const void* value,
                         std::size_t size) {
   if (used + CMSG_SPACE(size) > header.msg_controllen) return used;
@@ -67,8 +67,8 @@ std::size_t put_control(const msghdr& header, std::size_t used, int type, const 
   return used + CMSG_SPACE(size);
 }
 
-/// One message: a frame of any kind, sometimes with a stamp, sometimes with a count of lost frames,
-/// sometimes shorter or longer than a frame is.
+/// One message: a frame of any kind, sometimes with a time stamp or a count of lost frames,
+/// sometimes shorter or longer than a frame.
 bool deliver(fuzz::ByteFeed& feed, std::size_t& frames, mmsghdr& message) {
   if (feed.empty()) return false;
   const std::uint8_t kind = feed.u8();
@@ -88,7 +88,7 @@ bool deliver(fuzz::ByteFeed& feed, std::size_t& frames, mmsghdr& message) {
   std::size_t used = 0;
   if ((kind & 16) != 0) {
     timespec stamp{};
-    stamp.tv_sec = static_cast<time_t>(feed.u64() >> 31);  // up to far beyond any year
+    stamp.tv_sec = static_cast<time_t>(feed.u64() >> 31);  // far beyond any year
     stamp.tv_nsec = static_cast<long>(feed.u64() % 1'000'000'000);
     used = put_control(message.msg_hdr, used, SCM_TIMESTAMPNS, &stamp, sizeof stamp);
   }
@@ -115,7 +115,7 @@ void check_frame(const CanFrame& frame, const std::vector<CanSignal>& signals) {
   }
 }
 
-/// Two identifiers, a value in the first bytes and the number of its set in the last one.
+/// Two identifiers with a value in the first bytes and the set's number in the last byte.
 class TwoFrames {
  public:
   static constexpr std::array<std::uint32_t, 2> ids{0x100, 0x101};

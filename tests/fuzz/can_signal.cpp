@@ -1,4 +1,4 @@
-/// CAN frames <-> values: any signal that check() lets pass, any payload.
+/// CAN signals: encoding and decoding of any signal accepted by check(), with any payload.
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -47,7 +47,7 @@ CanSignal signal_from(fuzz::ByteFeed& feed) {
   return signal;
 }
 
-/// The bits of the signal come back; every other bit of the frame stays.
+/// The signal's bits are restored; all other bits of the frame are unchanged.
 void check_insertion(const CanSignal& signal, std::vector<std::uint8_t> payload,
                      std::uint64_t raw) {
   const std::vector<std::uint8_t> before = payload;
@@ -63,7 +63,7 @@ void check_insertion(const CanSignal& signal, std::vector<std::uint8_t> payload,
   FUZZ_PROMISE(mask.count() == static_cast<std::size_t>(signal.length_bits));
 }
 
-/// Only a multiplexor that is there can say that the signal is not.
+/// Only a multiplexor within the payload can exclude the signal.
 void check_pages(const CanSignal& signal, const std::vector<std::uint8_t>& payload) {
   const auto readable = [&](const CanSelector& selector) {
     return payload.size() >= bytes_needed(selector.field);
@@ -89,7 +89,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   FUZZ_PROMISE(std::isfinite(decoded.value) == (decoded.fault == Fault::none));
   const bool too_short = payload.size() < bytes_needed(signal);
   FUZZ_PROMISE(!too_short || decoded.fault == Fault::bad_frame);
-  // Without its status the same bytes are a value, or they are none for another reason.
+  // The status signal gives the fault of values that have no fault of their own.
   if (signal.status && !too_short) {
     CanSignal alone = signal;
     alone.status.reset();

@@ -1,4 +1,4 @@
-/// CANopen: any frames at any times to a line of two nodes, one of which uses all that there is.
+/// A CANopen line with two nodes, one of which uses all features, and arbitrary frames at any time.
 #include <cmath>
 #include <string>
 
@@ -82,7 +82,7 @@ void check_line(CanopenLine& line, nanoseconds now, bool open) {
   }
 }
 
-/// Most of them among those that mean something here.
+/// Mostly identifiers used on this line.
 std::uint32_t identifier_from(fuzz::ByteFeed& feed) {
   constexpr std::uint32_t ours[] = {0x585, 0x705, 0x085, 0x185, 0x186, 0x706, 0x586, 0x195};
   const std::uint8_t which = feed.u8();

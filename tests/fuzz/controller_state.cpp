@@ -1,5 +1,5 @@
-/// What a bridge tells the daemon (`controller_state`) and is answered: any lines, with pauses
-/// between them, while an estimator compensates by what the reports say.
+/// Reports of a bridge (`controller_state`) and their answers: any lines with pauses between them,
+/// while an estimator compensates by these reports.
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -19,9 +19,9 @@ using nlohmann::json;
 
 namespace {
 
-constexpr std::uint8_t waits = 0xFF;  ///< is no part of UTF-8: here a quarter of a second passes
+constexpr std::uint8_t waits = 0xFF;  ///< not part of UTF-8: a pause of a quarter of a second
 constexpr nanoseconds cycle = 50ms;
-constexpr double rounding_um = 0.11;  ///< what a read-back may lie outside the bound, and a hair
+constexpr double rounding_um = 0.11;  ///< a read-back's excess over the bound
 
 nanoseconds clock_now{};
 
@@ -40,7 +40,7 @@ DaemonConfig with_bridge() {
   return config;
 }
 
-/// A daemon without socket and threads, and what must hold of its answers.
+/// A daemon without socket and threads, and the promises of its answers.
 class Daemon {
  public:
   explicit Daemon(const DaemonConfig& config)
@@ -66,7 +66,7 @@ class Daemon {
     results_ = 0;
     const Answer answer = dispatcher_.answer({true, true, true}, line);
     check_line(answer);
-    // What is refused has changed nothing.
+    // A refused report has changed nothing.
     if (results_ == 0) {
       FUZZ_PROMISE(state().taken_at == before.taken_at);
       FUZZ_PROMISE(state().link_epoch == before.link_epoch);
@@ -79,7 +79,7 @@ class Daemon {
   }
 
  private:
-  /// One cycle, in which the machine warms by little.
+  /// One cycle, with a small temperature rise.
   void step() {
     clock_now += cycle;
     warm_K_ = std::min(warm_K_ + 0.02, 20.0);
@@ -100,11 +100,11 @@ class Daemon {
     const json line = json::parse(answer.text, nullptr, false);
     FUZZ_PROMISE(line.is_object() && line.contains("result") != line.contains("error"));
     FUZZ_PROMISE(answer.is_error == line.contains("error"));
-    // Nothing of a bridge's making is a fault inside the daemon.
+    // No client input causes an internal error.
     if (answer.is_error) FUZZ_PROMISE(line["error"]["code"] != rpc::internal_error);
   }
 
-  /// A report that was taken, and its answer.
+  /// An accepted report and its answer.
   void check_taken(const json& params, const json& result) {
     ++results_;
     const auto session = params["session"].get<std::uint64_t>();
@@ -128,7 +128,7 @@ class Daemon {
     }
   }
 
-  /// It goes on from what is applied or was answered before, no faster than the slew rate.
+  /// The offset continues from the applied or last answered one, at most at the slew limit.
   void check_offset(bool taking, const json& applied, const json& offset) {
     if (!taking || !applied.is_number()) {
       FUZZ_PROMISE(offset.is_null());
@@ -158,12 +158,12 @@ class Daemon {
   Report report_;
   ControllerState state_;
   double warm_K_{0.0};
-  int results_{0};  ///< of the line under way
+  int results_{0};  ///< of the current line
   std::uint64_t session_{0};
   std::uint32_t epoch_{0};
   nanoseconds taken_at_{};
   nanoseconds answered_at_{};
-  std::vector<double> stands_um_;  ///< reported as applied and answered lately
+  std::vector<double> stands_um_;  ///< reported as applied or answered recently
 };
 
 }  // namespace

@@ -1,5 +1,5 @@
-/// What command and gateway make of an answer of the daemon, whatever comes: it is refused in
-/// words, or every view of it can be made, and what its names become stays different.
+/// Any answer of the daemon, as used by command and gateway: it is refused with a message, or all
+/// views can be made from it with distinct names.
 #include <set>
 #include <string>
 #include <vector>
@@ -23,7 +23,7 @@ using nlohmann::json;
 
 namespace {
 
-/// Copied and printed, as the callers do: a depth without a bound ends the process here.
+/// Copied and printed like the callers do: unbounded depth ends the process here.
 json taken(std::string_view line) {
   const json message = parse_outer_json(line);
   const json copy = message;

@@ -1,5 +1,5 @@
-/// The daemon's configuration and the model that it names: what is refused is refused by name;
-/// with what loads, the daemon's parts can be made and the estimator steps.
+/// The daemon's configuration with its model: refusals name their cause; after loading, the
+/// daemon's parts can be made and the estimator steps.
 ///
 /// Input: the text of the configuration, a line "#### model", the text of the model file.
 #include "config/daemon/daemon_config.hpp"

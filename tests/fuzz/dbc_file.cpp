@@ -1,4 +1,4 @@
-/// DBC files: refused by file, line and rule, or signals that can be decoded from any frame.
+/// DBC files: refused with file, line and rule, or their signals can be decoded from any frame.
 #include "config/bus_files/dbc_file.hpp"
 
 #include <algorithm>
@@ -14,7 +14,7 @@ using namespace thermocomp;
 
 namespace {
 
-/// What a configuration refuses to stand on: the signal, or without one its message as a whole.
+/// True if configurations refuse it: the signal or, without a name, its whole message.
 bool is_flawed(const DbcFile& file, const std::string& message, const std::string& signal) {
   return std::any_of(file.flaws.begin(), file.flaws.end(), [&](const DbcFlaw& flaw) {
     return flaw.message == message && (flaw.signal.empty() || flaw.signal == signal);
@@ -23,7 +23,7 @@ bool is_flawed(const DbcFile& file, const std::string& message, const std::strin
 
 void check_signal(const DbcMessage& message, const DbcSignal& signal) {
   FUZZ_PROMISE(!signal.name.empty() && signal.line >= message.line);
-  if (message.bytes > can_bytes_max) return;  // naming one of its signals is refused
+  if (message.bytes > can_bytes_max) return;  // configurations that use it are refused
   check(signal.place);
   FUZZ_PROMISE(bytes_needed(signal.place) <= message.bytes);
   FUZZ_PROMISE(signal.place.id == message.id && signal.place.extended_id == message.extended);

@@ -1,5 +1,4 @@
-/// Electronic data sheets: what loads can be found by address and by name, what is refused is
-/// named.
+/// Electronic data sheets: loaded objects are found by address and name; refusals name their cause.
 #include "config/bus_files/eds_file.hpp"
 
 #include <algorithm>

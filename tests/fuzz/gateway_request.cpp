@@ -1,5 +1,5 @@
-/// What a request to the gateway may be: whatever headers and query say, a request is judged, a
-/// host that is let in is one of ours, and a stretch of history that is taken can be drawn.
+/// Gateway requests with any headers and query: each is accepted or refused, an accepted host is
+/// one of ours, and an accepted time range can be drawn.
 #include <cmath>
 #include <optional>
 #include <string>
@@ -14,7 +14,7 @@ using namespace thermocomp::gateway;
 
 namespace {
 
-/// The input's fields; a byte 0xFF, which is no part of UTF-8, divides them.
+/// Fields of the input, separated by the byte 0xFF, which is not part of UTF-8.
 std::vector<std::string_view> fields_of(std::string_view input) {
   std::vector<std::string_view> fields;
   while (fields.size() < 8) {
@@ -40,7 +40,7 @@ void judge(const std::vector<std::string_view>& fields) {
   FUZZ_PROMISE(name && (*name == "localhost" || *name == "127.0.0.1" || *name == "::1" ||
                         *name == "10.0.0.5" || *name == "mill.example"));
   FUZZ_PROMISE(request.path.front() == '/');
-  // An origin that is let through is that of the very host.
+  // An accepted origin is the host itself.
   if (!request.origin.empty())
     FUZZ_PROMISE(request.origin.size() == request.host.size() + 7 ||
                  request.origin.size() == request.host.size() + 8);

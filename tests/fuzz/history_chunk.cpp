@@ -1,4 +1,4 @@
-/// The packed records of the history, the inputs and the estimator's state at a segment's start.
+/// The history's packed records, the inputs and the estimator's state at a segment's start.
 #include <bit>
 #include <span>
 #include <vector>

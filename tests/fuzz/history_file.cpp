@@ -1,4 +1,4 @@
-/// A history whose bytes are anything at all: read, replayed and exported as the commands do.
+/// A history of arbitrary bytes: read, replayed and exported like the commands do.
 #include "common/fuzz.hpp"
 #include "common/history_promises.hpp"
 

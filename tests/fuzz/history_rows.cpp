@@ -1,5 +1,5 @@
-/// A history that SQLite finds in order, with rows that no daemon wrote: edits of a good one by
-/// SQL. Whatever else is damaged, a segment that nobody touched comes out whole.
+/// A history that is valid SQLite with rows that no daemon wrote, made from a good one by SQL. Any
+/// unchanged segment is read completely.
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -28,7 +28,7 @@ constexpr std::array segment_columns{
 constexpr std::array chunk_columns{"segment", "number", "through_cycle", "wall_minus_grid_ns",
                                    "count"};
 constexpr int edits_max = 8;
-/// Damage of whole rows, of types and of the file's own numbers.
+/// Damage of rows, of types and of the file's metadata.
 constexpr std::array statements{
     "DELETE FROM chunk WHERE number = 0",
     "DELETE FROM setup",
@@ -58,7 +58,7 @@ constexpr std::array statements{
     "ALTER TABLE chunk RENAME COLUMN checksum TO sum",
     "ALTER TABLE segment RENAME COLUMN wall_ns TO wall"};
 
-/// Statements on the open copy. What fails (a key that is there already) changes nothing.
+/// Statements on the open copy; failing ones (such as an existing key) change nothing.
 class Editor {
  public:
   explicit Editor(const std::filesystem::path& file) {
@@ -84,7 +84,7 @@ class Editor {
                         static_cast<int>(bytes.size()), SQLITE_TRANSIENT);
     });
   }
-  /// Bytes of a blob from `at` on are overwritten.
+  /// Overwrites bytes of a blob from `at` on.
   void splice(const std::string& table, const char* column, unsigned row, std::size_t at,
               const std::vector<std::uint8_t>& bytes) {
     std::vector<std::uint8_t> blob = get(table, column, row);
@@ -126,7 +126,7 @@ class Editor {
   sqlite3* handle_{nullptr};
 };
 
-/// Small numbers mostly, now and then any.
+/// Mostly small numbers, sometimes arbitrary ones.
 std::int64_t number_from(fuzz::ByteFeed& feed) {
   const std::uint8_t kind = feed.u8();
   if (kind < 0xC0) return kind % 64 - 2;
@@ -134,7 +134,7 @@ std::int64_t number_from(fuzz::ByteFeed& feed) {
   return std::bit_cast<std::int64_t>(feed.u64());
 }
 
-/// Records as an encoder would write them, in an order and with numbers that no cycle gave.
+/// Encoded records in an order and with numbers that no cycle produces.
 std::vector<std::uint8_t> chunk_from(fuzz::ByteFeed& feed, std::uint64_t& count) {
   ChunkEncoder encoder;
   count = feed.u8() % 16;
@@ -194,7 +194,7 @@ void edit(Editor& editor, fuzz::ByteFeed& feed) {
   }
 }
 
-/// The texts that the good one has are parsed once; others are refused as damaged ones are.
+/// Setups of the good history are parsed once; others are refused like damaged ones.
 ReplaySetup known_setup(const SegmentSetup& setup) {
   static const SegmentSetup known{fuzz::small_config_text(), fuzz::small_model_text(), ""};
   static const ReplaySetup parsed = parse_setup(known);
@@ -202,7 +202,7 @@ ReplaySetup known_setup(const SegmentSetup& setup) {
   return parse_setup(setup);
 }
 
-/// Every row of one segment, with its setup, as text.
+/// All rows of each segment with its setup, as text.
 std::vector<std::string> segments_as_text(const std::filesystem::path& file) {
   std::vector<std::string> found;
   sqlite3* handle = nullptr;
@@ -232,7 +232,7 @@ std::vector<std::string> segments_as_text(const std::filesystem::path& file) {
   return found;
 }
 
-/// A segment that nobody touched is sound to its last record, or it is told why it has no place.
+/// An unchanged segment is sound to its last record, or a reason is given why it cannot be placed.
 void check_untouched(const std::filesystem::path& file, const std::vector<std::uint8_t>& good) {
   struct Before {
     std::vector<std::string> texts;
@@ -268,8 +268,7 @@ void check_untouched(const std::filesystem::path& file, const std::vector<std::u
   }
 }
 
-/// A file may say that it holds hours of cycles, and replaying them takes its time: no fault of the
-/// program.
+/// A file may claim hours of cycles, which take time to replay: not a finding.
 bool takes_long(const std::filesystem::path& file) {
   constexpr std::uint64_t cycles_max = 4000;
   try {
@@ -279,7 +278,7 @@ bool takes_long(const std::filesystem::path& file) {
       cycles += static_cast<std::uint64_t>(segment.last_cycle + 1) - segment.first_cycle;
     return cycles > cycles_max;
   } catch (const HistoryError&) {
-    return false;  // what is refused is refused at once
+    return false;  // refusals are immediate
   }
 }
 

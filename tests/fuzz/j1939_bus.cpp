@@ -1,4 +1,4 @@
-/// J1939: any frames at any times to a line with a device at an address and one known by its NAME.
+/// A J1939 line with a device at an address and one with a NAME, and any frames at any time.
 #include <cmath>
 #include <string>
 
@@ -57,7 +57,7 @@ void check_line(J1939Line& line, nanoseconds now, bool open) {
   }
 }
 
-/// Most of them among those that mean something here.
+/// Mostly identifiers used on this line.
 std::uint32_t identifier_from(fuzz::ByteFeed& feed) {
   constexpr std::uint32_t ours[] = {0x18FEEE80, 0x1CECFF80, 0x1CEBFF80, 0x1CECF980, 0x1CEBF980,
                                     0x18EEFF80, 0x18EAFF80, 0x18EEFFF9, 0x18FEEE90, 0x18EEFF90};
@@ -66,7 +66,7 @@ std::uint32_t identifier_from(fuzz::ByteFeed& feed) {
   return static_cast<std::uint32_t>(feed.u64()) & 0x1FFFFFFFu;
 }
 
-/// What is put together from packets is what was announced.
+/// A message assembled from packets matches its announcement.
 void check_transport(std::span<const std::uint8_t> rest) {
   TransportReceiver receiver({0xFF10});
   const J1939Id control = read_identifier(0x1CECFF80);

@@ -1,4 +1,4 @@
-/// The simulator's machine file: refused by name, or a machine whose body warms without surprises.
+/// The simulator's machine file: refused with a named cause, or a machine whose body can warm.
 #include "simulator/files/machine_file.hpp"
 
 #include <cmath>
@@ -15,7 +15,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   try {
     static_cast<void>(parse_machine(text, name));
   } catch (const ConfigurationError& error) {
-    // A body is a file of its own, here none that exists; what is wrong there names it.
+    // The body is another file, which does not exist here; its problems name it.
     std::vector<Problem> problems = error.problems();
     FUZZ_PROMISE(!problems.empty());
     std::erase_if(problems, [&](const Problem& problem) { return problem.file != name; });

@@ -1,11 +1,11 @@
 #!/usr/bin/python3
-"""Writes the seeds of the fuzz targets, made from the examples, and their dictionaries, from the sources.
+"""Writes the seeds of the fuzz targets from the examples, and their dictionaries from the sources.
 
     tests/fuzz/make_seeds.py FOLDER [HISTORY.db]
 
-A seed becomes FOLDER/seeds/TARGET/NAME, a dictionary FOLDER/dictionaries/TARGET.dict. HISTORY.db, of the
-program make_history_seed, is the seed of history_file. Inputs that were found to break something stay in
-git: tests/fuzz/seeds/TARGET/found-*.
+Seeds are FOLDER/seeds/TARGET/NAME, dictionaries FOLDER/dictionaries/TARGET.dict. HISTORY.db, from
+the program make_history_seed, is the seed of history_file. Inputs that found bugs are kept in git:
+tests/fuzz/seeds/TARGET/found-*.
 """
 
 import importlib
@@ -30,13 +30,13 @@ def write(target, name, content):
 
 
 def bare(path):
-    """A TOML file without comments and empty lines: shorter inputs are mutated better."""
+    """A TOML file without comments and empty lines, since short inputs mutate better."""
     lines = (re.sub(r"\s*#[^\"]*$", "", line) for line in path.read_text().splitlines())
     return "".join(line + "\n" for line in lines if line.strip())
 
 
 def example_terms():
-    """[(name, text)] of every kind of term."""
+    """[(name, text)] for every kind of term."""
     return [(path.stem, path.read_text()) for path in sorted(EXAMPLE_MODEL.parent.glob("*.toml"))
             if path != EXAMPLE_MODEL]
 
@@ -75,7 +75,7 @@ def toml_seeds():
           'since_s = [60.0, 1e3, 2e3]\nrise_K = [[0.1, 0.3], [2.0, 1.0], [1.0, 1.0]]\n'
           'gain = [[1.1, 1.0], [1.2, 0.9], [1.2, 0.8]]\n'
           'gain_sd = [[0.1, 0.3], [0.1, 0.05], [0.1, 0.05]]\n')
-    # In the daemon, of the sensors and outputs that the short example has.
+    # In the daemon, with sensors and outputs of the short example.
     example = bare(ROOT / "config/examples/modbus_tcp.toml")
     for name, term in example_terms():
         if re.search("oil_degC|spindle_rpm|x_mm", term):
@@ -97,7 +97,7 @@ def toml_seeds():
 def preset_seeds():
     """Each preset in a configuration of its bus, with its first two channels.
 
-    What bus and device need besides it: tests/example_buses/PROTOCOL.toml.
+    Further keys of bus and device: tests/example_buses/PROTOCOL.toml.
     """
     for path in sorted((ROOT / "config" / "devices").glob("*.toml")):
         preset = tomllib.loads(path.read_text())
@@ -154,7 +154,8 @@ def socket_seeds():
     write("socket_request", "measured_too_far", request("measured", {"axis": "z", "value_um": 900}))
     write("socket_request", "measured", request("measured", {"axis": "z", "value_um": -3.5}))
 
-    # Of a model that corrects itself: often, far off and then agreeing, cycle ends between.
+    # For a model that corrects itself: frequent probings, wrong and then consistent, and cycle
+    # ends.
     def probing(value, number=1):
         return request("measured", {"axis": "z", "value_um": value}, number)
 
@@ -275,7 +276,7 @@ def piece(wrapping, body, delay=0, halves=False):
 
 
 def modbus_seeds():
-    """Line, then exchanges: what, table, address, count - 1, pieces (see modbus_answer.cpp)."""
+    """Line, then exchanges: kind, table, address, count - 1, pieces (see modbus_answer.cpp)."""
     framed, for_request, hang_up = 1, 2, 3
     read = bytes([0, 3, 0, 0, 1])  # two input registers
     words = bytes([4, 0, 210, 1, 4])
@@ -353,7 +354,7 @@ def can_seeds():
 
 
 def bus_seeds():
-    """Of what a kind of bus decodes: bus_seeds/PROTOCOL.py."""
+    """Seeds of the protocol decoders, from bus_seeds/PROTOCOL.py."""
     for path in sorted((HERE / "bus_seeds").glob("*.py")):
         maker = importlib.import_module(f"bus_seeds.{path.stem}")
         for name, content in maker.seeds():
@@ -418,7 +419,7 @@ def literals(*patterns):
 
 
 def listed(path, entry):
-    """Names in a list of kinds, ENTRY(name, ...)."""
+    """Names from a list of ENTRY(name, ...)."""
     return set(re.findall(rf"\b{entry}\((\w+),", (ROOT / path).read_text()))
 
 

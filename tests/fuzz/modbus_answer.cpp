@@ -1,7 +1,7 @@
-/// The real Modbus link, TCP and RTU, against a device that answers anything: an exchange is only
-/// ok when the very answer to it arrived whole, and ends in time whatever came.
+/// The real Modbus link, TCP and RTU, with a device that answers anything: an exchange succeeds
+/// only with its complete own answer, and always ends in time.
 ///
-/// Input: how the line is, then for each exchange what is asked and the pieces of the answer.
+/// Input: properties of the line, then for each exchange the request and the pieces of the answer.
 #include <algorithm>
 #include <array>
 #include <string>
@@ -32,10 +32,10 @@ void append_crc(Bytes& frame) {
   frame.push_back(static_cast<std::uint8_t>(crc >> 8));
 }
 
-/// How the bytes of the input become a piece of an answer.
+/// How input bytes become a piece of an answer.
 enum class Wrapping : std::uint8_t { as_it_is, framed, framed_for_request, hang_up };
 
-/// The device: its answers come from the input.
+/// The device: answers from the input.
 class Device {
  public:
   Device(fuzz::ByteFeed& feed, bool is_serial) : feed_(feed), is_serial_(is_serial) {}
@@ -51,7 +51,7 @@ class Device {
       piece.delay = std::chrono::milliseconds(delays_ms[head >> 2 & 7]);
       piece.bytes = wrapped(feed_.take(feed_.u8()), wrapping, request);
       piece.hang_up = wrapping == Wrapping::hang_up;
-      // In two parts, so that a frame also ends in the midst of a read.
+      // In two parts, so that a frame can also end in the middle of a read.
       if ((head & 0x80) != 0 && piece.bytes.size() > 1) {
         fuzz::VirtualLine::Piece second;
         const auto middle =
@@ -106,15 +106,14 @@ std::uint8_t function_of(ModbusTable table) {
   return functions[static_cast<std::size_t>(table)];
 }
 
-/// Whether `part` stands somewhere in what arrived after the question: what came earlier answers
-/// nothing.
+/// True if `part` arrived after the request; earlier data cannot answer it.
 bool has_arrived(const fuzz::VirtualLine& line, const Bytes& part) {
   const std::span<const std::uint8_t> all = line.arrived_since_asked();
   return std::search(all.begin(), all.end(), part.begin(), part.end()) != all.end();
 }
 
-/// The one answer that makes this read ok, without what the line puts around it. Unused bits of the
-/// last byte may be anything, so a read of bits is looked for without its last byte.
+/// The only answer that makes this read succeed, without framing. Unused bits of the last byte are
+/// arbitrary, so the last byte of bit reads is omitted.
 Bytes expected_answer(const Asked& asked) {
   const bool bits = asked.table == ModbusTable::coil || asked.table == ModbusTable::discrete_input;
   const std::size_t count = asked.words.size();
@@ -135,7 +134,7 @@ Bytes expected_answer(const Asked& asked) {
 
 void check_ended(const Exchange& exchange, nanoseconds began, const fuzz::VirtualLine& line) {
   const auto took = line.now() - began;
-  // Left alone after a late answer (6 s), waited for, drained, and the looks at the clock.
+  // Pause after a late answer (6 s), timeout, draining, and the clock readings.
   FUZZ_PROMISE(took <= std::chrono::milliseconds(7500));
   FUZZ_PROMISE(exchange.ok() == (exchange.fault() == Fault::none));
   FUZZ_PROMISE(exchange.ok() || !exchange.detail.empty());
@@ -213,7 +212,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     }
     check_ended(ended.back(), began, line);
   }
-  // A detail is static text: still there after the exchanges that followed.
+  // Details are static texts, unchanged after later exchanges.
   for (const Exchange& exchange : ended) {
     FUZZ_PROMISE(exchange.ok() || !exchange.detail.empty());
   }

@@ -1,4 +1,4 @@
-/// Registers <-> numbers, all encodings, orders, sentinels and status words.
+/// Conversion between registers and numbers, all encodings, orders, sentinels and status words.
 #include <array>
 #include <bit>
 #include <cmath>
@@ -16,7 +16,7 @@ NumberFormat format_from(fuzz::ByteFeed& feed) {
   const std::uint8_t kind = feed.u8();
   format.encoding = static_cast<Encoding>(kind % 6);
   format.word_order = static_cast<WordOrder>(kind / 6 % 4);
-  // A file's scale is finite and not 0; mostly an ordinary one, else any bits.
+  // The scale of a file is finite and not 0; mostly an ordinary one, else any bits.
   format.scale = (kind & 0x80) != 0 ? feed.f64() : (feed.u8() + 1) * 0.1;
   format.offset = (kind & 0x80) != 0 ? feed.f64() : feed.u8() - 100.0;
   if (!std::isfinite(format.scale) || format.scale == 0.0) format.scale = 0.1;
@@ -33,11 +33,11 @@ std::vector<Sentinel> sentinels_from(fuzz::ByteFeed& feed) {
   return sentinels;
 }
 
-/// A decoded number, written and read again, is the same number.
+/// A decoded number, written and read again, is unchanged.
 void check_round_trip(const Decoded& decoded, const NumberFormat& format) {
   const Encoded encoded = encode(decoded.value, format);
   if (encoded.result == EncodeResult::refused) {
-    // Only where the way back leaves the finite numbers.
+    // Fails only if the conversion to a raw value overflows.
     FUZZ_PROMISE(!std::isfinite((decoded.value - format.offset) / format.scale));
     return;
   }
@@ -63,7 +63,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const auto table = static_cast<ModbusTable>(feed.u8() % 4);
   const NumberFormat format = format_in(table, format_from(feed));
   const std::vector<Sentinel> sentinels = sentinels_from(feed);
-  // Exactly as many as needed, on the heap: reading one too many is seen.
+  // Exactly the required number, on the heap, to detect reads beyond the end.
   std::vector<std::uint16_t> registers(words_of(table, format.encoding));
   for (std::uint16_t& word : registers) word = is_bit_table(table) ? feed.u8() & 1 : feed.u16();
 

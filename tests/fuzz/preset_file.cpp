@@ -1,5 +1,5 @@
-/// A device preset and a configuration that uses it: what is refused is refused by the name of the
-/// file that has it; what loads can be built.
+/// A device preset with a configuration that uses it: refusals name the file concerned; after
+/// loading, the parts can be built.
 ///
 /// Input: the text of the preset, a line "#### configuration", the text of the daemon's file.
 #include <string>
@@ -25,7 +25,7 @@ std::span<const std::uint8_t> bytes_of(std::string_view text) {
   return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
 }
 
-/// The three files of a folder, as the daemon finds them there.
+/// The three files, in a folder as the daemon finds them.
 struct Files {
   Files() : configuration("thermocompd.toml"), scratch_model("model.toml") {
     folder = configuration.folder();
@@ -60,7 +60,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     make_sources(load_daemon_config(files.configuration.path()));
   } catch (const ConfigurationError& error) {
     FUZZ_PROMISE(!error.problems().empty());
-    // What stands in other files that the configuration may name is said of them.
+    // Problems in other files named by the configuration name those files.
     std::vector<Problem> problems = error.problems();
     const std::string preset_name = files.folder / "devices" / "module.toml";
     const std::string own_name = files.configuration.path();

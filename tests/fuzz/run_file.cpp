@@ -1,4 +1,4 @@
-/// Run files: what loads, written and read again, is the same; what is refused is refused by name.
+/// Run files: loaded ones are the same when written and read again; refusals name their cause.
 #include "config/runs/run_file.hpp"
 
 #include <bit>
@@ -41,7 +41,7 @@ void check_written(const RunFile& run) {
   }
 }
 
-/// The first line is also an argument of a command line, `FILE@T0:T1`.
+/// The first line is also the argument of a command, `FILE@T0:T1`.
 RunSelection selection_from(std::string_view text) {
   try {
     const RunSelection selection = parse_selection(text.substr(0, text.find('\n')));

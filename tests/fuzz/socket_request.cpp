@@ -1,5 +1,5 @@
-/// The status socket with the operators' methods behind it: whatever a client sends, in whatever
-/// pieces, every line that comes back is an answer of JSON-RPC, and the next client is served.
+/// The status socket with the operators' methods: for any client input, in any pieces, every output
+/// line is a JSON-RPC answer, and the next client is served.
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
@@ -25,12 +25,12 @@ using std::chrono::milliseconds;
 
 namespace {
 
-/// What the model's displacement changes by between two steps, at most, whatever its gains.
+/// Largest change of modelled displacement per step, with any gains.
 constexpr double rise_um_a_step = 0.5;
-constexpr std::uint8_t waits = 0xFF;  ///< is no part of UTF-8: here the client waits a round
+constexpr std::uint8_t waits = 0xFF;  ///< not part of UTF-8: the client waits one round
 
-/// A daemon without threads: commands are checked and reach an estimator that corrects itself by
-/// probings and follows cycle ends.
+/// A daemon without threads: commands are checked and reach an estimator that learns from probings
+/// and follows cycle ends.
 class Rig {
  public:
   Rig()
@@ -58,7 +58,7 @@ class Rig {
   static DaemonConfig with_socket(const std::filesystem::path& path) {
     DaemonConfig config = fuzz::small_config();
     config.socket.path = path;
-    // The promise about steps is one about probings; smoothed values leap once a period.
+    // The promised step limit concerns probings; smoothed values change once per period.
     for (SensorConfig& sensor : config.estimator.sensors) {
       sensor.smoothing.form = SmoothingForm::off;
       sensor.screening.settle_s = 0.0;
@@ -71,7 +71,7 @@ class Rig {
     correction.bias_drift_um_per_sqrt_h = 5.0;
     return config;
   }
-  /// Time stands still between two inputs here: rates would only make clients wait.
+  /// Time does not advance between two inputs: rate limits would only make clients wait.
   static SocketLimits without_rates() {
     SocketLimits limits;
     limits.requests_per_s = limits.requests_burst = 1e9;
@@ -82,7 +82,7 @@ class Rig {
     return {config_, report_, controller_,         timing_, {}, {}, {}, {},
             1.0,     false,   server_.statistics()};
   }
-  /// Every other command is answered a round later.
+  /// Every other command is answered one round later.
   RpcPending take(const Command& asked) {
     FUZZ_PROMISE(asked.axis < config_.estimator.axes.size());
     FUZZ_PROMISE(std::isfinite(asked.value_um));
@@ -94,7 +94,7 @@ class Rig {
       const double gain = report_.axes[asked.axis].correction.gain[g];
       FUZZ_PROMISE(gain >= correction.gain_min && gain <= correction.gain_max);
     }
-    // A new reference takes the learned bias away; before the first prediction there is nothing.
+    // A new reference removes the learned bias; before the first prediction there is none.
     if (asked.kind != CommandKind::reference && std::isfinite(before_um))
       FUZZ_PROMISE(std::abs(displacement_um(asked.axis) - before_um) <=
                    correction.step_um_max + rise_um_a_step);
@@ -104,7 +104,7 @@ class Rig {
       return json{{"done", true}};
     };
   }
-  /// One cycle, in which the machine warms by little.
+  /// One cycle, with a small temperature rise.
   void step() {
     ++steps_;
     now_ += milliseconds(100);
@@ -148,7 +148,7 @@ class Client {
   void send(std::span<const std::uint8_t> bytes, Rig& rig) {
     while (!bytes.empty()) {
       const ssize_t count = ::send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
-      if (count < 0 && errno != EAGAIN) return;  // the daemon has cut us off
+      if (count < 0 && errno != EAGAIN) return;  // the daemon has closed the connection
       if (count > 0) bytes = bytes.subspan(static_cast<std::size_t>(count));
       rig.server().handle(milliseconds(0));
       receive();
@@ -156,7 +156,7 @@ class Client {
     rig.server().handle(milliseconds(0));
     receive();
   }
-  /// The server then answers what is left, a request a round, and closes unless we subscribed.
+  /// The server then answers the rest, one request per round, and closes unless we subscribed.
   void end_input(Rig& rig, std::size_t rounds) {
     shutdown(fd_, SHUT_WR);
     for (std::size_t i = 0; i < rounds && !closed_; ++i) {
@@ -183,7 +183,7 @@ class Client {
 
 void check_answer(const json& answer) {
   FUZZ_PROMISE(answer.is_object() && answer.value("jsonrpc", "") == "2.0");
-  if (answer.contains("method")) {  // a notification of a subscription
+  if (answer.contains("method")) {  // a subscription's notification
     FUZZ_PROMISE(answer.contains("params") && !answer.contains("id"));
     return;
   }
@@ -193,7 +193,7 @@ void check_answer(const json& answer) {
   const json& error = answer["error"];
   FUZZ_PROMISE(error.is_object() && error["code"].is_number_integer());
   FUZZ_PROMISE(error["message"].is_string() && !error["message"].get<std::string>().empty());
-  // Nothing of a client's making is a fault inside the daemon.
+  // No client input causes an internal error.
   FUZZ_PROMISE(error["code"] != rpc::internal_error);
 }
 

@@ -1,5 +1,5 @@
-/// The state file: whatever stands there, the daemon starts - with the file's content, or with a
-/// warning that says which file and why; and what was read is written unchanged.
+/// The state file: with any content the daemon starts, with the file's state or a warning naming
+/// file and cause; a state that was read is written unchanged.
 #include "daemon/state/state_file.hpp"
 
 #include <cmath>

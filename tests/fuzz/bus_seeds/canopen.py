@@ -1,8 +1,8 @@
-"""What a CANopen bus decodes."""
+"""Seeds of the CANopen decoder."""
 
 
 def seeds():
-    """A frame: a step below 0xB0, the identifier's place in the target's list, eight bytes."""
+    """A frame: a step below 0xB0, the identifier's index in the target's list, eight bytes."""
     sdo, heartbeat, emergency, pdo = 0, 1, 2, 3
 
     def frame(which, *data):

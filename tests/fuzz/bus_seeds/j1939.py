@@ -1,4 +1,4 @@
-"""What a J1939 bus decodes."""
+"""Seeds of the J1939 decoder."""
 import struct
 
 

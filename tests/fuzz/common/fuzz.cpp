@@ -11,7 +11,7 @@ namespace thermocomp::fuzz {
 
 namespace {
 
-const Problem* told = nullptr;  ///< the one that is being looked at
+const Problem* told = nullptr;  ///< the problem being checked
 
 }  // namespace
 
@@ -51,7 +51,7 @@ std::vector<std::uint8_t> ByteFeed::take(std::size_t count) {
 
 namespace {
 
-/// Where the one who started us cleans up, else memory, else the disk.
+/// A folder that the caller of this process cleans up, else memory, else the disk.
 std::filesystem::path scratch_folder() {
   const char* given = std::getenv("THERMOCOMP_FUZZ_SCRATCH");
   if (given != nullptr) return given;
@@ -95,7 +95,7 @@ int lines_of(std::string_view text) {
 
 void check_problems(const std::vector<Problem>& problems, std::span<const NamedText> files) {
   FUZZ_PROMISE(!problems.empty());
-  std::vector<int> lines;  // counted once: there may be thousands of problems
+  std::vector<int> lines;  // counted once for possibly thousands of problems
   for (const NamedText& known : files) lines.push_back(lines_of(known.text));
   for (const Problem& problem : problems) {
     told = &problem;

@@ -1,4 +1,4 @@
-/// What the fuzz targets share: promises that must hold, a feed of bytes, a file that is nobody's.
+/// Common parts of the fuzz targets: checked promises, fields from input bytes, temporary files.
 #pragma once
 
 #include <cstddef>
@@ -13,10 +13,10 @@
 
 namespace thermocomp::fuzz {
 
-/// Ends the program: libFuzzer then keeps the input that broke the promise.
+/// Ends the program, so that libFuzzer keeps the input.
 [[noreturn]] void broken(const char* promise, const char* file, int line);
 
-/// Fields taken from the front of an input; zeros once it is used up.
+/// Fields from the front of an input; zeros after its end.
 class ByteFeed {
  public:
   ByteFeed(const std::uint8_t* data, std::size_t size) : bytes_(data, size) {}
@@ -25,7 +25,7 @@ class ByteFeed {
   [[nodiscard]] std::uint16_t u16() noexcept;
   [[nodiscard]] std::uint64_t u64() noexcept;
   [[nodiscard]] double f64() noexcept;
-  /// As many as there are, at most `count`.
+  /// Up to `count` bytes.
   [[nodiscard]] std::vector<std::uint8_t> take(std::size_t count);
   [[nodiscard]] std::span<const std::uint8_t> rest() const noexcept { return bytes_; }
 
@@ -33,7 +33,7 @@ class ByteFeed {
   std::span<const std::uint8_t> bytes_;
 };
 
-/// A file of this process in memory (/dev/shm where there is one), removed at the end.
+/// A file of this process in memory (in /dev/shm if it exists), removed at the end.
 class ScratchFile {
  public:
   explicit ScratchFile(std::string_view name);
@@ -49,9 +49,9 @@ class ScratchFile {
   std::filesystem::path path_;
 };
 
-/// What every refusal owes the one who wrote the file: at least one problem; each names a file
-/// that was read, a line that the file has, a key or a value (unless it is about the file as a
-/// whole or its syntax), and the rule; printable, on one line.
+/// Requirements for every refusal: at least one problem; each names a file that was read, an
+/// existing line, a key or a value (unless it concerns the whole file or its syntax), and the rule;
+/// printable, on one line.
 struct NamedText {
   std::string_view name;
   std::string_view text;

@@ -10,7 +10,7 @@
 namespace thermocomp::fuzz {
 namespace {
 
-/// @return whether `use` came to its end
+/// @return true if `use` did not throw
 template <class Use>
 bool is_done(const std::filesystem::path& file, Use use) {
   try {

@@ -1,4 +1,4 @@
-/// What reading, replaying and exporting promise, however damaged the history is.
+/// Promises of reading, replaying and exporting any damaged history.
 #pragma once
 
 #include <cstdint>
@@ -13,8 +13,7 @@ struct HistoryUse {
   bool exported{false};
   ReplaySummary summary;
 };
-/// Nothing but HistoryError and ConfigurationError leaves, and a HistoryError names the file; what
-/// was exported is a run file.
+/// Throws only HistoryError, which names the file, and ConfigurationError; exports are run files.
 HistoryUse use_history(const std::filesystem::path& file, const SetupParser& parser);
 
 }  // namespace thermocomp::fuzz

@@ -1,6 +1,6 @@
-/// A mutator that knows how a JSON file is built: values of other types and sizes, objects within
-/// objects, keys moved and doubled. What it makes is JSON nearly always, so that it gets past the
-/// parser. Linked into a target it is libFuzzer's LLVMFuzzerCustomMutator.
+/// A mutator for JSON: changes types and sizes of values, nests objects, moves and doubles keys.
+/// Most results are valid JSON and get past the parser. Linked as libFuzzer's
+/// LLVMFuzzerCustomMutator.
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -18,8 +18,8 @@ namespace {
 
 using nlohmann::json;
 
-/// Of a document that is changed, and of what is added to it: the library writes and copies
-/// levels by recursion, and a mutator that overflows its stack has found nothing.
+/// Nesting limit of mutated and inserted documents: the library is recursive, and a stack overflow
+/// in the mutator is not a finding.
 constexpr std::size_t levels_max = 3000;
 
 class JsonMutator {
@@ -49,7 +49,7 @@ class JsonMutator {
         break;
     }
   }
-  /// Damage of the text itself: a key twice, a part gone, a tail.
+  /// Damages the text itself: doubled key, missing part, appended text.
   void damage(std::string& text) {
     const std::size_t at = below(text.size() + 1);
     switch (below(4)) {
@@ -147,7 +147,7 @@ class JsonMutator {
   std::size_t levels_left_{levels_max};
 };
 
-/// How deep brackets are nested; those in strings count too.
+/// Nesting depth of brackets, including those in strings.
 std::size_t nesting(const std::uint8_t* data, std::size_t size) {
   std::size_t open = 0;
   std::size_t deepest = 0;
@@ -165,7 +165,7 @@ extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t s
   if (nesting(data, size) > levels_max) return LLVMFuzzerMutate(data, size, size_max);
   JsonMutator mutator(seed);
   json document =
-      json::parse(data, data + size, nullptr, false);  // discarded: no JSON, then bytes are changed
+      json::parse(data, data + size, nullptr, false);  // discarded: not JSON, so bytes are mutated
   if (seed % 8 == 0 || document.is_discarded()) return LLVMFuzzerMutate(data, size, size_max);
   const std::size_t changes = 1 + mutator.below(4);
   for (std::size_t i = 0; i < changes; ++i) mutator.change(document);

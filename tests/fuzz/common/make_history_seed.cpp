@@ -1,4 +1,4 @@
-/// Writes the history that the seeds of history_file begin with: make_history_seed FILE
+/// Writes the history for the seeds of history_file: make_history_seed FILE
 #include <cstdio>
 #include <fstream>
 

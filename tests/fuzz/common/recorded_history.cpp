@@ -18,7 +18,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// Sixty cycles of 100 ms: readings that drift, a fault, a command, skipped cycles, offsets noted
+/// Sixty cycles of 100 ms: drifting readings, a fault, a command, skipped cycles, offsets recorded
 /// ten times a second.
 class Recording {
  public:
@@ -87,7 +87,7 @@ class Recording {
   std::uint64_t cycle_{0};
 };
 
-/// Small pages, so that an input is small; and no write-ahead log, so that reading makes no files.
+/// Small pages for small inputs; no write-ahead log, so that reading creates no files.
 void make_small(const std::filesystem::path& file) {
   sqlite3* handle = nullptr;
   const bool done =

@@ -1,4 +1,4 @@
-/// A small good history, as the daemon's own writer makes it: the start of every damage.
+/// A small valid history written by the daemon's own writer, to be damaged.
 #pragma once
 
 #include <string>
@@ -8,12 +8,12 @@
 
 namespace thermocomp::fuzz {
 
-/// A configuration of two sensors and one axis with a dry run, and its model.
+/// A configuration with two sensors and one axis in dry run, and its model.
 [[nodiscard]] std::string small_config_text();
 [[nodiscard]] std::string small_model_text();
 [[nodiscard]] DaemonConfig small_config();
 
-/// The bytes of a SQLite file with two segments and some chunks, without a write-ahead log.
+/// The bytes of a SQLite file with two segments and several chunks, without a write-ahead log.
 [[nodiscard]] std::vector<std::uint8_t> recorded_history();
 
 }  // namespace thermocomp::fuzz

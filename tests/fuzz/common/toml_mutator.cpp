@@ -58,8 +58,8 @@ constexpr std::array<std::string_view, 14> values{"true",
                                                   "{ a = { b = 1 } }",
                                                   "[nan]",
                                                   "\"z\""};
-/// Escape and control characters, both directions of writing, what cannot be seen, what is no
-/// UTF-8, what takes many bytes.
+/// Escape and control characters, both writing directions, invisible characters, invalid UTF-8,
+/// long encodings.
 constexpr std::array<std::string_view, 22> oddities{"\\u001b[31m",  "\x1b[2J",
                                                     "\\u202e",      "\xE2\x80\xAE",
                                                     "\\u2066",      "\xE2\x81\xA9",
@@ -73,7 +73,7 @@ constexpr std::array<std::string_view, 22> oddities{"\\u001b[31m",  "\x1b[2J",
                                                     "..",           "/"};
 
 bool ends_line_continued(std::string_view statement) {
-  // Counts what is open, texts left out; enough to keep lists of many lines together.
+  // Counts open brackets outside strings; sufficient to keep multi-line lists together.
   int open = 0;
   char quote = '\0';
   for (std::size_t i = 0; i < statement.size(); ++i) {
@@ -139,7 +139,7 @@ std::string repeated(std::string_view part, std::size_t count) {
   return text;
 }
 
-/// Where a number stands in `text`, from `from` on. @return its length; 0: none
+/// Finds a number in `text` from `from` on. @return its length; 0: none
 std::size_t find_number(std::string_view text, std::size_t from, std::size_t& at) {
   const auto is_part = [](char c) {
     return std::isdigit(static_cast<unsigned char>(c)) != 0 || c == '.' || c == '-' || c == '+' ||
@@ -197,7 +197,7 @@ void TomlMutator::move_statement(Blocks& blocks) {
   const std::size_t at = below(from.statements.size());
   std::string statement = from.statements[at];
   if (below(2) == 0) from.statements.erase(from.statements.begin() + static_cast<long>(at));
-  if (below(3) == 0) return;  // away with it
+  if (below(3) == 0) return;  // delete it
   const std::size_t place = below(to.statements.size() + 1);
   to.statements.insert(to.statements.begin() + static_cast<long>(place), std::move(statement));
 }
@@ -431,7 +431,7 @@ using thermocomp::fuzz::TomlMutator;
 
 extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size,
                                                std::size_t size_max, unsigned seed) {
-  // Now and then bytes, for what is no TOML.
+  // Sometimes mutates bytes, for invalid TOML.
   if (seed % 8 == 0 || size == 0) return LLVMFuzzerMutate(data, size, size_max);
   const std::string text =
       TomlMutator(seed).mutate(thermocomp::fuzz::as_text(data, size), size_max);

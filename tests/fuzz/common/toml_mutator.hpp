@@ -1,8 +1,7 @@
-/// A mutator that knows how a TOML file is built. Bytes changed at random rarely get past the
-/// parser; this one moves, repeats and deepens whole statements, and puts numbers, names and types
-/// there that nobody would write.
+/// A mutator for TOML. Random byte changes rarely get past the parser; this one moves, repeats and
+/// nests statements, and inserts unusual numbers, names and types.
 ///
-/// Linked into a target it is libFuzzer's: LLVMFuzzerCustomMutator and LLVMFuzzerCustomCrossOver.
+/// Linked as libFuzzer's LLVMFuzzerCustomMutator and LLVMFuzzerCustomCrossOver.
 #pragma once
 
 #include <cstddef>
@@ -13,10 +12,10 @@
 
 namespace thermocomp::fuzz {
 
-/// A table's header with its lines, or the lines in front of the first header. What belongs
-/// together in many lines (a list, a text) stays one statement.
+/// A table's header with its lines, or the lines before the first header. A multi-line list or text
+/// is one statement.
 struct TomlBlock {
-  std::vector<std::string> statements;  ///< each with its line feed; the header, if any, first
+  std::vector<std::string> statements;  ///< with line feeds; starts with the header, if any
 };
 
 class TomlMutator {
@@ -25,7 +24,7 @@ class TomlMutator {
 
   /// @return the text with one to four changes, at most `size_max` bytes
   [[nodiscard]] std::string mutate(std::string_view text, std::size_t size_max);
-  /// @return `text` with blocks of `other` between its own
+  /// @return `text` with blocks of `other` inserted
   [[nodiscard]] std::string cross(std::string_view text, std::string_view other,
                                   std::size_t size_max);
 
@@ -33,7 +32,7 @@ class TomlMutator {
   using Blocks = std::vector<TomlBlock>;
   [[nodiscard]] std::size_t below(std::size_t count);  ///< 0 for 0
   [[nodiscard]] std::string* any_statement(Blocks& blocks);
-  /// A statement `key = value`, and where its parts are.
+  /// A statement `key = value` with the positions of its parts.
   struct Assignment {
     std::string* statement{nullptr};
     std::string key;

@@ -20,7 +20,7 @@ namespace {
 
 VirtualLine* line = nullptr;
 VirtualCan* can = nullptr;
-int serial_fd = -1;  ///< told by tcsetattr
+int serial_fd = -1;  ///< known from tcsetattr
 
 }  // namespace
 
@@ -33,7 +33,7 @@ VirtualLine::~VirtualLine() {
 }
 
 nanoseconds VirtualLine::tick() noexcept {
-  now_ += std::chrono::microseconds(1);  // looking at the clock takes time: no loop stands still
+  now_ += std::chrono::microseconds(1);  // reading the clock takes time, so that loops end
   return now_;
 }
 
@@ -105,7 +105,7 @@ nanoseconds from(const timespec& time) {
 }  // namespace
 }  // namespace thermocomp::fuzz
 
-// The calls of the C library. libmodbus is a shared library: it finds these before the C library's.
+// The C library's functions. The shared library libmodbus finds these first.
 using namespace thermocomp::fuzz;
 
 extern "C" {
@@ -144,7 +144,7 @@ int select(int count, fd_set* reads, fd_set* writes, fd_set* errors, timeval* ti
   }
   const nanoseconds until = line->now() + std::chrono::seconds(timeout->tv_sec) +
                             std::chrono::microseconds(timeout->tv_usec);
-  if (line->wait_readable(until)) return 1;  // the set stays as it is: it holds the line alone
+  if (line->wait_readable(until)) return 1;  // the set is unchanged: it contains only the line
   FD_ZERO(reads);
   return 0;
 }
@@ -190,7 +190,7 @@ int tcflush(int, int) noexcept {
 }
 
 int socket(int family, int kind, int protocol) noexcept {
-  // Any descriptor will do where the script speaks.
+  // Any descriptor will do for scripted calls.
   if (family == PF_CAN && can != nullptr) family = AF_UNIX, kind = SOCK_DGRAM, protocol = 0;
   return static_cast<int>(syscall(SYS_socket, family, kind, protocol));
 }

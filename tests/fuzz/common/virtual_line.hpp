@@ -1,9 +1,9 @@
-/// A line whose far end is the fuzzer, and a clock that moves only while somebody waits.
+/// A line with the fuzzer at its far end, and a clock that advances only during waits.
 ///
-/// virtual_line.cpp defines the C library's calls that drivers and libmodbus make (ppoll, recv,
-/// send, connect, select, read, write, recvmmsg, clock_gettime, ...). While a VirtualLine exists,
-/// those about its descriptor and the monotonic clock are answered from its script, so that a
-/// time-out costs no time and every run of an input is the same; otherwise they go to the kernel.
+/// virtual_line.cpp defines the C library's calls of drivers and libmodbus (ppoll, recv, send,
+/// connect, select, read, write, recvmmsg, clock_gettime, ...). While a VirtualLine exists, calls
+/// on its descriptor and the monotonic clock are answered from its script, so that timeouts take no
+/// time and runs are reproducible; other calls go to the kernel.
 #pragma once
 
 #include <chrono>
@@ -22,13 +22,13 @@ using std::chrono::nanoseconds;
 
 class VirtualLine {
  public:
-  /// What arrives, and how long after what came before it.
+  /// A part of the received data, with its delay after the previous part.
   struct Piece {
     nanoseconds delay{};
     std::vector<std::uint8_t> bytes;
-    bool hang_up{false};  ///< then the peer is gone
+    bool hang_up{false};  ///< after this part the peer is gone
   };
-  /// Called with every request that is sent; its answer arrives in these pieces.
+  /// Called with every request sent; the answer arrives in these pieces.
   using Peer = std::function<std::vector<Piece>(std::span<const std::uint8_t> request)>;
 
   explicit VirtualLine(Peer peer);
@@ -37,16 +37,16 @@ class VirtualLine {
   VirtualLine& operator=(const VirtualLine&) = delete;
 
   [[nodiscard]] nanoseconds now() const noexcept { return now_; }
-  /// Everything that has arrived so far, read or not.
+  /// All data that have arrived, read or not.
   [[nodiscard]] const std::vector<std::uint8_t>& arrived() const noexcept { return arrived_; }
-  /// The same, but for what was there before the newest request began to be sent.
+  /// Without the data present before the newest request was sent.
   [[nodiscard]] std::span<const std::uint8_t> arrived_since_asked() const noexcept {
     return std::span(arrived_).subspan(asked_at_);
   }
 
-  // What the calls of the C library do.
+  // Implementation of the C library's calls.
   [[nodiscard]] nanoseconds tick() noexcept;
-  /// @return whether something (or the hang-up) is there to be read, at the latest at `until`
+  /// @return true if data or the hang-up can be read by `until`
   bool wait_readable(nanoseconds until);
   void pass(nanoseconds until) noexcept;
   ssize_t read(void* to, std::size_t size);
@@ -58,7 +58,7 @@ class VirtualLine {
 
   Peer peer_;
   nanoseconds now_{std::chrono::hours(1)};
-  nanoseconds due_{now_};  ///< when the last piece under way arrives
+  nanoseconds due_{now_};  ///< arrival of the last piece in transit
   struct Due {
     nanoseconds at{};
     Piece piece;
@@ -70,10 +70,10 @@ class VirtualLine {
   bool hung_up_{false};
 };
 
-/// Frames and control messages for recvmmsg on a CAN socket, which the kernel here may not have.
+/// Frames and control messages of recvmmsg on a CAN socket, which this kernel may not support.
 class VirtualCan {
  public:
-  /// Fills one message. @return false when there is none
+  /// Fills one message. @return false if there is none
   using Next = std::function<bool(mmsghdr& message)>;
   explicit VirtualCan(Next next);
   ~VirtualCan();
