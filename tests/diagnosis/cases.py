@@ -1,8 +1,8 @@
-"""Cases in which effects were hidden by seed: the tool looks at the files alone."""
+"""Cases with effects hidden by seed; the tool gets only the files."""
 
 import os
 
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the jobs are the threads
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # one thread per job
 
 # ruff: noqa: E402
 import json
@@ -35,8 +35,8 @@ def said(answer):
 
 def examined(task, make, model=("--model", "model.toml")):
     """@param task  program, folder that keeps the files or None, kind, level, seed, causes
-    @param make  writes the files of a case; those that are there already stay
-    @return (task, what was hidden, the answer)"""
+    @param make  writes the files of a case; existing ones are kept
+    @return (task, hidden effects, answer)"""
     program, keep, kind, level, seed, causes = task
     with tempfile.TemporaryDirectory() as temporary:
         folder = pathlib.Path(keep or temporary) / ("%d_%d_%s" % (level, seed, "+".join(causes)))
@@ -47,8 +47,8 @@ def examined(task, make, model=("--model", "model.toml")):
 
 
 def is_right(truth, answer):
-    """The one hidden cause and its subject are the first finding; nothing is named where nothing
-    was hidden."""
+    """True if the only hidden cause with its subject is the first finding, or if nothing is hidden
+    and nothing named."""
     if not truth["hidden"]:
         return answer["verdict"] != "effect"
     return bool(answer["findings"]) and same(answer["findings"][0], truth["hidden"][0])
@@ -56,8 +56,7 @@ def is_right(truth, answer):
 
 def short_campaign(program, examine, level, causes, nulls, wrong_max):
     """Every cause once and some untouched machines.
-    @return exit status: 1 when more than wrong_max are wrong or an untouched machine is not left
-    alone"""
+    @return exit status: 1 if more than wrong_max are wrong or an untouched machine has a finding"""
     tasks = [(program, None, "single", level, seed, [cause]) for seed, cause in enumerate(causes)]
     tasks += [(program, None, "null", level, NULL_SEED + seed, []) for seed in range(nulls)]
     wrong = invented = 0

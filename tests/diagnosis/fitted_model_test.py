@@ -1,9 +1,9 @@
 #!/usr/bin/python3
-"""A model fitted to the very rows that are diagnosed has taken up what acted in them. The cause
-must be named all the same, what it put into the coefficients taken out again, and nothing be named
-with confidence where nothing was hidden. Exit status 1 when more than WRONG_MAX are not.
+"""A model fitted to the diagnosed rows has absorbed part of the cause. The cause must be named all
+the same, its part removed from the coefficients, and nothing named with confidence if nothing was
+hidden. Exit status 1 when more than WRONG_MAX are wrong.
 
-fitted_model_test.py PROGRAM [--few]    --few: a handful of cases, for sanitizer builds
+    fitted_model_test.py PROGRAM [--few]    --few: a handful of cases, for sanitizer builds
 """
 
 import json
@@ -12,7 +12,7 @@ import sys
 import tempfile
 import tomllib
 
-import cases  # first: it settles the number of threads
+import cases  # first: sets the number of threads
 import hidden_effects as hidden
 import numpy as np
 
@@ -21,8 +21,8 @@ CASES = ((1, 136, "thermal_lag", 0.0, False), (1, 140, "speed_growth", 0.0, True
          (2, 121, "missing_heat_source", 0.0, False), (2, 160, "missing_temperature", 0.0, False),
          (1, 118, "thermal_lag", 1e-3, False), (1, 131, "displacement_step", 1e-3, False))
 SILENT = ((2, 50100, 0.0, False), (2, 50102, 1e-3, False), (1, 50120, 0.0, True))
-WRONG_MAX = 1  # of 6: a heat that the base model itself lacks is named before a lag
-STATED = 0.8  # a name with more than this probability on untouched data is an invention
+WRONG_MAX = 1  # of 6: a heat that the base model lacks is named before a lag
+STATED = 0.8  # a finding in untouched data with a higher probability is an error
 GAIN_MIN = 0.3  # of the test RMS, in one output at least
 
 
@@ -33,7 +33,7 @@ def columns(path):
 
 
 def fit(folder, ridge, offset):
-    """Replaces the matrix by that of least squares on the training runs."""
+    """Replaces the model's matrix by the least-squares fit to the training runs."""
     model = tomllib.loads((folder / "model.toml").read_text())
     left, right = [], []
     for name in ("train_a.csv", "train_b.csv"):
@@ -56,7 +56,7 @@ def fit(folder, ridge, offset):
 
 
 def rms_of_written_um(program, folder):
-    """Of the extended model as its file says, on the test run."""
+    """RMS of the extended model on the test run, from its written file."""
     again = cases.diagnose(program, folder, ("--model", "out/model.toml"))
     return {output: said["test_rms_um"] for output, said in again["baseline"].items()}
 

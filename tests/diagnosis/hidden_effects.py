@@ -1,4 +1,4 @@
-"""Measured runs with something hidden in them, by seed: run files, a model file and the truth."""
+"""Simulated runs with effects hidden by seed: run files, a model file and the truth."""
 
 import json
 import pathlib
@@ -14,7 +14,7 @@ LEVELS = {1: dict(sensor_K=0.01, step_K=0.0, noise_um=0.05, wander=False, coeffi
 ALWAYS = ("thermal_lag", "slow_sensor", "time_shift", "missing_heat_source", "speed_growth",
           "missing_temperature", "wrong_coefficient", "nonlinear_expansion", "position_dependence",
           "hysteresis_output", "hysteresis_temperature", "periodic_disturbance", "sensor_swap")
-EXCEEDS = 1.5  # an effect over what was left without it, RMS
+EXCEEDS = 1.5  # least RMS of an effect relative to the remainder without it
 FAULTS = ("displacement_step", "displacement_drift", "sensor_drift", "sensor_step", "sensor_loose")
 OUTSIDE = ("outside_walk", "outside_chirp", "outside_bursts")
 CAUSES = ALWAYS + FAULTS
@@ -44,11 +44,11 @@ def rms(values):
 
 
 class Case:
-    """One machine with its runs and its base model; `hide` puts effects in, `write` the files.
+    """One machine with its runs and base model; `hide` adds effects, `write` writes the files.
 
-    Machines differ in outputs (one or two), rows (every 30, 60 or 120 s) and in what moves them:
-    the integral over their fields, which a few sensors follow closely at best, or the temperatures
-    of the measured places alone, which a linear model follows exactly.
+    Machines differ in outputs (one or two), rows (every 30, 60 or 120 s) and the source of
+    displacement: the integral over the fields, which a few sensors follow only approximately, or
+    the temperatures of the measured places, which a linear model follows exactly.
     """
 
     def __init__(self, seed, level):
@@ -90,7 +90,7 @@ class Case:
         return run["temps"][name] - run["temps"][name][0]
 
     def _fit(self, runs):
-        """The best linear model of the bare machine: least squares on runs of its own."""
+        """Best linear model of the unchanged machine: least squares on separate runs."""
         left = np.vstack([np.stack([self.rise(r, n)[::self.sample] for n in self.inputs], axis=1)
                           for r in runs])
         right = np.vstack([np.stack([r["moved"][o][::self.sample] for o in self.outputs], axis=1)
@@ -105,7 +105,7 @@ class Case:
         self.left_before_um = {o: self.left_um(self.train(), o, centred=True) for o in self.outputs}
 
     def left_um(self, runs, output, centred=False):
-        """RMS of what the base model leaves of the untouched machine, noise included."""
+        """RMS remainder of the base model on the untouched machine, including noise."""
         parts = []
         for run in runs:
             row = self.model[self.outputs.index(output)]
@@ -114,7 +114,7 @@ class Case:
         return float(np.hypot(np.sqrt(np.mean(np.concatenate(parts) ** 2)), self._noise_um(output)))
 
     def _noise_um(self, output):
-        """Of a measured displacement and of what noise and steps of the readings make of it."""
+        """Noise of a measured displacement with that of the readings' noise and steps."""
         reading_K = np.hypot(self.level["sensor_K"], self.level["step_K"] / np.sqrt(12.0))
         row = self.model[self.outputs.index(output)]
         return float(np.hypot(self.level["noise_um"], reading_K * np.linalg.norm(row)))
@@ -127,7 +127,7 @@ class Case:
         return sum(k * self.rise(run, n) for k, n in zip(row, self.inputs))
 
     def size_um(self, effect, runs=None):
-        """RMS of an effect over the training rows, the largest of the outputs."""
+        """RMS of an effect over the training rows, maximum over the outputs."""
         runs = runs if runs is not None else self.train()
         return max(rms(np.concatenate([effect(r, o) - np.mean(effect(r, o)) for r in runs]))
                    for o in self.outputs)
@@ -139,7 +139,7 @@ class Case:
                 run["moved"][output] = run["moved"][output] + added[output]
 
     def _scaled(self, effect, runs=None, low=2.0, high=6.0):
-        """The gain that gives the effect of 1 a random size, with a random sign."""
+        """Gain that scales a unit effect to a random size, with random sign."""
         size = self.size_um(effect, runs)
         if not size > 0:
             raise ValueError("no effect")
@@ -155,7 +155,7 @@ class Case:
                 for i, o in enumerate(self.outputs)}
 
     def strong_input(self):
-        """An input that moves the machine by enough to carry an effect."""
+        """An input with sufficient effect on displacement."""
         sizes = {n: max(abs(self.matrix[i, j]) * rms(np.concatenate(
             [self.rise(r, n) for r in self.train()])) for i in range(len(self.outputs)))
             for j, n in enumerate(self.inputs)}
@@ -175,7 +175,7 @@ class Case:
         self.truth.append(dict(cause=named, subject=subject, parameters=parameters))
 
     def _exceeds_noise(self, before):
-        """@throws ValueError when what was hidden is smaller than what was left without it"""
+        """@throws ValueError if the hidden effect is smaller than the remainder without it"""
         for output in self.outputs:
             parts = []
             for run in self.train():
@@ -377,7 +377,7 @@ class Case:
         return "", {}
 
     def _outside_chirp(self):
-        """A sine whose period grows from 25 minutes to three hours in the course of a run."""
+        """A sine whose period grows from 25 minutes to three hours during a run."""
         def unit(r, o):
             share = r["time_s"] / r["time_s"][-1]
             period_s = 1500.0 * 7.0 ** share
@@ -431,7 +431,7 @@ class Case:
 
 
 def make(folder, seed, level, causes):
-    """Tries machines by seed until every cause finds a place that carries it."""
+    """Tries machines by seed until every cause has a subject that can carry it."""
     for attempt in range(200):
         case = Case(seed * 1000 + attempt, level)
         try:

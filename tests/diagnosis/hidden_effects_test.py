@@ -1,21 +1,21 @@
 #!/usr/bin/python3
-"""The short campaign: every cause once, silence on untouched machines, and a machine on which
-another peak of the right cause is likelier. Exit status 1 when more than WRONG_MAX causes are not
-named, that machine's is not, or an untouched machine is not left alone.
+"""Short campaign: every cause once, untouched machines, and a machine on which another peak of the
+right cause is more likely. Exit status 1 when more than WRONG_MAX causes or that machine's are
+missed, or an untouched machine has a finding.
 
-hidden_effects_test.py PROGRAM [--few]    --few: a handful of cases, for sanitizer builds
+    hidden_effects_test.py PROGRAM [--few]    --few: a handful of cases, for sanitizer builds
 """
 
 import pathlib
 import sys
 
-import cases  # first: it settles the number of threads
+import cases  # first: sets the number of threads
 import hidden_effects as hidden
 
 LEVEL = 2
 WRONG_MAX = 3  # of 18
 NULLS = 6
-# A heat of 51 min; the model's own misfit makes one of 2 min likelier, which explains nothing.
+# A heat of 51 min; the model's misfit makes one of 2 min more likely, which explains nothing.
 QUICK_PEAK = 1, 120003, "missing_heat_source"
 FEW = ("missing_heat_source", "sensor_swap", "displacement_step")
 

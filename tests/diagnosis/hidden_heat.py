@@ -1,8 +1,8 @@
-"""Measured temperatures of a machine whose heat flows otherwise than its thermal network says, by seed.
+"""Measured temperatures of a machine that differs from its thermal network, by seed.
 
-The machine is six bodies of five cells each, integrated in steps of seconds; the network has a lump
-a body, fitted to runs of the untouched machine. Then one thing of the machine is changed, and the
-files are written: machine.toml, train_a.csv, train_b.csv, test.csv, truth.json.
+The machine has six bodies of five cells each, integrated in steps of seconds; the network has one
+lump per body, fitted to runs of the untouched machine. Then one property of the machine is changed,
+and the files are written: machine.toml, train_a.csv, train_b.csv, test.csv, truth.json.
 """
 
 import json
@@ -37,12 +37,12 @@ CAUSES = ("wrong_film_coefficient", "wrong_heat_source", "missing_heat_source", 
           "wrong_heat_capacity", "wrong_ambient")
 FAULTS = ("sensor_step", "sensor_drift", "slow_sensor")
 OUTSIDE = ("outside_bursts", "outside_walk")
-EFFECT_K = 0.4   # least RMS of an effect at the sensor that shows it most, centred run by run ...
-EXCEEDS = 1.5    # ... and so many times what the network leaves of the untouched machine there
+EFFECT_K = 0.4   # least RMS of an effect at the most affected sensor, centred per run ...
+EXCEEDS = 1.5    # ... and relative to the network's remainder there on the untouched machine
 
 
 class Body:
-    """What the machine is made of; changed by name, integrated as a field."""
+    """Thermal properties of the machine, changed by name and integrated as a field."""
 
     def __init__(self, random):
         vary = lambda: random.uniform(0.75, 1.3)
@@ -54,7 +54,7 @@ class Body:
         self.sources = {s: [w[0] * vary(), w[1], w[2]] for s, w in SOURCES.items()}
         self.air_K = {b: 0.0 for b in BODIES}
         self.lag_s = {}
-        self.extra = None  # (body, W at every step): heat that no signal goes with
+        self.extra = None  # (body, W at every step): heat unrelated to any signal
 
     @staticmethod
     def cell(body, at):
@@ -83,8 +83,8 @@ class Body:
         return conductance + np.diag(air + wet), capacity, air, wet
 
     def fields(self, signals, room_degC, coolant_degC):
-        """Temperatures of all cells [degC], shape (steps, cells); begins in balance, all at rest.
-        Backward Euler: each step is stable however short a cell's time is."""
+        """Temperatures of all cells [degC], shape (steps, cells), from equilibrium at rest.
+        Backward Euler, stable for any time constant of a cell."""
         steps = []
         for flows in (False, True):
             conductance, capacity, air, wet = self.matrices(flows)
@@ -109,7 +109,7 @@ class Body:
 
 
 class Network:
-    """One lump a body: the model that is given to the diagnosis, and its fit."""
+    """Network with one lump per body, as given to the diagnosis, and its fit."""
 
     def __init__(self, body):
         self.names = ([("capacity", b) for b in BODIES] + [("room", b) for b in BODIES] +
@@ -159,10 +159,10 @@ class Network:
         return out
 
     def fit(self, runs, sample):
-        """Gauss-Newton in the logarithms of all values, held near the body's own."""
+        """Gauss-Newton in the logarithms of all values, with a prior at the body's own values."""
         start = np.log(self.value)
         at = start.copy()
-        # The coolant reaches one body while it works: its own weight keeps it in its place.
+        # A stronger prior for the coolant, which reaches one body and only at times.
         pull = 0.3 * np.ones(len(at))
 
         def left(x):
@@ -206,7 +206,7 @@ def centred_rms(values):
 
 
 class NothingToSee(Exception):
-    """No change of this kind shows on this machine."""
+    """No change of this kind is visible on this machine."""
 
 
 class Case:
@@ -249,12 +249,12 @@ class Case:
         return true
 
     def _left(self, name):
-        """RMS of what the fitted network leaves of the untouched machine, body by body."""
+        """RMS remainder of the fitted network on the untouched machine, per body."""
         lumps = self.network.readings(self.network.value, self.inputs[name], self.sample)
         return centred_rms(lumps - self.before[name][:len(lumps) * self.sample:self.sample])
 
     def hide(self, cause):
-        """Changes the machine until the change can be seen."""
+        """Changes the machine until the change is visible."""
         noise_K = max(self.level["noise_K"], self.level["step_K"] / np.sqrt(12.0))
         for _ in range(40):
             body, truth = self._changed(cause)
@@ -263,8 +263,8 @@ class Case:
                 after[name][:, BODIES.index(column)] += values
             run = truth["parameters"].get("run", "train_a.csv")
             moved = after[run] - self.before[run]
-            # Another air warms the balance at the start as well: not the change shows it, but that
-            # the network, begun at the readings, leaves them.
+            # Another ambient temperature also shifts the initial equilibrium: visible is not the
+            # change but the drift of the network from the initial readings.
             moved = np.abs(moved).mean(axis=0) if cause == "wrong_ambient" else centred_rms(moved)
             seen = moved > np.maximum(EFFECT_K, EXCEEDS * np.hypot(self.left_K, noise_K))
             if seen.any():
@@ -342,7 +342,7 @@ class Case:
             truth["add"] = [(r, name, 2.0 * w / centred_rms(w)) for r, w in walk.items()]
 
     def _bursts(self, name, truth):
-        """Heat that comes and goes with no signal: added as the answer of the body to it."""
+        """Heat unrelated to any signal, added as the body's response."""
         truth["add"] = []
         for run, inputs in self.inputs.items():
             steps = len(inputs["room"])
@@ -383,7 +383,7 @@ class Case:
 
 
 def make(folder, seed, level, causes):
-    """On the first machine of the seed on which the causes show."""
+    """The first machine of the seed on which the causes are visible."""
     for attempt in range(10):
         case = Case(seed, level, attempt)
         try:

@@ -1,14 +1,14 @@
 #!/usr/bin/python3
-"""The short thermal campaign: everything that can be wrong with heat once, silence on untouched
-machines. Exit status 1 when more than WRONG_MAX are not named or an untouched one is not left alone.
+"""Short thermal campaign: every kind of thermal error once, and untouched machines. Exit status 1
+when more than WRONG_MAX are missed or an untouched one has a finding.
 
-hidden_heat_test.py PROGRAM [--few]    --few: a handful of cases, for sanitizer builds
+    hidden_heat_test.py PROGRAM [--few]    --few: a handful of cases, for sanitizer builds
 """
 
 import pathlib
 import sys
 
-import cases  # first: it settles the number of threads
+import cases  # first: sets the number of threads
 import hidden_heat as hidden
 
 LEVEL = 2

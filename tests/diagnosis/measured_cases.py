@@ -1,8 +1,8 @@
-"""One effect planted in what real machines measured: the tool looks at files and model alone."""
+"""One effect planted in data of real machines; the tool gets only files and model."""
 
 import os
 
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the jobs are the threads
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # one thread per job
 
 # ruff: noqa: E402
 import json
@@ -16,7 +16,7 @@ from measured_plants import CAUSES, FAMILIES, Impossible, Planted
 
 ATTEMPTS = 12
 PROBED_EACH_S = 1800.0
-STATED = 0.8  # a name with more than this probability on untouched data is an invention
+STATED = 0.8  # a finding in untouched data with a higher probability is an error
 
 
 def machine_of(name, random):
@@ -24,7 +24,7 @@ def machine_of(name, random):
 
 
 def spared(machine, cause, random):
-    """A place that the model may not have."""
+    """Temperature withheld from the model, if any."""
     if cause != "missing_temperature" and random.uniform() < 0.7:
         return ()
     if len(machine.temperatures) < 2:
@@ -33,15 +33,15 @@ def spared(machine, cause, random):
 
 
 def second_cause(first, random):
-    """Of another family."""
+    """A cause of another family."""
     family = lambda cause: FAMILIES["hysteresis" if cause.startswith("hysteresis") else cause]
     return str(random.choice([c for c in CAUSES if family(c) != family(first)]))
 
 
 def planted_case(seed, machines, base, cause, times, kind):
-    """A machine that cannot carry the cause gives way to another one.
-    @return the machine with the effects in it, its model, and the truths
-    @throws Impossible when no attempt can carry it"""
+    """Tries another machine if one cannot carry the cause.
+    @return the machine with its effects, its model, and the truths
+    @throws Impossible if no attempt can carry it"""
     for attempt in range(ATTEMPTS):
         random = np.random.default_rng([seed, attempt])
         machine = machine_of(str(random.choice(machines)), random)
@@ -98,7 +98,7 @@ def diagnosed(program, machine, model):
 
 
 def with_groups(truths, machine):
-    """The truths with the places that cannot be told from their subjects."""
+    """The truths with the places that cannot be distinguished from their subjects."""
     for truth in truths:
         truth["groups"] = [sorted(machine.group(p)) if p.endswith("_degC") else [p]
                            for p in truth["subject"].split("|")]
@@ -106,7 +106,7 @@ def with_groups(truths, machine):
 
 
 def examine(task):
-    """@return the task, the truths (None: untouched or not to be planted), the answer"""
+    """@return the task, the truths (None: untouched or impossible), the answer"""
     program, seed, machines, base, cause, times, kind = task
     named = lambda machine: (program, seed, machine.name, base, cause, times, kind)
     if cause is None:

@@ -1,8 +1,8 @@
 #!/usr/bin/python3
-"""Some effects planted in measured machines, and machines that were left as they are. Exit status
-1 when more than WRONG_MAX are not named, 77 where there are no data.
+"""Effects planted in measured machines, and untouched measured machines. Exit status 1 when more
+than WRONG_MAX are missed, 77 without data.
 
-measured_effects_test.py PROGRAM
+    measured_effects_test.py PROGRAM
 """
 
 import pathlib
@@ -14,7 +14,7 @@ import measured_machines
 CAUSES = ("displacement_step", "speed_growth", "nonlinear_expansion", "periodic_disturbance",
           "missing_heat_source", "hysteresis_output", "sensor_step", "thermal_lag")
 SEED = 7
-WRONG_MAX = 4  # of 8, three times what the model leaves; 3 where this was set
+WRONG_MAX = 4  # of 8, three times the model's remainder; 3 when this was set
 UNTOUCHED = 4
 
 

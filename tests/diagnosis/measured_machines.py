@@ -1,6 +1,6 @@
-"""Machines that somebody measured, read from the shared data, with base models fitted to them.
+"""Measured machines from the shared data, with base models fitted to them.
 
-Nothing of these data is copied: a run is thinned in memory and written to a temporary folder.
+The data are not copied: a run is thinned in memory and written to a temporary folder.
 """
 
 import os
@@ -12,11 +12,11 @@ from hidden_effects import low_pass as low_pass_evenly
 
 DATA = pathlib.Path(os.environ.get("THERMOCOMP_DATA") or
                     pathlib.Path(__file__).resolve().parents[3] / "shared" / "data")
-TRAIN_SHARE = 0.75  # of the rows of a machine measured in one run
+TRAIN_SHARE = 0.75  # share of the rows if the machine was measured in one run
 BLOCKS = 8
 LAGS_S = (900.0, 2700.0, 8100.0)
 BANK_LAGS_S = (300.0, 900.0, 2700.0, 8100.0)  # as `fit` takes them
-ALIKE = 0.98  # rises that correlate above it belong to places that cannot be told apart
+ALIKE = 0.98  # places with a higher correlation of rises cannot be distinguished
 
 
 def columns(path):
@@ -48,12 +48,12 @@ def low_pass(time_s, values, tau_s):
 
 
 def rms(parts):
-    """Of all rows, each run's mean taken off."""
+    """RMS of all rows after removing each run's mean."""
     return float(np.sqrt(np.mean(np.concatenate([p - p.mean() for p in parts]) ** 2)))
 
 
 class Machine:
-    """Runs of one machine; the names of what was measured; which rows are for training."""
+    """Runs of one machine, names of the measured quantities, training rows."""
 
     def __init__(self, name, runs, outputs, signals, train):
         self.name, self.runs, self.outputs, self.signals = name, runs, outputs, signals
@@ -64,11 +64,11 @@ class Machine:
         return run[name] - run[name][0]
 
     def train_parts(self, values):
-        """@param values  one array a run"""
+        """@param values  one array per run"""
         return [v[rows] for v, rows in zip(values, self.train) if rows.stop]
 
     def keep_probings(self, apart_s):
-        """Displacement is known in one row each `apart_s` only, as where somebody probes."""
+        """Keeps displacement only in one row per `apart_s`, like probings."""
         for run in self.runs:
             slot = np.floor((run["time_s"] - run["time_s"][0]) / apart_s + 1e-9)
             probed = np.concatenate([[True], np.diff(slot) > 0])
@@ -76,7 +76,7 @@ class Machine:
                 run[output] = np.where(probed, run[output], np.nan)
 
     def group(self, name):
-        """Temperatures whose rises cannot be told from this one's in the training rows."""
+        """Temperatures whose rises cannot be distinguished from this one's in the training rows."""
         def stacked(of):
             parts = self.train_parts([self.rise(r, of) for r in self.runs])
             return np.concatenate(parts)
@@ -91,7 +91,7 @@ def one_run(name, run, outputs, signals):
 
 
 def spindle(random, count=None):
-    """@param count  of outputs; None: one or two"""
+    """@param count  number of outputs; None: one or two"""
     run = columns(DATA / "spindle_46h" / "hours_00_32.csv")
     hours = [(0, 32), (0, 16), (16, 32)][int(random.integers(3))]
     run = thinned(run, 60.0, hours[0] * 3600.0, hours[1] * 3600.0)
@@ -114,7 +114,7 @@ def other_printer(_):
 
 
 def probe(random):
-    """Two runs of one probe, or of one kind of probe: bed, nozzle and chamber warm what it reads."""
+    """Two runs of one probe or one kind of probe, whose reading bed, nozzle and chamber warm."""
     pair = (("superpinda", "superpinda_covered"), ("superpinda_fysetc", "superpinda_fysetc_covered"),
             ("GX_H8A", "N3F_H4NB"))[int(random.integers(3))]
     runs = [columns(DATA / "probe_drift" / ("%s.csv" % name)) for name in pair]
@@ -154,9 +154,9 @@ MACHINES = {"spindle": spindle, "spindle_outputs": spindle_outputs, "printer": p
 
 
 class Model:
-    """A linear model with lags: coefficients of inputs, of lagged inputs less the inputs.
+    """A linear model with lags: coefficients of inputs, and of lagged inputs less the inputs.
 
-    @param as_bank  written as one lag_bank instead of a thermal_lag each
+    @param as_bank  written as one lag_bank instead of one thermal_lag each
     """
 
     def __init__(self, inputs, outputs, lags_s, as_bank=False):
@@ -171,7 +171,7 @@ class Model:
         return np.hstack([rises] + lagged)
 
     def fit(self, runs, penalty=None):
-        """Ridge on standardised columns without intercept, the penalty by left-out blocks."""
+        """Ridge on standardised columns without intercept, the penalty from left-out blocks."""
         left = [self.parts(run) for run in runs]
         right = [np.stack([run[o] - run[o][0] for o in self.outputs], axis=1) for run in runs]
         left, right = np.vstack(left), np.vstack(right)
@@ -208,7 +208,7 @@ class Model:
     def write(self, path):
         quoted = lambda values: "[" + ", ".join('"%s"' % v for v in values) + "]"
         listed = lambda values: "[" + ", ".join("%.12f" % v for v in values) + "]"
-        # A bank lags the values themselves: what lags is not at once.
+        # A bank lags the values themselves: the lagged part has no immediate effect.
         at_once = self.matrix - self.gains.sum(axis=1) if self.as_bank else self.matrix
         rows = ",\n  ".join(listed(row) for row in at_once)
         text = ('format = 1\ninputs = %s\noutputs = %s\nreference = "first_sample"\n'
@@ -236,7 +236,7 @@ class Model:
 
 
 def chosen_few(machine, names, most, lags_s):
-    """Forward choice by left-out blocks."""
+    """Forward selection with left-out blocks."""
     chosen = []
     best = None
     while len(chosen) < min(most, len(names)):
@@ -251,8 +251,8 @@ def chosen_few(machine, names, most, lags_s):
 
 def base_model(machine, kind, without=()):
     """@param kind  ridge (all temperatures), few (static), lags (few, each with three lags) or bank
-                 (all temperatures, each with four lags, as one lag_bank)
-    @param without  temperatures that the model may not have"""
+    (all temperatures, each with four lags, as one lag_bank)
+    @param without  temperatures withheld from the model"""
     names = [n for n in machine.temperatures if n not in without]
     if kind == "ridge":
         return Model(names, machine.outputs, ()).fit(machine.runs)

@@ -1,5 +1,5 @@
-"""One effect planted in measured columns: what acts on the machine changes the displacement, what
-is wrong with a reading changes the reading."""
+"""One effect planted in measured columns: physical effects change displacement, sensor faults a
+reading."""
 
 import numpy as np
 
@@ -18,8 +18,8 @@ CAUSES = ("thermal_lag", "wrong_coefficient", "nonlinear_expansion", "missing_te
           "hysteresis_output", "hysteresis_temperature", "slow_sensor", "missing_heat_source",
           "speed_growth", "displacement_step", "displacement_drift", "time_shift",
           "periodic_disturbance", "sensor_drift", "sensor_step", "sensor_loose", "sensor_swap")
-OUTSIDE = ("outside_walk", "outside_chirp", "outside_bursts")  # nothing recorded goes with them
-SHARE_MIN = 0.7  # of the wanted size that a fault of a reading must move the prediction by
+OUTSIDE = ("outside_walk", "outside_chirp", "outside_bursts")  # unrelated to any recorded column
+SHARE_MIN = 0.7  # least movement of the prediction by a sensor fault, relative to the wanted size
 
 
 class Impossible(Exception):
@@ -29,8 +29,8 @@ class Impossible(Exception):
 class Planted:
     """A machine with one effect in it.
 
-    @param times  size of the effect over what the base model leaves
-    @param size_um  by output, of a second effect: as large as the first
+    @param times  size of the effect relative to the base model's remainder
+    @param size_um  per output, for a second effect as large as the first
     """
 
     def __init__(self, machine, model, cause, times, random, size_um=None):
@@ -44,7 +44,7 @@ class Planted:
                           parameters=parameters)
 
     def left(self):
-        """What the model leaves: by output, by run."""
+        """Remainder of the model: by output, by run."""
         model, runs = self.model, self.machine.runs
         predicted = [model.predicted(run) for run in runs]
         return [[run[o] - run[o][0] - p[i] for run, p in zip(runs, predicted)]
@@ -54,7 +54,7 @@ class Planted:
         return rms(self.machine.train_parts(values))
 
     def _add_scaled(self, values, first_only=False):
-        """Adds the column to the displacement of every output in the wanted size, signs free.
+        """Adds the column to every output's displacement in the wanted size, with random sign.
         @return gains by output"""
         size = self._moves(values)
         if not size > 0:
@@ -85,7 +85,7 @@ class Planted:
         return float(np.exp(self.random.uniform(np.log(min(low_s, 0.5 * high_s)), np.log(high_s))))
 
     def _coefficients(self, name):
-        """Of the group of places that cannot be told apart, by output."""
+        """Coefficients by output, summed over the group of indistinguishable places."""
         group = self.machine.group(name)
         return [sum(k for k, n in zip(row, self.model.inputs) if n in group)
                 for row in self.model.matrix]
@@ -124,7 +124,7 @@ class Planted:
         return name, dict(tau_s=tau_s, gain_um_per_K=gains)
 
     def _reached(self, make, low, high, wanted):
-        """The parameter between low and high with which make(parameter) has the wanted size."""
+        """The parameter between low and high for which make(parameter) has the wanted size."""
         for _ in range(40):
             middle = np.sqrt(low * high)
             low, high = (low, middle) if make(middle) > wanted else (middle, high)
@@ -155,7 +155,7 @@ class Planted:
         return name, dict(width_K=width)
 
     def _false_reading(self, name, readings):
-        """By how much the prediction moves over its wanted size when readings are these."""
+        """Movement of the prediction with these readings, relative to its wanted size."""
         changed = [dict(run, **{name: reading}) for run, reading in
                    zip(self.machine.runs, readings)]
         moved = [self.model.predicted(new) - self.model.predicted(old)
@@ -283,7 +283,7 @@ class Planted:
         raise Impossible
 
     def _outside(self, unit):
-        """@param unit  of a run's times"""
+        """@param unit  effect of unit size from a run's times"""
         return "", dict(gain_um=self._add_scaled([unit(r["time_s"]) for r in self.machine.runs]))
 
     def _outside_walk(self):
@@ -291,7 +291,7 @@ class Planted:
             time_s, np.cumsum(self.random.normal(size=len(time_s))), 1200.0))
 
     def _outside_chirp(self):
-        """A sine whose period grows sevenfold in the course of a run."""
+        """A sine whose period grows sevenfold during a run."""
         def unit(time_s):
             share = (time_s - time_s[0]) / (time_s[-1] - time_s[0])
             period_s = min(1500.0, time_s[-1] / 30.0) * 7.0 ** share

@@ -1,17 +1,17 @@
-"""Effects that physics makes (physical_effects.py): the tool looks at the files alone."""
+"""Physical effects (physical_effects.py); the tool gets only the files."""
 
 import json
 import pathlib
 import subprocess
 import tempfile
 
-import measured_cases as measured  # first: it settles the number of threads
+import measured_cases as measured  # first: sets the number of threads
 import physical_effects as physical
 from measured_plants import FAMILIES
 
 
 def examine(task):
-    """@return the task as measured_campaign has it, truths (None: no machine carries it), answer"""
+    """@return the task as in measured_campaign, truths (None: no machine carries it), answer"""
     program, seed, level, kind, times = task
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(folder)

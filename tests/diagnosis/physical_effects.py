@@ -1,8 +1,8 @@
-"""Effects that bodies, joints, films and clocks make, hidden in simulated machines by seed.
+"""Effects of bodies, joints, films and clocks, hidden in simulated machines by seed.
 
-A body without a thermocouple is a rod of cells with conduction along it and a film to the room; a
-joint is a row of sliders; a sensor is one or two thermal masses. None of these is a form that the
-diagnosis looks for: each is only nearly one of them, as on a machine.
+A body without a thermocouple is a rod of cells with conduction and a film to the room; a joint is a
+row of sliders; a sensor is one or two thermal masses. Each resembles a form of the diagnosis only
+approximately, as on a real machine.
 """
 
 import numpy as np
@@ -10,17 +10,17 @@ import numpy as np
 import hidden_effects as hidden
 import plant
 
-SIZES = (1.0, 3.0, 10.0, 50.0)  # over what the base model leaves
+SIZES = (1.0, 3.0, 10.0, 50.0)  # relative to the base model's remainder
 CELLS = 8
 STEP_S = plant.STEP_S
 
 
 def rod(steps, source_K_per_s, room_K, room_s, along_s, host_K=None, contact_s=None):
-    """Rises of a rod's cells [K], shape (steps, CELLS), in balance at the start.
+    """Rises of a rod's cells [K], shape (steps, CELLS), from equilibrium.
     @param source_K_per_s  of the first cell
     @param room_K          rise of the room
-    @param room_s          time of the film, one number or one a step
-    @param host_K          rise of the body that the first cell touches"""
+    @param room_s          time constant of the film, one number or one per step
+    @param host_K          rise of the body that touches the first cell"""
     between = CELLS ** 2 / along_s
     to_room = 1.0 / np.broadcast_to(room_s, steps)
     rises = np.zeros((steps, CELLS))
@@ -41,7 +41,7 @@ def rod(steps, source_K_per_s, room_K, room_s, along_s, host_K=None, contact_s=N
 
 
 class PhysicalCase(hidden.Case):
-    """A machine with one such effect, `times` as large as what its model leaves."""
+    """A machine with one such effect, `times` the model's remainder."""
 
     def __init__(self, seed, level, times):
         super().__init__(seed, level)
@@ -53,7 +53,7 @@ class PhysicalCase(hidden.Case):
         self.truth.append(dict(cause=cause, subject=subject, parameters=parameters, kind=kind))
 
     def group(self, name):
-        """Temperatures whose rises cannot be told from this one's in the training rows."""
+        """Temperatures whose rises cannot be distinguished from this one's in the training rows."""
         stacked = lambda of: np.concatenate([self.rise(r, of) for r in self.train()])
         return {n for n in self.runs["test.csv"]["temps"] if n == name or
                 np.corrcoef(stacked(name), stacked(n))[0, 1] > 0.98}
@@ -88,7 +88,7 @@ class PhysicalCase(hidden.Case):
             films_s = room_s / (1.0 + film * u)
             heat = 0.004 * u
             rises = rod(len(u), heat, self._room(run), films_s, along_s)
-            for _ in range(2 if feedback else 0):  # heat grows with the warmth that it made
+            for _ in range(2 if feedback else 0):  # heat grows with the rise it causes
                 heat = 0.004 * u * (1.0 + feedback * rises[:, 0])
                 rises = rod(len(u), heat, self._room(run), films_s, along_s)
             return rises.mean(axis=1) + 0.3 * rises[:, -1]
@@ -138,7 +138,7 @@ class PhysicalCase(hidden.Case):
         return "missing_temperature", name, {}
 
     def _warped_reference(self):
-        """The artefact that is measured against follows the room."""
+        """The reference artefact follows the room temperature."""
         film_s, along_s = self.random.uniform(900.0, 7200.0), self.random.uniform(300.0, 3000.0)
         self._moves(lambda run: rod(len(run["time_s"]), self._zeros(run), self._room(run), film_s,
                                     along_s).mean(axis=1))
@@ -149,7 +149,7 @@ class PhysicalCase(hidden.Case):
         return self._rod_at(str(self.random.choice(spare)))
 
     def _other_material(self):
-        """A bracket that expands otherwise, and is a little late."""
+        """A bracket with another expansion coefficient and a small lag."""
         name = self.strong_input()
         along_s = self.random.uniform(60.0, 300.0)
         self._moves(lambda run: rod(len(run["time_s"]), self._zeros(run), self._room(run), 60000.0,
@@ -164,7 +164,7 @@ class PhysicalCase(hidden.Case):
         return "nonlinear_expansion", name, {}
 
     def _reached(self, change, low, high):
-        """The parameter with which the change of the first output has the wanted size."""
+        """The parameter for which the change of the first output has the wanted size."""
         wanted = self.size_um_wanted[self.outputs[0]]
         size = lambda p: hidden.rms(np.concatenate(
             [v - v.mean() for v in (change(p, run) for run in self.train())]))
@@ -176,7 +176,7 @@ class PhysicalCase(hidden.Case):
         return float(middle)
 
     def _friction(self):
-        """A joint of five sliders of different hold."""
+        """A joint of five sliders with different friction."""
         output = self.outputs[0]
         holds = self.random.uniform(0.5, 1.5, 5)
         def change(width, run):
@@ -189,7 +189,7 @@ class PhysicalCase(hidden.Case):
         return "hysteresis", output, {}
 
     def _late_clock(self):
-        """A logger whose clock is late, and runs a little slow."""
+        """A logger with a late and slightly slow clock."""
         output = self.outputs[0]
         sign = self.random.choice([-1.0, 1.0])
         def change(shift_s, run):
@@ -201,7 +201,7 @@ class PhysicalCase(hidden.Case):
         return "time_shift", output, {}
 
     def _changes_reading(self, name, make, low, high, runs):
-        """The reading of every run is make(parameter, run), the wanted size away in the model."""
+        """Replaces each run's reading by make(parameter, run), with the wanted effect."""
         output = self.outputs[0]
         change = lambda p, run: (self.k(name, output) * (make(p, run) - run["temps"][name])
                                  if any(run is r for r in runs) else self._zeros(run))
@@ -211,7 +211,7 @@ class PhysicalCase(hidden.Case):
         return value
 
     def _two_masses(self):
-        """A cartridge in a sleeve."""
+        """A sensor cartridge in a sleeve."""
         name = self.strong_input()
         make = lambda tau_s, run: hidden.low_pass(hidden.low_pass(run["temps"][name], tau_s),
                                                   tau_s / 3.0)
@@ -223,7 +223,7 @@ class PhysicalCase(hidden.Case):
         return name, run, self._onset(run, 0.2, 0.7)
 
     def _loose_cartridge(self):
-        """From a time on its contact is poor: a mass between its place and the room."""
+        """A contact that becomes poor: a mass between its place and the room."""
         run_name, faulty, at_s = self._one_run()
         name = self.strong_input()
         def make(poor, run):
@@ -241,7 +241,7 @@ class PhysicalCase(hidden.Case):
         return "sensor_loose", name, dict(run=run_name)
 
     def _ageing_sensor(self):
-        """Decalibration: fast at first."""
+        """Decalibration, fast at first."""
         run_name, faulty = self._fault_run()
         start_s = self._onset(faulty, 0.0, 0.3)
         name, sign = self.strong_input(), self.random.choice([-1.0, 1.0])
@@ -279,7 +279,7 @@ class PhysicalCase(hidden.Case):
         return "displacement_drift", self.outputs[0], dict(run=run_name)
 
     def _bearing_seat(self):
-        """Grows with the square of speed, gives way at the top, is felt within a minute."""
+        """Grows with the square of speed, saturates, with a time constant below a minute."""
         def values(run):
             square = (run["signals"]["spindle_rpm"] / 6000.0) ** 2
             return hidden.low_pass(square / (1.0 + 0.15 * square), 25.0)
@@ -287,7 +287,7 @@ class PhysicalCase(hidden.Case):
         return "speed_growth", "spindle_rpm", {}
 
     def _hunting_cooler(self):
-        """A two-point controller: warms and cools a cabinet at two rates."""
+        """A two-point controller that warms and cools a cabinet at two rates."""
         period_s, share = self.random.uniform(900.0, 5000.0), self.random.uniform(0.35, 0.65)
         def values(run):
             phase = (run["time_s"] / period_s + self.random.uniform()) % 1.0

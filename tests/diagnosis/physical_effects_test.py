@@ -1,9 +1,8 @@
 #!/usr/bin/python3
-"""Effects that bodies, joints and films make, three and ten times as large as what the model
-leaves. Exit status 1 when fewer than RIGHT_MIN are named first, or more than WRONG_MAX wrongly with
-confidence.
+"""Physical effects, three and ten times the model's remainder. Exit status 1 when fewer than
+RIGHT_MIN are named first, or more than WRONG_MAX wrongly with confidence.
 
-physical_effects_test.py PROGRAM [--few]    --few: a handful of cases, for sanitizer builds
+    physical_effects_test.py PROGRAM [--few]    --few: a handful of cases, for sanitizer builds
 """
 
 import pathlib
@@ -15,7 +14,7 @@ import physical_effects as physical
 
 LEVEL, SEED = 2, 4300
 SIZES = (3.0, 10.0)
-RIGHT_MIN = 13  # of 19 kinds; 16 where this was set
+RIGHT_MIN = 13  # of 19 kinds; 16 when this was set
 WRONG_MAX = 1
 
 

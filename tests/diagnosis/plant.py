@@ -1,7 +1,7 @@
-"""A machine of five bodies as full temperature fields: finite volumes, conduction, joints, convection.
+"""A machine of five bodies as temperature fields: finite volumes, conduction, joints, convection.
 
-Nothing in here knows the forms that the diagnosis looks for. Displacement is the integral of the
-expansion over the fields, with levers for bending; sensors read the field at places.
+Independent of the forms that the diagnosis looks for. Displacement is the integral of the expansion
+over the fields, with levers for bending; sensors read the field at places.
 """
 
 import numpy as np
@@ -10,22 +10,22 @@ BODIES = ("bed", "column", "head", "screw", "table")
 CELLS = 10
 STEP_S = 10.0
 ALPHA_UM_PER_M_K = 11.5
-# m: length; s: time to the room; s: time of conduction along the whole body.
+# m: length; s: time constant to the room; s: time of conduction along the whole body.
 LENGTH_M = {"bed": 1.2, "column": 1.0, "head": 0.5, "screw": 0.8, "table": 0.6}
 ROOM_S = {"bed": 21000.0, "column": 12000.0, "head": 5000.0, "screw": 3500.0, "table": 8000.0}
 ALONG_S = {"bed": 26000.0, "column": 16000.0, "head": 4500.0, "screw": 9000.0, "table": 7000.0}
 JOINTS = (("bed", 9, "column", 0, 4000.0), ("column", 9, "head", 0, 2500.0),
           ("bed", 2, "screw", 0, 6000.0), ("screw", 9, "table", 4, 7000.0))
 OUTPUTS = ("z_um", "y_um")
-# Levers of the expansion of each body on the outputs [1].
+# Levers of each body's expansion on the outputs [1].
 LEVERS = {"z_um": {"column": 1.0, "head": -1.3, "bed": 0.2, "screw": 0.1, "table": 0.5},
           "y_um": {"column": 0.3, "head": 0.9, "bed": -0.8, "screw": 1.1, "table": -0.3}}
-# A body warmer at one end bends: um per K of the first moment of the field.
+# Bending of a body warmer at one end: um per K of the field's first moment.
 BENDING = {"z_um": {"column": 3.0, "bed": -2.0}, "y_um": {"column": 1.0, "head": 2.0}}
 
 
 class Machine:
-    """One machine: random details by `random`, the same for all its runs."""
+    """One machine: random details from `random`, the same for all its runs."""
 
     def __init__(self, random):
         self.random = random
@@ -64,7 +64,7 @@ class Machine:
         return np.arange(start, start + CELLS)
 
     def run(self, signals, room_degC):
-        """Fields [degC], shape (steps, cells), from the signals at every step; begins in balance."""
+        """Fields [degC], shape (steps, cells), from the signals at every step; from equilibrium."""
         rpm = signals["spindle_rpm"] / 6000.0
         source = np.zeros((len(rpm), len(self.to_room)))
         head, screw, bed = self.cells("head"), self.cells("screw"), self.cells("bed")
@@ -109,7 +109,7 @@ def room_air(random, steps, wander):
 
 
 def duty(random, steps):
-    """Operating signals at every step: stretches of work with stops, positions of a moving axis."""
+    """Operating signals at every step: periods of work with stops, positions of a moving axis."""
     def stretches(values, low_s, high_s, rest):
         out = np.zeros(steps)
         at = int(random.uniform(600, 2400) / STEP_S)

@@ -1,5 +1,5 @@
 #!/bin/bash
-# run_can_cases.sh BIN: every case that has a CAN bus, four at a time, each on an interface of its own.
+# run_can_cases.sh BIN: all cases with a CAN bus, four at a time, each on its own interface.
 here=$(cd "$(dirname "$0")" && pwd)
 bin=$(realpath "$1")
 if [ $# -eq 1 ]; then

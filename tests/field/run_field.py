@@ -1,7 +1,7 @@
-"""Runs a field case: a device as a transcript, and what daemon, `scan` and `check` make of it.
+"""Runs a field case: a device as a transcript, and the reactions of daemon, `scan` and `check`.
 
     run_field.py FOLDER            # exit status 0: as expected, 77: needs a CAN interface
-    run_field.py --serve FOLDER    # only the device, for a look by hand
+    run_field.py --serve FOLDER    # only the device, for manual tests
 
 README.md beside this file describes the three files of a case."""
 
@@ -44,7 +44,7 @@ def can_number(text):
 
 
 class Rule:
-    """`> PATTERN` or `every SECONDS`, its conditions and what it does."""
+    """`> PATTERN` or `every SECONDS`, with conditions and actions."""
 
     def __init__(self, pattern="", every_s=None):
         self.every_s, self.uses, self.steps, self.conditions = every_s, 0, [], []
@@ -64,7 +64,7 @@ class Rule:
 
 
 class Place:
-    """One port, serial line or CAN interface with the rules of what is said there."""
+    """One port, serial line or CAN interface with its rules."""
 
     def __init__(self, kind, name):
         self.kind, self.name, self.rules, self.memory = kind, name, [], {}
@@ -72,7 +72,7 @@ class Place:
         self.asked_at, self.links, self.running = None, [], True
         self.requests = []
 
-    # what the transcript says
+    # parsing of the transcript
 
     def bytes_of(self, text, request):
         out = b""
@@ -106,7 +106,7 @@ class Place:
         return True
 
     def take(self, buffer, send, whole=False):
-        """Answers the requests at the front of the buffer; what is left of it, None: to be closed."""
+        """Answers requests at the front of the buffer; returns the rest, or None: to be closed."""
         while buffer:
             self.asked_at = self.asked_at or time.monotonic()
             now_s = time.monotonic() - self.asked_at
@@ -124,7 +124,7 @@ class Place:
                     return None
         return buffer
 
-    # where it is said
+    # device
 
     def open(self, folder):
         if self.kind == "tcp":
@@ -171,7 +171,7 @@ class Place:
                 link.close()
                 continue
             if self.links and self.second_client == "replace":
-                with contextlib.suppress(OSError):  # it may be going by itself
+                with contextlib.suppress(OSError):  # may exit by itself
                     self.links.pop().shutdown(socket.SHUT_RDWR)
             self.links.append(link)
             self.start(self.serve_link, link)
@@ -199,7 +199,7 @@ class Place:
                 try:
                     buffer = self.take(buffer + os.read(self.server, 4096),
                                        lambda data: os.write(self.server, data)) or b""
-                except OSError:  # nobody has it open
+                except OSError:  # not open anywhere
                     time.sleep(0.02)
 
     def send_frame(self, data):
@@ -223,7 +223,7 @@ class Place:
     def close(self):
         self.running = False
         if self.kind == "serial":
-            return  # read by a thread that looks at `running`; the process' end closes it
+            return  # for a thread that checks `running`; closed by the end of the process
         with contextlib.suppress(OSError):
             if self.kind == "tcp":
                 self.server.shutdown(socket.SHUT_RDWR)
@@ -236,7 +236,7 @@ class Place:
 def read_device(path):
     places, rule = [], None
     for number, line in enumerate(path.read_text().splitlines(), 1):
-        words = line.split("#!")[0].strip()  # a `#` alone is part of a CAN frame
+        words = line.split("#!")[0].strip()  # a single `#` is part of a CAN frame
         if not words or words.startswith("# ") or words == "#":
             continue
         verb, _, rest = words.partition(" ")
@@ -265,10 +265,10 @@ def read_device(path):
     return places
 
 
-# ---- the daemon's file
+# ---- the daemon's configuration
 
 def whole_config(text, folder):
-    """The case's file with what it leaves out: model, blocks, an axis, socket."""
+    """The case's file completed by model, blocks, an axis and socket."""
     known = tomllib.loads(text)
     names = [sensor["name"] for sensor in known.get("sensor", [])]
     if "block" not in known:
@@ -293,7 +293,7 @@ def whole_config(text, folder):
             f'[history]\nenabled = false\n[socket]\npath = "{folder}/s"\n')
 
 
-# ---- what is said
+# ---- the outputs
 
 class Case:
     def __init__(self, folder):
@@ -370,7 +370,7 @@ class Case:
         for name, value in wanted.get("values", {}).items():
             if not self.is_near(shown.get(name), value):
                 self.wrong.append(f"scan: {name}: expected {value}, came {shown.get(name)}")
-        for name, fault in self.faults.items():  # as the daemon has it
+        for name, fault in self.faults.items():  # as used by the daemon
             said = shown.get(name, "nothing")
             said = "none" if re.fullmatch(r"-?\d.*", said) else said
             self.compare("scan", name + " beside the daemon", fault, said)
@@ -435,7 +435,7 @@ class Case:
                 for unit in bus["units"]}
 
     def differs(self, wanted, log):
-        """What is not as expected now."""
+        """Current differences from the expectations."""
         kept, self.wrong = self.wrong, []
         try:
             status, sensors = self.call("status"), self.call("sensors")["sensors"]
@@ -460,7 +460,7 @@ class Case:
         for reason in wanted.get("reasons", []):
             if reason not in status["reasons"]:
                 self.wrong.append(f"daemon: no reason {reason}: {status['reasons']}")
-        # Without a controller everything else can be well.
+        # Cases without a controller may be well in dry run.
         self.beside = f"status {exit_status} {status['mode']} {','.join(status['reasons']) or '-'}"
         self.is_well = exit_status == 0 or (status["mode"] == "dry_run" and not status["reasons"])
         if "status_exit" in wanted:

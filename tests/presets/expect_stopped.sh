@@ -1,8 +1,8 @@
 #!/bin/bash
-# expect_stopped.sh MESSAGE PROGRAM ARGUMENT...: passes when the program ends with another status than
-# 0 and 2 (bad use) and says MESSAGE, an extended regular expression.
+# expect_stopped.sh MESSAGE PROGRAM ARGUMENT...: passes if the program ends with a status other than 0 and 2
+# (bad use) and prints MESSAGE, an extended regular expression.
 set -uo pipefail
-# The report is to be seen here, not among those of the tests.
+# Keep the report on stderr, out of the tests' report files.
 unset ASAN_OPTIONS UBSAN_OPTIONS LSAN_OPTIONS TSAN_OPTIONS
 message=$1
 shift

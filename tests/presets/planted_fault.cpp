@@ -1,4 +1,4 @@
-// Commits, on demand, one fault that an instrumented build must stop.
+// Commits one chosen fault that an instrumented build must stop.
 #include <cstdio>
 #include <limits>
 #include <string_view>
@@ -9,7 +9,7 @@ namespace {
 
 volatile int sink = 0;
 
-// volatile: the compiler must neither see the fault coming nor remove it.
+// volatile prevents the compiler from detecting or removing the fault.
 void heap_overflow() {
   volatile std::size_t one_too_many = 4;
   const std::vector<int> values(4, 1);

@@ -1,4 +1,4 @@
-// Breaks, on demand, one promise of the fuzz targets, which must end the program with its text.
+// Breaks one chosen promise of the fuzz targets, which must end the program with its text.
 #include <cstdio>
 #include <span>
 #include <string>
@@ -28,7 +28,7 @@ void refuse_with(Problem problem) {
   fuzz::check_problems({good, std::move(problem)}, files);
 }
 
-/// @return whether there is such a promise
+/// @return false: no such promise
 bool break_promise(std::string_view name) {
   if (name == "none") {
     fuzz::check_problems({good}, files);

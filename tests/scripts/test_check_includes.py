@@ -1,4 +1,4 @@
-"""scripts/check_includes.py finds the circles that are planted, and only those."""
+"""scripts/check_includes.py finds planted include cycles, and only those."""
 import os
 import subprocess
 

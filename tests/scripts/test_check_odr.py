@@ -14,7 +14,7 @@ double second() { return n::other().share; }
 
 
 def link(folder, name):
-    """Two files with the compiler's options of the preset; the other one defines n::NAME."""
+    """Links two files with the preset's compiler options; the other one defines n::NAME."""
     presets = json.loads((SOURCE / "CMakePresets.json").read_text())["configurePresets"]
     odr = next(preset for preset in presets if preset["name"] == "odr")
     (folder / "main.cpp").write_text(MAIN)

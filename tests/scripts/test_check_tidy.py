@@ -1,4 +1,4 @@
-"""clang-tidy with the rules of .clang-tidy finds what is planted, in every folder with code."""
+"""clang-tidy with the rules of .clang-tidy finds planted defects in every folder with code."""
 import pathlib
 import re
 import shutil
@@ -36,7 +36,7 @@ PLANTS = {
 
 
 def run_tidy(folder, header_folder, code):
-    """Of a header in `header_folder`, as that of a file that includes it."""
+    """Output for a header in `header_folder`, checked through a file that includes it."""
     if shutil.which("clang-tidy") is None:
         pytest.skip("clang-tidy is not installed")
     header = folder / header_folder / "planted.hpp"

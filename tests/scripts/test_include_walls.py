@@ -1,4 +1,4 @@
-"""A header of a library that is not linked cannot be included: planted includes must not compile."""
+"""Headers of libraries not linked cannot be included: planted includes must not compile."""
 import json
 import os
 import pathlib
@@ -20,7 +20,7 @@ def commands():
 
 
 def compile_beside(commands, file, header, folder):
-    """Compiles a file that includes `header` with the include folders that `file` is compiled with."""
+    """Compiles a file that includes `header`, with the include folders of `file`."""
     words = shlex.split(commands[str(SOURCE / file)]["command"])
     compiler = next(word for word in words if word.endswith(("c++", "g++", "clang++")))
     kept, takes_next = [], False

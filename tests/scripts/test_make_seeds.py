@@ -1,4 +1,4 @@
-"""Every fuzz target has seeds, and every example of its kind is one of them."""
+"""Every fuzz target has seeds, including every example of its kind."""
 import pathlib
 import subprocess
 

@@ -1,7 +1,7 @@
 #!/bin/bash
-# check_packages.sh SOURCE FOLDER: builds the packages of SOURCE in FOLDER/packages (build_packages.sh),
-# and the root file system that they are tested in (build_rootfs.sh, as root); lintian must find no
-# error and no warning. Prints the sizes. Exit status 77, with the reason, where it cannot.
+# check_packages.sh SOURCE FOLDER: builds the packages of SOURCE in FOLDER/packages (build_packages.sh) and
+# the root file system for their tests (build_rootfs.sh, as root); lintian must report no error or warning.
+# Prints the sizes. Exit status 77, with the reason, if this machine cannot do it.
 set -euo pipefail
 here=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)
 source_tree=${1:?the source tree} folder=${2:?a folder}
@@ -24,7 +24,7 @@ echo "packages built in $((SECONDS - began)) s"
 lintian --allow-root --fail-on error,warning --tag-display-limit 0 "$packages"/*.changes
 echo "lintian: no error, no warning"
 
-# depends_of PACKAGE...: names of the packages of others that they depend on.
+# depends_of PACKAGE...: names of their dependencies outside this project.
 depends_of() {
   local name
   for name in "$@"; do dpkg-deb -f "$packages/$name"_*.deb Depends; done |
@@ -35,7 +35,7 @@ fail() {
   exit 1
 }
 
-# What stands beside the machine stays small, and no file is in two packages.
+# The packages for the machine stay small, and no file is in two packages.
 beside_machine=$(depends_of thermocomp thermocomp-simulator)
 for library in gmsh cholmod blas occt linuxcnc; do
   [[ $beside_machine != *"$library"* ]] || fail "the daemon's packages depend on $library"
@@ -44,13 +44,13 @@ twice=$(for file in "$packages"/*.deb; do
   dpkg-deb --fsys-tarfile "$file" | tar -t | grep -v '/$'
 done | sort | uniq -d)
 [[ -z $twice ]] || fail "in more than one package: $twice"
-# Only modules of it are linked with Gmsh and CHOLMOD; the package depends on them all the same.
+# Gmsh and CHOLMOD are linked only by modules, but the package must depend on them.
 for library in gmsh cholmod; do
   [[ $(depends_of thermocomp-modelling) == *"lib$library"* ]] ||
     fail "$library does not come with the package"
 done
 
-# Unpacked, because what it needs is large: it runs, and the command finds it.
+# Unpacked rather than installed, because of its large dependencies: it runs, and the command finds it.
 unpacked=$folder/unpacked
 rm -rf "$unpacked"
 for name in thermocomp thermocomp-modelling; do

@@ -1,10 +1,9 @@
 #!/bin/bash
 # install_and_purge.sh PACKAGE FOLDER
 #
-# Installs PACKAGE of FOLDER/packages (check_packages.sh) by dpkg on a copy of this machine's root that
-# is kept in memory, so that the machine stays as it is; lets its program do something small; purges
-# it. Nothing may be left. Exit status 77, with the reason, where this machine cannot, or where what the
-# package needs is not installed on it.
+# Installs PACKAGE of FOLDER/packages (check_packages.sh) with dpkg on a copy of this machine's root in
+# memory, runs its program on a small task, and purges it. The machine is not changed. Nothing may be left.
+# Exit status 77, with the reason, if this machine cannot do it or lacks the package's dependencies.
 set -euo pipefail
 here=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)
 name=${1:?a package} folder=${2:?a folder}
@@ -21,7 +20,7 @@ package=$(compgen -G "$folder/packages/${name}_*.deb") ||
   skip "there is no package (the test packages makes it)"
 if dpkg-query -W "$name" >/dev/null 2>&1; then skip "$name is installed on this machine"; fi
 
-# What is mounted from here on is gone when this script ends.
+# Later mounts are gone when this script ends.
 if [[ -z ${OWN_MOUNTS:-} ]]; then
   unshare --mount true || skip "nothing can be mounted here"
   OWN_MOUNTS=yes exec unshare --mount "${BASH_SOURCE[0]}" "$name" "$folder"
@@ -36,12 +35,12 @@ mount -t proc none "$copy/root/proc"
 mount --bind /dev "$copy/root/dev"
 in_copy() { chroot "$copy/root" env LC_ALL=C DEBIAN_FRONTEND=noninteractive "$@"; }
 
-# use_modelling, use_linuxcnc: something small that needs the libraries too.
+# use_modelling, use_linuxcnc: a small task that also needs the libraries.
 use_modelling() {
   cp "$here/../../config/examples/structure.toml" "$copy/root/tried.toml"
   in_copy thermocomp-modelling structure /tried.toml -o /tried.model >/dev/null &&
     grep -q '^matrix_um_per_K' "$copy/root/tried.model" || return
-  # And what it loads only where a mesh is read.
+  # Loads the module that reads meshes.
   cp "$here/../integration/cli/cube/cube.msh" "$copy/root/tried.msh"
   sed 's/cube\.msh/tried.msh/' "$here/../integration/cli/cube/cube.toml" > "$copy/root/tried.toml"
   in_copy thermocomp-modelling structure /tried.toml -o /tried.model >/dev/null &&
@@ -67,7 +66,7 @@ rm -f "$copy"/root/tried.*
 left=$(cd "$copy/changed" && find . -mindepth 1 | while read -r path; do
   case $path in
     ./var/lib/dpkg/* | ./var/log/* | ./var/cache/*) ;;  # of dpkg itself and its triggers
-    ./etc/fltk* | ./root/.fltk*) ;;  # FLTK writes them when Gmsh asks it for its options
+    ./etc/fltk* | ./root/.fltk*) ;;  # written by FLTK when Gmsh reads its options
     *) [[ -d $path && -d /$path ]] || echo "$path" ;;
   esac
 done)

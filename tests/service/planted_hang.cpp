@@ -1,6 +1,6 @@
-// Preloaded into thermocompd by the service tests: the installed program, with a hang planted that
-// a file in its state folder sets off. A hang happens once; the file is gone then.
-#undef _FORTIFY_SOURCE  // which brings a poll() of its own, where one is defined here
+// Preloaded into the installed thermocompd by the service tests: a hang triggered by a file in its
+// state folder. A hang happens once and removes the file.
+#undef _FORTIFY_SOURCE  // its poll() would be defined here
 #include <atomic>
 #include <cstdlib>
 #include <ctime>
@@ -37,7 +37,7 @@ Function next(const char* name) {
 
 extern "C" {
 
-// The cycle's sleep to the next point of its grid; nobody else in the daemon sleeps to a time.
+// The cycle's sleep to the next cycle; no other thread of the daemon sleeps to an absolute time.
 int clock_nanosleep(clockid_t clock, int flags, const timespec* time, timespec* left) {
   static const auto real = next<decltype(&clock_nanosleep)>("clock_nanosleep");
   if (clock == CLOCK_MONOTONIC && (flags & TIMER_ABSTIME) != 0) {

@@ -1,13 +1,13 @@
 #!/bin/bash
 # run_in_systemd.sh nspawn|uml ROOTFS FILES COMMAND...
 #
-# Boots systemd on a throw-away overlay of ROOTFS and runs COMMAND in it as root, as the last thing of
-# the boot, with the folder FILES as /opt/service-test and as its working directory. nspawn: a
-# container, with the host's kernel. uml: User Mode Linux, a kernel that has CAN; the modules it needs
-# and the interface vcan0 are up. What COMMAND prints is printed at its end.
+# Boots systemd on a temporary overlay of ROOTFS and runs COMMAND in it as root, last in the boot, with the
+# folder FILES as /opt/service-test and working directory. nspawn: a container with the host's kernel. uml:
+# User Mode Linux, a kernel with CAN; its modules are loaded and the interface vcan0 is up. COMMAND's output
+# is printed at its end.
 #
-# Exit status: COMMAND's; 124 after SERVICE_TEST_S seconds (default 300); 125 when systemd did not come
-# up. Needs root.
+# Exit status: COMMAND's; 124 after SERVICE_TEST_S seconds (default 300); 125 if systemd did not come up.
+# Needs root.
 # shellcheck disable=SC2015,SC2317  # fail never returns; functions are called by name
 set -u
 kind=${1:?nspawn or uml}
@@ -22,7 +22,7 @@ fail() {
 }
 
 if [[ ${SERVICE_TEST_NAMESPACE:-} != own ]]; then
-  # Mounts, and what nspawn does with cgroups, are nobody else's business and end with us.
+  # Own namespace: mounts and cgroups of nspawn end with this script.
   export SERVICE_TEST_NAMESPACE=own
   exec unshare --mount --propagation private -- "$0" "$kind" "$rootfs" "$files" "$@"
 fi
@@ -56,7 +56,7 @@ mkdir -p "$place" && cp -a "$files/." "$place/" || fail "the files cannot be cop
       insmod "/opt/service-test/modules/$module.ko"
     done
     sysctl -q kernel.sched_rt_runtime_us=-1
-    # On the host'"'"'s files everything new belongs to root.
+    # On hostfs every new file belongs to root.
     mount -t tmpfs tmpfs /mnt && cp -a /var/lib/. /mnt/ && mount --bind /mnt /var/lib
     ip link add dev vcan0 type vcan && ip link set vcan0 up'
   fi
@@ -81,12 +81,12 @@ mkdir -p "$root/etc/systemd/system/multi-user.target.wants"
 ln -s ../service-test.service "$root/etc/systemd/system/multi-user.target.wants/"
 
 boot_nspawn() {
-  # A tree of its own for the guest, whatever the host's cgroups look like.
+  # A cgroup tree for the guest, independent of the host's.
   umount -R /sys/fs/cgroup 2>/dev/null
   mount -t cgroup2 cgroup2 /sys/fs/cgroup || fail "no cgroup2"
   cgroup=/sys/fs/cgroup/thermocomp-service-$$
   mkdir "$cgroup" && echo $$ > "$cgroup/cgroup.procs" || fail "no cgroup"
-  # SCHED_FIFO and locked memory need capabilities that a container does not have by itself.
+  # SCHED_FIFO and locked memory need capabilities that containers lack by default.
   timeout --foreground -k 5 "$limit_s" systemd-nspawn --quiet --register=no --keep-unit \
     --machine="service-test-$$" --directory="$root" --private-network \
     --capability=CAP_IPC_LOCK,CAP_SYS_NICE --boot systemd.show_status=0 \

@@ -1,9 +1,9 @@
 #!/bin/bash
 # run_tests.sh nspawn|uml FOLDER PLANTED_HANG [PYTEST_OPTION...]
 #
-# The tests of guest/ in a booted systemd, on the packages that build_packages.sh left in
-# FOLDER/packages and the root file system of build_rootfs.sh in FOLDER. Exit status 77, with the
-# reason, where this machine cannot.
+# Runs the tests of guest/ in a booted systemd, with the packages of build_packages.sh in FOLDER/packages
+# and the root file system of build_rootfs.sh in FOLDER. Exit status 77, with the reason, if this machine
+# cannot do it.
 set -euo pipefail
 kind=${1:?nspawn or uml} folder=$(cd -- "${2:?a folder}" && pwd) planted_hang=${3:?planted_hang.so}
 shift 3
@@ -28,7 +28,7 @@ esac
 
 files=$(mktemp -d)
 trap 'rm -rf "$files"' EXIT
-chmod 755 "$files"  # the service reads the planted hang
+chmod 755 "$files"  # the service must read the planted hang
 mkdir "$files/packages" "$files/guest"
 cp "$folder"/packages/*.deb "$files/packages/"
 rm -f "$files"/packages/*-dbgsym_*

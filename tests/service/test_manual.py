@@ -1,4 +1,4 @@
-"""The manual pages and the completion that the build made say what --help says."""
+"""The built manual pages and completion agree with --help."""
 
 import os
 import pathlib
@@ -23,12 +23,12 @@ PROGRAMS = {"thermocomp": "thermocomp.1", "thermocompd": "thermocompd.8",
             "thermocomp-gateway": "thermocomp-gateway.1",
             "thermocomp-fleet": "thermocomp-fleet.1",
             "thermocomp-fleet-page": "thermocomp-fleet-page.1", "thermocomp-uplink": "thermocomp-uplink.1"}
-# Carried out by a program of its own, which has the help.
+# Executed by another program, which has the help.
 MODELLING = {"structure", "place", "tiebar", "plan", "series", "group", "fit", "diagnose", "inspect"}
 
 
 def shown(page):
-    """The page as a reader sees it, without bold and italic; no warning of the formatter."""
+    """The page as displayed, without bold and italic; the formatter must not warn."""
     done = subprocess.run(["man", "--warnings", "-Tutf8", "-l", str(MANUAL / page)],
                           capture_output=True, text=True, timeout=60,
                           env={"PATH": os.environ["PATH"], "LC_ALL": "C.UTF-8", "MANWIDTH": "100",
@@ -92,7 +92,7 @@ def test_the_configurations_page_is_the_commented_example():
 
 
 class Shell:
-    """A bash with the completion, at a terminal, as a person has it."""
+    """A bash with the completion on a terminal, as for a user."""
 
     def __init__(self, folder):
         self.master, slave = pty.openpty()
@@ -105,7 +105,7 @@ class Shell:
                  "bind 'set enable-bracketed-paste off'; bind 'set completion-query-items 0'\n")
         for program in PROGRAMS:
             self.say(f"source {MANUAL / program}.bash\n")
-        # The prompt behind it: from then on the terminal no longer echoes what is typed.
+        # The prompt behind it: from then on the terminal no longer echoes typed text.
         self.until("echo rea''dy\n", "ready\r\n$ ")
 
     def say(self, text):
@@ -122,7 +122,7 @@ class Shell:
         return seen
 
     def completed(self, line):
-        """The line after TAB: what echo was given. The program is not run."""
+        """The line after TAB, as received by echo. The program is not run."""
         # TAB, then to the beginning of the line and `: ` before it, then end it and echo it.
         seen = self.until(f"{line}\t\t\x01echo '<' \x05 '>'\n", ">\r\n")
         return seen

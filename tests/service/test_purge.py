@@ -1,4 +1,4 @@
-"""What a purge takes away, package by package, in a folder that stands for the root (DPKG_ROOT)."""
+"""Files removed by a purge, per package, in a folder used as root (DPKG_ROOT)."""
 
 import os
 import pathlib
@@ -25,7 +25,7 @@ def root(tmp_path):
 
 
 def after(package, action, root):
-    """Runs the package's script as dpkg does on a root elsewhere."""
+    """Runs the package's script as dpkg does with another root."""
     subprocess.run(["sh", DEBIAN / f"{package}.postrm", action], check=True, timeout=60,
                    env={"PATH": os.environ["PATH"], "DPKG_ROOT": str(root)})
     return sorted(str(path.relative_to(root)) for path in root.rglob("*") if path.is_file())

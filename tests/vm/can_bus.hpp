@@ -1,4 +1,4 @@
-// Other people's CAN: raw frames, can-utils and python-can, for the tests on real interfaces.
+// Independent CAN access for the tests on real interfaces: raw frames, can-utils and python-can.
 #pragma once
 
 #include <chrono>
@@ -23,12 +23,12 @@
 
 namespace thermocomp::test {
 
-/// Runs a shell command. @return whether it succeeded
+/// Runs a shell command. @return true if it succeeded
 inline bool shell(const std::string& command) {
   return std::system(command.c_str()) == 0;
 }
 
-/// A program in the background, ended with the object.
+/// A background program that ends with the object.
 class Background {
  public:
   explicit Background(const std::string& command) : pid_(::fork()) {
@@ -49,7 +49,7 @@ class Background {
   pid_t pid_;
 };
 
-/// Frames put on an interface with nothing of the project in between.
+/// Sends frames without any code of the project.
 class RawSender {
  public:
   explicit RawSender(const std::string& interface)
@@ -65,7 +65,7 @@ class RawSender {
   RawSender& operator=(const RawSender&) = delete;
   ~RawSender() { ::close(socket_); }
 
-  /// @param id  with CAN_EFF_FLAG or CAN_RTR_FLAG where wanted
+  /// @param id  may include CAN_EFF_FLAG or CAN_RTR_FLAG
   bool send(std::uint32_t id, std::initializer_list<int> bytes) {
     can_frame frame{};
     frame.can_id = id;
@@ -77,7 +77,7 @@ class RawSender {
   int socket_;
 };
 
-/// What passes on an interface, classic frames alone.
+/// Received classic frames of an interface.
 class RawReceiver {
  public:
   explicit RawReceiver(const std::string& interface)
@@ -104,7 +104,7 @@ class RawReceiver {
   int socket_;
 };
 
-/// candump of one interface into a file that goes with the object.
+/// candump of one interface into a file that is removed with the object.
 class Candump {
  public:
   explicit Candump(const std::string& what)
@@ -124,7 +124,7 @@ class Candump {
   [[nodiscard]] bool shows(const std::string& part) const {
     return text().find(part) != std::string::npos;
   }
-  /// A frame that it would show is sent; a program takes its time to begin.
+  /// Sends a frame and looks for it in the output, since candump takes time to start.
   [[nodiscard]] bool listens(RawSender& bus, std::uint32_t id) const {
     return bus.send(id, {0x5A, 0xA5}) && shows("5A A5");
   }

@@ -33,7 +33,7 @@ CanSignal place(std::uint32_t id, int start, int length, double scale = 1.0) {
   return signal;
 }
 
-/// Two axes, valid bits and heartbeat in 0x100; applied in 0x200; spindle speed in 0x201.
+/// Two axes, valid bits and heartbeat in 0x100; read-back in 0x200; spindle speed in 0x201.
 CanControllerConfig two_axes(const std::string& interface) {
   CanControllerConfig config;
   config.name = "cnc";
@@ -50,7 +50,7 @@ CanControllerConfig two_axes(const std::string& interface) {
   return config;
 }
 
-/// The controller's side: tells every 20 ms what it applies and its spindle speed.
+/// The controller: reports its applied offsets and spindle speed every 20 ms.
 class Machine {
  public:
   explicit Machine(const std::string& interface) : bus_(interface), thread_([this] { run(); }) {}
@@ -60,7 +60,7 @@ class Machine {
     stopping = true;
     thread_.join();
   }
-  std::atomic<int> applied_counts{0};  ///< of the first axis, 0.01 um
+  std::atomic<int> applied_counts{0};  ///< first axis, 0.01 um
   std::atomic<bool> tells_applied{true};
   std::atomic<bool> tells_speed{true};
   std::atomic<bool> stopping{false};
@@ -94,7 +94,7 @@ TEST_CASE("candump sees the offsets, several signals in one frame", "[vm][contro
   REQUIRE(eventually([&] { return dump.shows("vcan0  100   [7]  FF FF 44 FD 01"); }));
   const std::uint64_t writes = link.health().writes;
   REQUIRE(eventually([&] { return link.health().writes > writes + 5; }));
-  CHECK_FALSE(dump.shows("88 13"));  // 50 um was never on the bus
+  CHECK_FALSE(dump.shows("88 13"));  // 50 um was never sent
 }
 
 TEST_CASE("what has left the CAN interface is written, and what waits in its queue is not",
@@ -156,13 +156,13 @@ TEST_CASE("a silent CAN controller is offline, and its return is a new epoch", "
   REQUIRE(eventually([&] { return link.health().writes > 3; }));
   const std::uint32_t epoch = cycle.state().link_epoch;
   cycle.fixed_epoch = epoch;
-  machine.tells_applied = false;  // the speed goes on
+  machine.tells_applied = false;  // the speed frames continue
   REQUIRE(eventually([&] { return !cycle.state().online; }));
   const std::string silent = "the controller is silent";
   REQUIRE(eventually([&] { return link.health().last_error == silent; }));
   const std::uint64_t frames = link.health().reads;
   REQUIRE(eventually([&] { return link.health().reads > frames + 5; }));
-  CHECK(link.health().last_error == silent);  // other frames of it are no reason to forget that
+  CHECK(link.health().last_error == silent);  // its other frames do not clear that error
   machine.applied_counts = 33;
   machine.tells_applied = true;
   REQUIRE(eventually([&] { return cycle.state().online; }));
@@ -172,7 +172,7 @@ TEST_CASE("a silent CAN controller is offline, and its return is a new epoch", "
   const std::uint64_t writes = link.health().writes;
   const std::uint64_t reads = link.health().reads;
   REQUIRE(eventually([&] { return link.health().reads > reads + 20; }));
-  CHECK(link.health().writes == writes);  // the cycle's commands are of the old epoch
+  CHECK(link.health().writes == writes);  // the cycle's commands belong to the old epoch
   cycle.fixed_epoch = 0;
   CHECK(eventually([&] { return link.health().writes > writes; }));
 }
@@ -186,7 +186,7 @@ TEST_CASE("a bus-off that is over before the link looks takes a new epoch", "[vm
   for (std::uint64_t round = 1; round <= 20; ++round) {
     const std::uint32_t epoch = cycle.state().link_epoch;
     REQUIRE(bus.send(CAN_ERR_FLAG | CAN_ERR_BUSOFF, {0, 0, 0, 0, 0, 0, 0, 0}));
-    REQUIRE(bus.send(0x201, {0xE0, 0x2E}));  // the next frame ends it
+    REQUIRE(bus.send(0x201, {0xE0, 0x2E}));  // ended by the next frame
     REQUIRE(eventually([&] { return cycle.state().link_epoch > epoch; }));
     REQUIRE(eventually([&] { return cycle.state().online; }));
     CHECK(link.health().bus_offs == round);
@@ -195,7 +195,7 @@ TEST_CASE("a bus-off that is over before the link looks takes a new epoch", "[vm
 
 TEST_CASE("a controller made with python-can takes offsets and shows them applied",
           "[vm][controller]") {
-  // It applies what 0x100 brings, tells it in 0x200, and its spindle stands still.
+  // Applies 0x100 and reports it in 0x200; its spindle is at rest.
   const Background peer(
       "/usr/bin/python3 -c \"\n"
       "import can\n"
@@ -246,7 +246,7 @@ namespace {
 constexpr std::uint32_t near_frame = 0x110, far_frame = 0x111, bits_frame = 0x112;
 constexpr std::uint32_t near_shown = 0x210, far_shown = 0x211;
 
-/// One axis with two nodes in two frames, the number in the third byte of each.
+/// One axis with two nodes in two frames, with the set's number in the third byte.
 CanControllerConfig two_nodes(const std::string& interface) {
   const auto number = [](std::uint32_t id) {
     CanSignal signal = place(id, 16, 8);
@@ -273,8 +273,8 @@ CanControllerConfig two_nodes(const std::string& interface) {
   return config;
 }
 
-/// A controller of its own: takes sets over that are whole, and shows the one in effect. What is
-/// asked of it here is kept apart from what the link is built from.
+/// An independent controller: applies complete sets and reports the active one. Its parameters are
+/// separate from the link's configuration.
 class Interpolator {
  public:
   explicit Interpolator(const std::string& interface)
@@ -293,12 +293,12 @@ class Interpolator {
   std::atomic<int> number_in_effect{0};
   std::atomic<int> near_counts{0};
   std::atomic<int> far_counts{0};
-  std::atomic<int> far_shown_behind{0};  ///< its frame shows a set that is older by so many
+  std::atomic<int> far_shown_behind{0};  ///< its frame reports an older set, by this number
   std::atomic<bool> tells{true};
   std::atomic<bool> takes_over{true};
   std::atomic<int> valid{-1};
-  std::atomic<int> sets{0};    ///< taken over
-  std::atomic<int> reused{0};  ///< a number came with another content
+  std::atomic<int> sets{0};    ///< applied
+  std::atomic<int> reused{0};  ///< a number was repeated with other content
   std::atomic<bool> stopping{false};
 
  private:
@@ -351,7 +351,7 @@ TEST_CASE("a set goes in several frames with one number that counts up",
   Cycle cycle(link);
   cycle.want(0, 1.0);
   cycle.want(1, -2.0);
-  REQUIRE(eventually([&] { return machine.sets > 300; }));  // past all 256 numbers
+  REQUIRE(eventually([&] { return machine.sets > 300; }));  // more than all 256 numbers
   CHECK(machine.near_counts == 100);
   CHECK(machine.far_counts == -200);
   CHECK(machine.valid == 1);
@@ -412,7 +412,7 @@ TEST_CASE("while one node must stand, the set stays and its valid bit is 0",
   REQUIRE(eventually([&] { return link.health().writes > writes + 5; }));
   CHECK(machine.far_counts == 200);
   CHECK(machine.number_in_effect == number);
-  CHECK(machine.sets <= sets + 1);  // not even the same one again
+  CHECK(machine.sets <= sets + 1);  // not even the same set again
   cycle.want(0, 1.0);
   REQUIRE(eventually([&] { return machine.far_counts == 250; }));
   CHECK(machine.reused == 0);

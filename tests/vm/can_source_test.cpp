@@ -84,7 +84,7 @@ TEST_CASE("FD and classic frames, pages and counters are read on one interface",
   REQUIRE(shell("cansend vcan0 182##003" + zeros + "FF000000000000"));
   REQUIRE(shell("cansend vcan0 182##002" + zeros + "E2000000000000"));
   REQUIRE(bus.becomes(1, 22.6));
-  // The counter stands still: neither the value nor its time moves.
+  // The counter is unchanged: neither value nor time changes.
   REQUIRE(shell("cansend vcan0 181#FF00000000000001"));
   REQUIRE(eventually([&] {
     return bus.source.health().units[0].last_error == "the counter in the frame stands still";
@@ -104,7 +104,7 @@ TEST_CASE("a J1939 group is read from any sender, and from none while two send i
   group.id = 0x18FF31FE;
   group.id_mask = 0x03FFFF00;
   Running bus(config);
-  REQUIRE(shell("cansend vcan0 14FF3127#012C"));  // of another priority as well
+  REQUIRE(shell("cansend vcan0 14FF3127#012C"));  // also with another priority
   REQUIRE(bus.becomes(3, 30.0));
   CHECK(bus.source.health().units[1].last_error.empty());
   REQUIRE(shell("cansend vcan0 18FF3227#0190"));  // another group
@@ -130,8 +130,8 @@ TEST_CASE("thermocouples are read from frames of cansend and of a raw socket", "
   REQUIRE(bus.becomes(1, 22.6));
   CHECK(bus.newest(0).fault == Fault::open_circuit);
   CHECK(std::isnan(bus.newest(0).temp_degC));
-  CHECK(bus.newest(2).fault == Fault::never_read);  // another bus' sensor is left alone
-  // The readings of a frame are there before it is counted.
+  CHECK(bus.newest(2).fault == Fault::never_read);  // another bus's sensor is unchanged
+  // A frame's readings are published before it is counted.
   CHECK(eventually([&] { return bus.source.health().units[0].answers == 2; }));
   const BusHealth health = bus.source.health();
   CHECK(health.kind == "can");
@@ -147,7 +147,7 @@ TEST_CASE("a reading carries the time of its frame and keeps it until the next",
   const nanoseconds after = monotonic_now();
   REQUIRE(bus.becomes(0, 1.0));
   const nanoseconds taken_at = bus.newest(0).taken_at;
-  // The stamp is made while send() runs; the two clocks are read one after the other.
+  // The time stamp is made during send(); the two clocks are read one after the other.
   CHECK(taken_at >= before - 500ms);
   CHECK(taken_at <= after + 500ms);
   REQUIRE(sender.send(0x18FF1234 | CAN_EFF_FLAG, {0, 50}));
@@ -177,7 +177,7 @@ TEST_CASE("the kernel drops frames nobody asked for", "[vm][source]") {
   REQUIRE(sender.send(0x123 | CAN_RTR_FLAG, {}));   // a request, no data
   REQUIRE(sender.send(0x1ABCDEF | CAN_EFF_FLAG, {2}));
   REQUIRE(sender.send(0x123, {3}));
-  const auto frames = socket.receive();  // the socket itself does not look at identifiers
+  const auto frames = socket.receive();  // the socket itself does not filter identifiers
   REQUIRE(frames.size() == 2);
   CHECK(frames[0].id == CanId{0x1ABCDEF, true});
   CHECK(frames[1].id == CanId{0x123, false});
@@ -201,7 +201,7 @@ TEST_CASE("frames lost because nobody read them are counted", "[vm][source]") {
   CanSocket socket("vcan0", {{0x300, false}});
   REQUIRE(socket.open());
   RawSender sender("vcan0");
-  constexpr int sent = 20'000;  // some 4 MB of the kernel's memory hold a third of them
+  constexpr int sent = 20'000;  // the kernel's 4 MB buffer holds a third of them
   for (int i = 0; i < sent; ++i) {
     if (!sender.send(0x300, {i % 256})) FAIL("frame " << i << " could not be sent");
   }
@@ -210,7 +210,7 @@ TEST_CASE("frames lost because nobody read them are counted", "[vm][source]") {
     received += frames.size();
   }
   REQUIRE(received < sent);
-  REQUIRE(sender.send(0x300, {1}));  // the kernel tells with the next frame
+  REQUIRE(sender.send(0x300, {1}));  // reported by the kernel with the next frame
   CHECK(socket.receive().size() == 1);
   CHECK(received + socket.errors().dropped == sent);
 }
@@ -235,7 +235,7 @@ TEST_CASE("the error state of an interface is reported, with the time it was ent
   told("20000004#0040000000000000", "active");
   CHECK(bus.source.health().last_error.empty());
   const nanoseconds since = bus.source.health().state_since;
-  REQUIRE(shell("cansend vcan0 20000004#0001000000000000"));  // an overflow is no change of state
+  REQUIRE(shell("cansend vcan0 20000004#0001000000000000"));  // an overflow is not a state
   REQUIRE(eventually([&] { return bus.source.health().error_frames == 5; }));
   CHECK(bus.source.health().state == "active");
   CHECK(bus.source.health().state_since == since);
@@ -245,7 +245,7 @@ TEST_CASE("the error state of an interface is reported, with the time it was ent
 
 TEST_CASE("a short frame is a fault of its readings", "[vm][source]") {
   Running bus(two_nodes("vcan0"));
-  REQUIRE(shell("cansend vcan0 181#0A0014"));  // three bytes: sensor 0 is whole, sensor 1 is not
+  REQUIRE(shell("cansend vcan0 181#0A0014"));  // three bytes: sensor 0 is complete, sensor 1 is not
   REQUIRE(bus.becomes(0, 1.0));
   CHECK(bus.newest(1).fault == Fault::bad_frame);
 }

@@ -1,7 +1,7 @@
 #!/bin/busybox sh
 # shellcheck shell=dash
-# First process under QEMU, in memory: loads the modules, makes the host's own files the root
-# (through 9p) and goes on with guest_init.sh. Not to be run by hand.
+# First process under QEMU, in memory: loads the modules, mounts the host's files as root (9p) and continues
+# with guest_init.sh. Not to be run by hand.
 /bin/busybox --install -s /bin
 export PATH=/bin
 mount -t proc proc /proc

@@ -1,8 +1,7 @@
 #!/bin/sh
-# First process of the guests that run_in_vm.sh boots, once the host's own files are the root: under
-# User Mode Linux from the beginning (hostfs), under QEMU after emulated_init.sh (9p). VM_RUN, from
-# the kernel's command line, is the folder that holds the file `command` and takes `stdout`,
-# `stderr`, `started` and `status`. Not to be run by hand.
+# First process of run_in_vm.sh's guests after mounting the host's files as root: at once under User Mode
+# Linux (hostfs), after emulated_init.sh under QEMU (9p). VM_RUN, from the kernel's command line, is the
+# folder with the file `command`, for `stdout`, `stderr`, `started` and `status`. Not to be run by hand.
 export PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin
 mountpoint -q /proc || mount -t proc proc /proc
 mountpoint -q /sys || mount -t sysfs sysfs /sys

@@ -1,7 +1,7 @@
 #!/bin/bash
-# run_both_suites.sh BIN: the tests of the CAN drivers and those of the daemon on CAN, with the
-# programs in the folder BIN. The second runs also where the first failed.
-# Exit status: 0 all passed; 77 (ctest: skipped) there are no such programs.
+# run_both_suites.sh BIN: the CAN driver tests and the daemon's tests on CAN, with the programs in BIN. The
+# second suite runs even if the first fails.
+# Exit status: 0 all passed; 77 (ctest: skipped) the programs do not exist.
 set -u
 here=$(cd "$(dirname "$0")" && pwd)
 bin=${1:?run_both_suites.sh needs the folder of the programs}
@@ -13,8 +13,8 @@ status=0
 "$bin/can_vm_tests" --durations yes || status=1
 echo "run_both_suites.sh: drivers $SECONDS s" >&2
 began=$SECONDS
-# The measured spindle run is for the fast builds: here it would only show how slow this guest is.
-# So are the simulated nodes, whose tests take many minutes here.
+# Fast builds only: the replayed spindle run, which would show the guest's slowness, and the simulated
+# nodes, which take many minutes here.
 "$here/daemon/run_tests.sh" "$bin" \
   -k "not model_of_every_row and not field_nodes and not can_presets" || status=1
 echo "run_both_suites.sh: daemon $((SECONDS - began)) s" >&2

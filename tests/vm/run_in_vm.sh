@@ -1,22 +1,20 @@
 #!/bin/bash
 # run_in_vm.sh [--emulated] [--timeout S] [--memory SIZE] [--times] COMMAND [ARGUMENT...]
 #
-# Runs COMMAND as root in a guest where AF_CAN exists and the virtual CAN interfaces vcan0 and vcan1
-# are up. The guest's root file system is the host's own, read-write; working directory and exported
-# variables are those of the caller; PATH is extended by the sbin folders. /run, /dev and /dev/shm
-# are the guest's own and empty: sockets and FIFOs belong there. TMPDIR is /dev/shm, because the
-# host's files seen from a guest lack what temporary files need (a file that is deleted while it is
-# open cannot be truncated). Any number can run at a time.
+# Runs COMMAND as root in a guest with AF_CAN and the virtual CAN interfaces vcan0 and vcan1 up.
+# The guest's root file system is the host's own, read-write; working directory and exported variables are
+# the caller's; PATH includes the sbin folders. /run, /dev and /dev/shm are the guest's own and empty: for
+# sockets and FIFOs. TMPDIR is /dev/shm, because host files seen from a guest cannot serve as temporary
+# files (an open file cannot be truncated after its deletion). Any number of guests can run at a time.
 #
-# The guest is User Mode Linux (package user-mode-linux): as fast as the host but for system calls,
-# one CPU; ASan and TSan programs abort in it. Processors with AMX need whole_registers.cpp, which is
-# built with c++ for each boot and preloaded. With --emulated it is Debian's kernel under QEMU
-# (qemu-system-x86, busybox-static, scripts/guest-kernel.sh): it computes some five times slower,
-# runs whatever the host runs, and has two more CAN interfaces, can0 and can1, which are emulated
-# PCI cards on one bus.
+# The guest is User Mode Linux (package user-mode-linux): as fast as the host except for system calls, one
+# CPU; ASan and TSan programs abort in it. Processors with AMX need whole_registers.cpp, which is compiled
+# at each boot and preloaded. With --emulated it is Debian's kernel under QEMU (qemu-system-x86,
+# busybox-static, scripts/guest-kernel.sh): some five times slower, runs all programs of the host, and has
+# two more CAN interfaces, can0 and can1, emulated PCI cards on one bus.
 #
-# Exit status: COMMAND's; 124 after S seconds (default 300); 125 when the guest did not come up or
-# died. --times prints to stderr how long the boot and the command took.
+# Exit status: COMMAND's; 124 after S seconds (default 300); 125 if the guest did not come up or died.
+# --times prints the duration of boot and command to stderr.
 set -u
 
 usage() { sed -n '2,4p' "$0" | cut -c3- >&2; exit 125; }
@@ -70,7 +68,7 @@ cp "$here/guest_init.sh" "$run/init" && chmod 755 "$run/init" || fail "no guest_
 {
   export -p
   echo 'export TMPDIR=/dev/shm'
-  # Emulated programs on a busy machine may take their time.
+  # Longer timeouts for emulated programs on a busy machine.
   if [ -n "$emulated" ]; then echo 'export THERMOCOMP_PATIENCE_S=120'; fi
   echo "export THERMOCOMP_VM=${emulated:-user-mode-linux}"
   printf 'cd %q || exit 125\n' "$PWD"
@@ -80,7 +78,7 @@ cp "$here/guest_init.sh" "$run/init" && chmod 755 "$run/init" || fail "no guest_
 } > "$run/command"
 
 boot_user_mode_linux() {
-  # The guest's memory is a sparse file; on a tmpfs it never meets a disk.
+  # The guest's memory is a sparse file; on a tmpfs it never reaches a disk.
   local memory_place=/dev/shm needed_kB free_kB
   needed_kB=$(($(numfmt --from=iec "$memory") / 1024))
   free_kB=$(df --output=avail /dev/shm 2> /dev/null | tail -n 1)
@@ -91,7 +89,7 @@ boot_user_mode_linux() {
     "uml_dir=$run" umid=vm "init=$run/init" "VM_RUN=$run"
 }
 
-# What the guest needs before it sees the host's files.
+# Files that the guest needs before it sees the host's.
 make_initramfs() {
   local tree=$run/initramfs version module
   version=$(cat "$kernel/version")
@@ -129,7 +127,7 @@ else
     fail "whole_registers.cpp could not be built"
 fi
 begin=$(date +%s.%N)
-# Not --foreground: the guest's processes are a group of their own, which ends as a whole.
+# Not --foreground: the guest's processes are a separate group, which ends as a whole.
 $boot < /dev/null > "$run/console" 2>&1 &
 vm_pid=$!
 wait "$vm_pid"

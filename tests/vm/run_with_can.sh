@@ -1,9 +1,9 @@
 #!/bin/bash
 # run_with_can.sh [--emulated] [--timeout S] COMMAND [ARGUMENT...]
 #
-# Runs COMMAND where AF_CAN works and vcan0 and vcan1 are up: on the host itself, in a network
-# namespace of its own, where the kernel can and we may; else in a guest (run_in_vm.sh, which says
-# what --emulated is for). Exit status: COMMAND's or run_in_vm.sh's.
+# Runs COMMAND with working AF_CAN and vcan0 and vcan1 up: on the host, in a network namespace, if kernel
+# and permissions allow; else in a guest (run_in_vm.sh, which explains --emulated). Exit status: COMMAND's
+# or run_in_vm.sh's.
 set -u
 
 here=$(cd "$(dirname "$0")" && pwd)

@@ -1,8 +1,8 @@
-/// Loaded before linux.uml, which keeps the first 2696 bytes of a process's vector registers:
-/// enough for AVX-512. Where the processor has tiles too (AMX), they are 11 kB, and the host's
-/// kernel hands out the first bytes of them but takes nothing less than all back: the guest dies
-/// before its first program. Here the host gets all: what the guest kept, and the rest as it is. No
-/// program of the guest has tiles, since nobody asks the host for them.
+/// Preloaded into linux.uml, which saves the first 2696 bytes of a process's vector registers,
+/// enough for AVX-512. With AMX tiles they are 11 kB, and the host's kernel gives out the first
+/// bytes but accepts only all of them: the guest dies before its first program. This library
+/// restores all bytes: those saved by the guest, the rest unchanged. No program of the guest has
+/// tiles, since none requests them from the host.
 #include <array>
 #include <cerrno>
 #include <cstdarg>

@@ -19,7 +19,7 @@ def pytest_runtest_makereport(item, call):
 
 @pytest.fixture(scope="session")
 def machine():
-    """Module and controller for all tests; the service is installed by the first one."""
+    """Module and controller for all tests; the first test installs the service."""
     made = service.Machine()
     yield made
     made.close()
@@ -27,7 +27,7 @@ def machine():
 
 @pytest.fixture
 def running(machine):
-    """The service, compensating, with an offset of 9 um that has settled."""
+    """The compensating service with a settled offset of 9 um."""
     service.write_config(machine.config())
     if not service.active():
         service.start()

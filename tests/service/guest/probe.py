@@ -1,4 +1,4 @@
-"""Tries what a program in the service's sandbox may do; the result goes to its state folder."""
+"""Tries operations in the service's sandbox; writes the results to its state folder."""
 
 import ctypes
 import json
@@ -11,7 +11,7 @@ results = {}
 
 
 def attempt(name, action):
-    """An empty text: it could be done."""
+    """Notes the error; an empty text: the operation succeeded."""
     try:
         action()
         results[name] = ""

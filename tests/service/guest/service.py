@@ -33,13 +33,13 @@ def run(*command, check=True, **more):
 
 
 def package(name):
-    """The file of a package that was built."""
+    """The file of a built package."""
     found, = FILES.glob(f"packages/{name}_*.deb")
     return found
 
 
 def show(*names):
-    """Properties of the unit; one name: its value."""
+    """Properties of the unit; a single name: its value."""
     text = run("systemctl", "show", UNIT, "-p", ",".join(names)).stdout
     values = dict(line.split("=", 1) for line in text.splitlines() if "=" in line)
     return values[names[0]] if len(names) == 1 else values
@@ -63,7 +63,7 @@ def journal(since=None):
 
 
 def drop_in(name, text):
-    """A site's own lines for the unit; None takes them away."""
+    """A drop-in for the unit; None removes it."""
     DROP_INS.mkdir(exist_ok=True)
     file = DROP_INS / f"{name}.conf"
     if text is None:
@@ -103,7 +103,7 @@ def wait_for_offset(offset_um):
         raise AssertionError(f"offset {offset_um} um was not reached: {status()}") from error
 
 
-# What every configuration here has, whatever its buses.
+# Common to all configurations, whatever their buses.
 COMMON = """format = 1
 [loop]
 rate_hz = 100
@@ -124,7 +124,7 @@ def write_config(text):
 
 
 class Machine:
-    """A thermocouple module and a controller on Modbus TCP, and the configuration for them."""
+    """A thermocouple module and a controller on Modbus TCP, with their configuration."""
 
     def __init__(self):
         self.module = PlainModule(free_port())
@@ -137,7 +137,7 @@ class Machine:
                                           f"rate_um_per_s_max = {SLEW_UM_PER_S}") + ENABLED + more)
 
     def warm_by(self, offset_um):
-        """The column is so much off the 20 degC of the reference that this is the offset."""
+        """Sets the column temperature for this offset, relative to the 20 degC of the reference."""
         self.module.show(20.0 - offset_um / 3.0, 20.0)
 
     def settled_at(self, offset_um):
@@ -161,8 +161,8 @@ def largest_step_um(orders):
 
 
 def assert_slewed(orders, slack_s=0.5):
-    """No two orders are farther apart than the slew allows for the time between them; the slack is
-    for what a busy machine does between computing an offset and its arrival."""
+    """Consecutive offsets differ by at most the slew limit; the slack covers a busy machine's delay
+    between computing an offset and its arrival."""
     assert len(orders) > 1
     for (earlier_s, earlier), (later_s, later) in zip(orders, orders[1:]):
         allowed = SLEW_UM_PER_S * (later_s - earlier_s + slack_s) + 0.001
@@ -184,7 +184,7 @@ def process_fact(pid, name):
 
 
 def stop_and_forget():
-    """As after an installation: nothing runs, nothing is remembered, nothing is configured."""
+    """Like after an installation: nothing running, stored or configured."""
     run("systemctl", "stop", UNIT)
     run("systemctl", "reset-failed", UNIT, check=False)
     for file in STATE.iterdir():
@@ -198,7 +198,7 @@ def start(mode="compensating"):
 
 
 def committed_chunks():
-    """Each part of the history that is on disk, whole."""
+    """All history chunks on disk."""
     with contextlib.closing(sqlite3.connect(HISTORY)) as base:
         return set(base.execute("SELECT segment, number, through_cycle, count, records FROM chunk"))
 
@@ -213,7 +213,7 @@ def recorded_spans():
 
 
 def tree(*tops):
-    """Every path below, with what a change of it would change."""
+    """All paths below, with properties that change with them."""
     found = {}
     for top in tops:
         for folder, folders, files in os.walk(top):
@@ -245,7 +245,7 @@ scale = 0.01
 
 @contextlib.contextmanager
 def simulated_line():
-    """thermocomp-sim with a module of two thermocouples on a serial line; the line's device."""
+    """thermocomp-sim with a module of two thermocouples; returns the serial line's device."""
     (FILES / "run.csv").write_text("time_s,column_degC,spindle_degC\n0,21,22\n1,21,22\n")
     machine = FILES / "machine.toml"
     machine.write_text("format = 1\n" + LINE + "".join(
@@ -256,7 +256,7 @@ def simulated_line():
     try:
         ready = json.loads(process.stdout.readline())
         device = pathlib.Path(ready["paths"]["line"])
-        # As udev does with a serial adapter.
+        # Like udev with a serial adapter.
         os.chown(device.resolve(), 0, grp.getgrnam("dialout").gr_gid)
         device.resolve().chmod(0o660)
         yield device
@@ -266,7 +266,7 @@ def simulated_line():
 
 
 def serial_config(device):
-    """The sensors on that line, and nothing sent."""
+    """A configuration with the sensors on that line; no offsets are sent."""
     sensors = "".join(f'[[sensor]]\nname = "{name}"\ndevice = "module"\naddress = {i}\n'
                       for i, name in enumerate(("column", "spindle")))
     line = LINE.replace("/run/service-test-line", str(device)).replace(

@@ -1,4 +1,4 @@
-"""From nothing to a service that is ready."""
+"""From a bare system to a ready service."""
 
 import grp
 import pathlib
@@ -64,7 +64,7 @@ def test_ready_is_said_only_when_cycles_run(machine):
     run("systemctl", "start", "--no-block", UNIT)
     eventually(lambda: service.main_pid() and
                service.process_fact(service.main_pid(), "Threads") != "1", "its threads")
-    # The program runs, its cycle does not.
+    # The program runs, but its cycle does not.
     until = time.monotonic() + 2.0
     while time.monotonic() < until:
         assert show("ActiveState") == "activating"
@@ -100,7 +100,7 @@ def test_the_cycle_is_real_time_inside_the_sandbox(running):
     assert int(service.process_fact(pid, "VmLck").split()[0]) > 0
     assert service.process_fact(pid, "NoNewPrivs") == "1"
     assert service.process_fact(pid, "Seccomp") == "2"
-    # CAP_IPC_LOCK (14) and CAP_SYS_NICE (23), no other.
+    # Only CAP_IPC_LOCK (14) and CAP_SYS_NICE (23).
     assert int(service.process_fact(pid, "CapEff"), 16) == 1 << 14 | 1 << 23
     assert service.status()["mode"] == "compensating"
 

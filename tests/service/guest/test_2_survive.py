@@ -1,4 +1,4 @@
-"""What goes wrong while it runs, as systemd and the controller see it."""
+"""Failures at run time, as seen by systemd and the controller."""
 
 import os
 import signal
@@ -55,7 +55,7 @@ def test_a_restart_is_bumpless(running):
     written = record.stat().st_ino
     run("systemctl", "restart", UNIT)
     assert service.main_pid() != pid
-    assert record.stat().st_ino == written  # what was sent last outlives the service
+    assert record.stat().st_ino == written  # the last-sent record survives the service
     service.wait_for_mode("compensating")
     eventually(lambda: len(running.orders_since(orders)) > 20, "orders")
     assert stayed_at(running.orders_since(orders), 9.0)
@@ -85,7 +85,7 @@ def test_kill_9_leaves_the_operators_switch_as_it_was(running):
 
 
 def test_a_stop_ramps_to_zero_where_that_is_configured(running):
-    # Longer than TimeoutStopSec: the daemon asks for the time it needs.
+    # Longer than TimeoutStopSec: the daemon requests the time it needs.
     service.write_config(running.config('on_stop = "ramp_to_zero"\n'))
     run("systemctl", "reload", UNIT)
     running.settled_at(36.0)
@@ -109,7 +109,7 @@ def test_the_simulated_machine_over_a_serial_line_is_served(running):
             now = service.start("dry_run")
             assert [each["temp_degC"] for each in now["inputs"]] == [21.0, 22.0]
     finally:
-        # The reference was that machine's.
+        # The reference belonged to that machine.
         service.stop_and_forget()
         service.write_config(running.config())
         running.warm_by(0.0)

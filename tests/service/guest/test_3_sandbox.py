@@ -1,4 +1,4 @@
-"""What the service may do, and what it may not."""
+"""Allowed and forbidden operations of the service."""
 
 import json
 import pathlib
@@ -10,7 +10,7 @@ PROBE = pathlib.Path("/opt/service-test/guest/probe.py")
 
 
 def probe():
-    """What can be done in the unit's sandbox, tried by a program that starts before the daemon."""
+    """Possible operations in the unit's sandbox, tried by a program started before the daemon."""
     service.drop_in("probe", f"[Service]\nExecStartPre=/usr/bin/python3 {PROBE}\n")
     run("systemctl", "restart", UNIT)
     service.drop_in("probe", None)

@@ -58,7 +58,7 @@ def config_of(machine, shown):
 
 @pytest.fixture(params=["applied is read back", "nothing can be read back"])
 def known_machine(request, running):
-    """Without a read-back only last-sent record and state file know where the axis is."""
+    """Without a read-back only last-sent record and state file hold the axis's offset."""
     shown = request.param == "applied is read back"
     service.drop_in("planted", None)
     service.write_config(config_of(running, shown))
@@ -75,7 +75,7 @@ def known_machine(request, running):
 
 
 def change_over(machine, package, from_um, to_um):
-    """Installs the package while the axis is on its way; prints how it went for the controller."""
+    """Installs the package while the axis moves; prints the effect on the controller."""
     pid, began, chunks = service.main_pid(), machine.count(), service.committed_chunks()
     kept = [CONFIG.read_bytes(), HISTORY.stat().st_ino,
             [each["reference_degC"] for each in service.status()["inputs"]]]
@@ -94,10 +94,10 @@ def change_over(machine, package, from_um, to_um):
           f"{orders[held + 1][1]:.3f} um; largest step {max(steps):.3f} um, at most "
           f"{max(step - service.SLEW_UM_PER_S * pause for step, pause in zip(steps, pauses)):.3f}"
           " um more than slew x time")
-    # 0.1 s: between an offset's computation and its arrival the guest does something else.
+    # 0.1 s: possible delay of the guest between an offset's computation and its arrival.
     service.assert_slewed(orders, slack_s=0.1)
     assert min(from_um, to_um) < orders[held][1] < max(from_um, to_um)
-    # The longest pause may be the guest's own, within which the axis was on its way.
+    # The longest pause may be the guest's own, during which the axis moved.
     assert steps[held] < service.SLEW_UM_PER_S * pauses[held] + 0.05, "it goes on from where the one before stopped"
 
     eventually(lambda: service.recorded_spans()[-1][1] > orders[-1][0], "all of it is committed")
@@ -159,7 +159,7 @@ def test_a_removal_stops_it_and_keeps_configuration_history_and_reference(runnin
     assert not service.SOCKET.exists()
     assert CONFIG.exists() and HISTORY.exists() and (STATE / "state.json").exists()
     assert running.controller.applied_um() == pytest.approx(9.0, abs=0.01)
-    # Installed again it goes on with what it knew, once it is started.
+    # Installed and started again, it continues with its stored state.
     run("dpkg", "--force-confold", "-i", service.package("thermocomp"))
     assert show("ActiveState") == "inactive"
     service.start()

@@ -1,4 +1,4 @@
-"""The gateway's package and unit beside the daemon's: starts, answers, sandbox, what a purge leaves."""
+"""The gateway's package and unit beside the daemon's: start, answers, sandbox, purge."""
 
 import contextlib
 import http.client
@@ -14,7 +14,7 @@ from service import CONFIG, run
 UNIT = "thermocomp-gateway.service"
 SETTINGS = CONFIG.parent / "gateway.toml"
 PASSWORDS = CONFIG.parent / "gateway.passwords"
-PORT = 8420  # of the page of a store too
+PORT = 8420  # also of a store's page
 GATEWAY = 'format = 1\nmachine = "mill_3"\n[http]\n'
 EXPOSURE_MAX = 1.5
 
@@ -26,7 +26,7 @@ def show(*names):
 
 
 def ask(path):
-    """(status, text); nothing while nobody listens."""
+    """(status, text); None if nothing listens."""
     with contextlib.suppress(OSError), contextlib.closing(
             http.client.HTTPConnection("127.0.0.1", PORT, timeout=20)) as link:
         link.request("GET", path)
@@ -66,7 +66,7 @@ def test_started_it_answers_with_what_the_daemon_says(machine):
     assert abs(metric("thermocomp_axis_offset_meters") - 9e-6) < 1e-8
     status, page = ask("/")
     assert status == 200 and "<title>" in page
-    # The history too, which belongs to the daemon's user: its rows are there when they are committed.
+    # The history belongs to the daemon's user; its rows are readable once committed.
     eventually(history_has_offsets, "the history has rows")
     service.stop_and_forget()
     eventually(lambda: metric("thermocomp_up") == 0.0, "the daemon is missed")
@@ -89,7 +89,7 @@ def test_it_is_nobody_in_its_sandbox():
     assert service.process_fact(pid, "NoNewPrivs") == "1"
     assert service.process_fact(pid, "Seccomp") == "2"
     assert int(service.process_fact(pid, "CapEff"), 16) == 0
-    # What it may not do with the daemon, it cannot: the socket asks who calls.
+    # Forbidden calls to the daemon fail: the socket checks the caller.
     asked = run("setpriv", "--reuid", "thermocomp-gateway", "--regid", "thermocomp-gateway", "--init-groups",
                 "thermocomp", "disable", check=False)
     assert asked.returncode == 2, asked

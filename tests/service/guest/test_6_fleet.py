@@ -1,4 +1,4 @@
-"""The units of many machines as they are installed: uplink, admission under a user of its own, page of a store."""
+"""The installed units for many machines: uplink, admission with its own user, page of a store."""
 
 import json
 import pathlib
@@ -15,7 +15,7 @@ from test_5_gateway import ask as ask_page
 UPLINK, PAGE, ADMIT, TIMER = (f"thermocomp-{name}" for name in (
     "uplink.service", "fleet-page.service", "admit.service", "admit.timer"))
 ADMITTED = pathlib.Path("/var/lib/thermocomp-admit/model.toml")
-AUTHORITY = "/etc/ssl/certs/ssl-cert-snakeoil.pem"  # of Debian's PostgreSQL; without the server's name
+AUTHORITY = "/etc/ssl/certs/ssl-cert-snakeoil.pem"  # of Debian's PostgreSQL; no server name
 BETTER = service.MODEL.replace("[[3.0, -1.5]]", "[[2.0, -1.5]]")
 EXPOSURE_MAX = 1.5
 
@@ -42,7 +42,7 @@ def steps():
 
 @pytest.fixture(scope="module")
 def office():
-    """PostgreSQL as Debian installs it, a store in it, and a key by which somebody approves."""
+    """PostgreSQL as installed by Debian, with a store, and an approver's key."""
     run("systemctl", "unmask", "postgresql.service")
     run("systemctl", "start", "postgresql@15-main.service")
     as_user("postgres", "createdb", "thermocomp_fleet")
@@ -68,14 +68,14 @@ def test_installed_they_start_nothing_before_they_are_configured():
 
 
 def test_the_uplink_sends_what_the_daemon_records(machine, office):
-    # The model lives where admit may write; its first start, without an offer, makes the folder.
+    # The model is in admit's folder, which its first start, without an offer, makes.
     (CONFIG.parent / "releases.toml").write_text('format = 1\nmachine = "mill_3"\napprovers = "releases_approvers"\n')
     run("systemctl", "start", ADMIT)
     ADMITTED.write_text(service.MODEL)
     service.write_config(machine.config().replace('"model.toml"', f'"{ADMITTED}"'))
     machine.warm_by(0.0)
     service.start()
-    for offset_um in (3.0, 6.0, 9.0, 12.0):  # of each a third is too much
+    for offset_um in (3.0, 6.0, 9.0, 12.0):  # each a third too large
         machine.settled_at(offset_um)
         run("thermocomp", "measured", "z", offset_um / 3.0)
     run("install", "-m", "640", "-g", "thermocomp-uplink", "/tmp/uplink.password", CONFIG.parent)
@@ -121,7 +121,7 @@ def test_admit_may_change_the_model_and_nothing_else(office):
     for command in (("disable",), ("reference", "--force"), ("measured", "z", "1"), ("cycle-end",), ("prove", "z", "2")):
         assert not may(*command), command
     assert service.status()["enabled"]
-    # Its user has no network in its unit, and the uplink no right at the daemon.
+    # Its user has no network in its unit, and the uplink no rights at the daemon.
     assert show(ADMIT, "PrivateNetwork") == "yes" and show(ADMIT, "User") == "thermocomp-admit"
     refused = as_user("thermocomp-uplink", "thermocomp", "candidate", "none", check=False)
     assert refused.returncode == 2 and "only for root" in refused.stdout + refused.stderr, refused

@@ -1,5 +1,5 @@
-"""The installed service on a CAN interface: sensors and controller as frames, in a guest whose kernel
-has CAN. Also what only this kernel has: serial ports and device rules of its own."""
+"""The installed service on a CAN interface, in a guest whose kernel has CAN; also this kernel's
+serial ports and device rules."""
 
 import os
 import pathlib
@@ -53,7 +53,7 @@ applied = { id = 0x300, start_bit = 0, length_bits = 32, scale = 0.001 }
 
 
 class Node:
-    """Thermocouples and a controller on vcan0; notes every offset it is told."""
+    """Thermocouples and a controller on vcan0; records every received offset."""
 
     def __init__(self):
         self.applied_nm = 0

@@ -1,8 +1,8 @@
-"""A daemon whose two CAN buses fail, and a watch over what it does meanwhile.
+"""A daemon with two failing CAN buses, and recordings of its reactions.
 
-Thermocouples of the block "body" come over the first interface; one of the block "table", and the
-controller, are on the second. Each bus has a thermocomp-sim of its own. All temperatures rise
-steadily, so that the offset has something to catch up with after every outage."""
+Thermocouples of the block "body" are on the first interface, one of the block "table" and the
+controller on the second. Each bus has its own thermocomp-sim. All temperatures rise steadily, so
+that the offset must catch up after every outage."""
 
 import bisect
 import contextlib
@@ -21,8 +21,7 @@ RISE_K_PER_S = 0.05
 RATE_UM_PER_S_MAX = 1.5
 STALE_AFTER_S = 1.0
 SILENT_AFTER_S = 0.5
-# What the daemon must stay below, as its documentation says (docs/operating.md). Not asserted: a
-# shared machine may stand still for longer.
+# Limit of docs/operating.md. Not asserted, since a shared machine may stall for longer.
 RECOVERED_WITHIN_S = 2.0
 ENOUGH_FRAMES = 50
 BUS_OFF, CONTROLLER_PROBLEM, RESTARTED = 0x40, 0x04, 0x100
@@ -56,7 +55,7 @@ def bus_text(name, interface, more=""):
 
 
 def device_text(kind, name, bus, frame, places, period_s=None):
-    """A node and what it measures: 16 bits each, in one frame."""
+    """A node and its measured values: 16 bits each, in one frame."""
     text = f'[[device]]\nname = "{name}"\nbus = "{bus}"\n'
     text += f"period_s = {period_s}\n" if period_s else ""
     return text + "".join(f'[[{kind}]]\nname = "{place}"\ndevice = "{name}"\nid = {frame}\n'
@@ -65,13 +64,13 @@ def device_text(kind, name, bus, frame, places, period_s=None):
 
 
 def body_machine(interface):
-    """For thermocomp-sim: the sensors of the first bus."""
+    """Configuration of thermocomp-sim for the sensors of the first bus."""
     return ("format = 1\n" + bus_text("body", interface) +
             device_text("channel", "body_node", "body", 0x181, ("front", "back"), 0.05))
 
 
 def table_machine(interface):
-    """For thermocomp-sim: the second bus."""
+    """Configuration of thermocomp-sim for the second bus."""
     return ("format = 1\n" + bus_text("table", interface) + '[controller]\nname = "cnc"\n'
             f'kind = "can"\ninterface = "{interface}"\nperiod_s = 0.05\n' + PLACES +
             AXIS.replace("@LIMITS@\n", "") +
@@ -107,7 +106,7 @@ def ip(*arguments):
 
 
 def set_up(interface):
-    """Like `ip link set up`, without the time that a process takes to start."""
+    """Like `ip link set up`, without the time to start a process."""
     set_flags, up = 0x8914, 0x1
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
         fcntl.ioctl(link, set_flags, struct.pack("16sH22x", interface.encode(), up))
@@ -120,19 +119,19 @@ def write_frame(interface, identifier, data=bytes(8)):
 
 
 def write_error_frame(interface, error_class, controller_bits=0):
-    """As the driver of a CAN controller would: class in the identifier, detail in the data."""
+    """Like the driver of a CAN controller: class in the identifier, detail in the data."""
     write_frame(interface, socket.CAN_ERR_FLAG | error_class,
                 bytes([0, controller_bits, 0, 0, 0, 0, 0, 0]))
 
 
 @dataclasses.dataclass
 class Recovery:
-    """Times count from the event that ends the fault: interface up, restart, cable in."""
+    """Times since the event that ended the fault: interface up, restart, cable connected."""
     fault: str
     bus: str
     reading_s: float
     compensating_s: float
-    held_um: float  # spread of the offset while it was held
+    held_um: float  # spread of the held offset
 
     def __str__(self):
         return (f"recovery: {self.fault:34s} {self.bus:10s} first reading {self.reading_s:5.2f} s, "
@@ -141,11 +140,11 @@ class Recovery:
 
 @dataclasses.dataclass
 class Window:
-    """An outage as the test saw it."""
+    """An outage as observed by the test."""
     fault: str
     bus: str
     holding: float  # CLOCK_MONOTONIC
-    held_until_s: float  # of the history
+    held_until_s: float  # time of the history
     reading_s: float
     compensating_s: float
 
@@ -157,9 +156,9 @@ class Window:
 
 
 def computed_until_s(cycle):
-    """Time of the history up to which the offsets were computed when the status was asked for. The
-    clock does not tell: a cycle carries the grid's time however late it runs, so one that was due
-    before a fault's end may have run after it."""
+    """Time of the history up to which offsets had been computed when the status was requested. A
+    clock reading will not do: a late cycle carries its grid time, so a cycle due before a fault's
+    end may run after it."""
     return (cycle["count"] + cycle["missed"] - 0.5) / cycle["rate_hz"]
 
 
@@ -178,7 +177,7 @@ class Rig:
             zip(("body", "table"), (body_machine, table_machine), theirs)}
         self.daemon = lab.daemon(daemon_text(*interfaces)).start()
         self.daemon.wait_for_mode("compensating")
-        # The status shows the buses as they were up to a second ago: not connected yet.
+        # The status may be 1 s old and show the buses as not yet connected.
         eventually(lambda: all(bus["connected"] for bus in self.daemon.status()["buses"]),
                    "both buses are told to be connected")
 
@@ -200,7 +199,7 @@ class Rig:
 
     def outage(self, fault, bus, begin, end, prepare=lambda: None):
         """One fault from begin() to end(), until the daemon compensates again. `bus`: "body",
-        "table" or "both". prepare() is what must be done before end() can end it."""
+        "table" or "both". prepare() is required before end() can end the fault."""
         lost = "table" if bus == "table" else "front"
         begin()
         eventually(lambda: not self.is_good(lost), f"{fault}: the reading is lost")
@@ -239,7 +238,7 @@ class Rig:
         return reading_s, time.monotonic() - since
 
     def finish(self):
-        """Ends the daemon; every outage with what the history says of it."""
+        """Ends the daemon and checks every outage in the history."""
         eventually(lambda: len(self.monitor.offsets) > ENOUGH_FRAMES, "offsets to look at")
         self.daemon.committed()
         self.daemon.end()
@@ -253,7 +252,7 @@ class Rig:
 
 
 class Simulated:
-    """thermocomp-sim, that can be stopped and continued as if its cable were out."""
+    """thermocomp-sim that can be stopped and continued like a disconnected cable."""
 
     def __init__(self, folder, machine, run):
         (folder / "machine.toml").write_text(machine)
@@ -273,9 +272,9 @@ class Simulated:
 
 
 def assert_slewed(offsets, on_the_bus):
-    """Recorded offsets never change faster than allowed. But what was computed until a loss was
-    noticed never reached the controller: in a new epoch the offset starts from what is applied,
-    and that is what one of the last frames before said."""
+    """Recorded offsets change within the slew limit. Exception: offsets computed until a loss was
+    noticed never reached the controller, so a new epoch starts from a read-back of the last
+    frames."""
     times = [at for at, _, _ in on_the_bus]
     for (before, a), (after, b) in zip(offsets, offsets[1:]):
         bound = RATE_UM_PER_S_MAX * (after - before) + 0.002
@@ -288,7 +287,7 @@ def assert_slewed(offsets, on_the_bus):
 
 
 class Monitor:
-    """The offset frames as anybody on the bus sees them: (time, um, heartbeat) of valid ones."""
+    """Valid offset frames on the bus: (time, um, heartbeat)."""
 
     def __init__(self, interface):
         self.interface = interface
@@ -325,9 +324,8 @@ def note_offset(offsets, data):
 
 
 def assert_no_jump_on_the_bus(offsets):
-    """An offset is where the last one was, or as far from it as the slew rate allows in the time
-    between; after an outage in no more than 1 s. Half a second is for a machine that stands still
-    meanwhile."""
+    """Consecutive offsets differ by at most the slew limit; across an outage by at most that of 1
+    s. Half a second is allowed for a stall of the machine."""
     assert len(offsets) > ENOUGH_FRAMES
     for (before, a, _), (after, b, _) in zip(offsets, offsets[1:]):
         bound = RATE_UM_PER_S_MAX * min(after - before + 0.5, 1.0) + 0.002
@@ -335,6 +333,6 @@ def assert_no_jump_on_the_bus(offsets):
 
 
 def cpu_s(process):
-    """Processor time that a process has used."""
+    """Processor time used by a process."""
     fields = (open(f"/proc/{process.pid}/stat").read().rpartition(")")[2]).split()
     return (int(fields[11]) + int(fields[12])) / 100.0

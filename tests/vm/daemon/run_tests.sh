@@ -1,6 +1,6 @@
 #!/bin/sh
-# run_tests.sh BIN: the tests of this folder, with everything they write in the memory of where they
-# run: a guest's view of the host's files has neither sockets nor SQLite's shared memory.
+# run_tests.sh BIN: the tests of this folder, with all files in memory, since the guest's view of the host's
+# files supports neither sockets nor SQLite's shared memory.
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 TMPDIR=$(mktemp -d /dev/shm/thermocomp.XXXXXX)

@@ -1,5 +1,5 @@
-"""A serial CAN adapter on a pseudo terminal, for the kernel's slcan driver: a real interface whose
-error states the test commands. Behind it are the sensors and the controller of rig.py."""
+"""A serial CAN adapter on a pseudo terminal for the kernel's slcan driver: a real interface with
+error states set by the test. It also simulates the sensors and the controller of rig.py."""
 
 import fcntl
 import os
@@ -14,7 +14,7 @@ import tty
 from lab import eventually
 from rig import RISE_K_PER_S, note_offset
 
-# Of the kernel's line disciplines (linux/tty.h).
+# Line disciplines of the kernel (linux/tty.h).
 TIOCSETD, N_SLCAN = 0x5423, 17
 
 
@@ -34,12 +34,12 @@ class SerialAdapter:
         self.name = eventually(lambda: next(iter(interfaces() - before), None), "an interface")
         self.opened = False
         self.opens = 0
-        self.cut = False  # the cable: nothing in either direction, and no error told
+        self.cut = False  # cable cut: nothing in either direction, no error
         self.applied = b"\0\0\0\0"
-        self.offsets = []  # as rig.Monitor notes them
+        self.offsets = []  # as recorded by rig.Monitor
         self.begin = time.monotonic()
         self.unread = b""
-        # A bus that is off is silent: no frame may follow the line that says so.
+        # No frame may follow the line that reports bus-off.
         self.sending = threading.Lock()
         self.ending = threading.Event()
         self.thread = threading.Thread(target=self.run)
@@ -82,7 +82,7 @@ class SerialAdapter:
         os.write(self.device, line + b"\r")
 
     def tell_state(self, letter):
-        """a: active, w: warning, p: passive, b: bus-off, with counters that fit."""
+        """a: active, w: warning, p: passive, b: bus-off, with matching counters."""
         counters = {"a": "000000", "w": "100000", "p": "130000", "b": "000256"}[letter]
         with self.sending:
             if letter == "b":
@@ -97,5 +97,5 @@ class SerialAdapter:
 
 
 def is_possible():
-    """In the guests only: the interface belongs to the first network namespace."""
+    """True in guests only: the interface is in the first network namespace."""
     return "THERMOCOMP_VM" in os.environ and pathlib.Path("/sys/module/slcan").exists()

@@ -1,5 +1,5 @@
-"""Buses that fail while the daemon compensates: the offset is held, the other bus goes on, and
-everything comes back by itself. Each fault on the sensors' and on the controller's bus."""
+"""Bus failures while the daemon compensates: the offset is held, the other bus continues, and
+everything recovers by itself. Each fault on the sensors' and on the controller's bus."""
 
 import os
 import pathlib
@@ -21,7 +21,7 @@ BUSES = ("body", "table")
 
 @pytest.fixture(scope="module")
 def rig(tmp_path_factory):
-    """One daemon for all faults: what one of them leaves behind must not harm at the next."""
+    """One daemon for all faults: none may affect the next one."""
     lab = Lab(tmp_path_factory.mktemp("faults"))
     try:
         made = rigs.Rig(lab, tuple(INTERFACES.values()))
@@ -87,7 +87,7 @@ def test_interface_removed_and_made_anew(rig, bus):
 
 @pytest.mark.parametrize("bus", BUSES)
 def test_cable_out_and_in(rig, bus):
-    """No frame, and no error that would say why."""
+    """No frames, and no error that gives a reason."""
     machine = rig.machines[bus]
     rig.outage("cable out, in (silence)", bus, machine.cable_out, machine.cable_in)
 
@@ -112,12 +112,12 @@ print(sent / (time.monotonic() - begin))
 """
 
 
-# A guest that computes five times slower than its host gets a fifth of it.
+# The emulated guest computes five times slower than its host.
 OTHERS_A_SECOND = 1540 if os.environ.get("THERMOCOMP_VM") == "qemu" else 7700
 
 
 def live_on_a_full_bus(rig):
-    """The modes seen in 5 s of it."""
+    """The modes seen in 5 s on the full bus."""
     began, used = time.monotonic(), rigs.cpu_s(rig.daemon.process)
     frames = rig.bus("body")["units"][0]["answers"]
     sender = subprocess.Popen([sys.executable, "-c", SENDER, INTERFACES["body"], "5",
@@ -128,7 +128,7 @@ def live_on_a_full_bus(rig):
         ages_s.append(rig.sensor("front")["age_s"])
         time.sleep(0.2)
     rate = float(sender.communicate(timeout=120)[0])
-    time.sleep(1.1)  # the status is brought up to date each second
+    time.sleep(1.1)  # the status is updated every second
     elapsed_s = time.monotonic() - began
     frames = rig.bus("body")["units"][0]["answers"] - frames
     used = rigs.cpu_s(rig.daemon.process) - used
@@ -140,9 +140,9 @@ def live_on_a_full_bus(rig):
 
 
 def test_a_bus_full_of_others_frames_costs_nothing(rig):
-    """1 Mbit/s is some 7700 frames a second of 8 bytes with 11-bit identifiers. The kernel's
-    filters keep them from the daemon; ours between them all arrive."""
-    # A busy machine that stands still for a second makes readings stale too, but not each time.
+    """1 Mbit/s is some 7700 frames/s of 8 bytes with 11-bit identifiers. The kernel filters them
+    for the daemon; our frames between them all arrive."""
+    # A stall of the machine for a second makes readings stale too, but not each time.
     for _ in range(3):
         rig.daemon.wait_for_mode("compensating")
         modes = live_on_a_full_bus(rig)

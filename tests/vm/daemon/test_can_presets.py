@@ -1,9 +1,8 @@
-"""Every preset for CAN, CANopen and J1939 from its simulated device over real frames: the right
+"""Every CAN, CANopen and J1939 preset with its simulated device over real frames: the right
 temperature, and each code of the device as the right fault and never as a temperature.
 
-What the frames must hold is written down here once more, from the manuals and not from the
-presets: the question that a module is asked, if any, the identifier and the bytes of its first
-channel at 25.0 degC, and those of each code.
+The frames are defined independently of the presets, from the manuals: the request to a module, if
+any, the identifier and the bytes of its first channel at 25.0 degC, and those of each code.
 """
 
 import json
@@ -44,7 +43,7 @@ def read_object(index, sub):
 
 
 def answer(index, sub, *value):
-    """... and the answer that has so many bytes."""
+    """The answer with its data bytes."""
     return struct.pack("<BHB4s", 0x43 | (4 - len(value)) << 2, index, sub, bytes(value))
 
 
@@ -56,8 +55,8 @@ AI_STATUS = [("over_range", 2, RANGE), ("over_range", 3, RANGE),
              ("under_range", 4, RANGE), ("under_range", 5, RANGE)]
 JUMO = [("channel_error", 1), ("channel_error", 3), ("channel_error", 5), ("over_range", 2),
         ("under_range", 4)]
-# name: (keys that must be given, what is asked, the frame's data at 25 degC,
-#        [(event, code, fault, what is asked, data)])
+# name: (required keys, request, frame data at 25 degC,
+#        [(event, code, fault, request, data)])
 PRESETS = {
     # TPDO 1: 25.0 degC with one decimal, then the status.
     "jumo_cantrans_t": ({"scale": 0.1}, None, bytes([250, 0, 0, 0, 0]), [
@@ -74,14 +73,14 @@ PRESETS = {
     "axiomatic_axtc4co": ({}, read_object(0x7130, 1), answer(0x7130, 1, 0xA0, 0x12), [
         ("open_circuit", -512, OPEN, read_object(0x7130, 1), answer(0x7130, 1, 0x00, 0xFE)),
         ("channel_error", -1, ERROR, read_object(0x7130, 1), answer(0x7130, 1, 0xFF, 0xFF))]),
-    # PGN 65187; the other three channels of it show 25 degC too: (25 + 273) / 0.03125 = 0x2540.
+    # PGN 65187; its other three channels are at 25 degC too: (25 + 273) / 0.03125 = 0x2540.
     "j1939_exhaust_ports": ({}, None, bytes([0x40, 0x25] * 4), [
         (event, code, fault, None, struct.pack("<H", code) + bytes([0x40, 0x25] * 3))
         for event, code, fault in [
             ("open_circuit", 0xFE00, OPEN), ("open_circuit", 0xFEFF, OPEN),
             ("channel_error", 0xFF00, ERROR), ("channel_error", 0xFFFF, ERROR),
             ("over_range", 0xFB00, RANGE), ("over_range", 0xFDFF, RANGE)]]),
-    # Two bits of status and 22 of (25 + 16384) / 0.0078125 = 0x200C80, twice; nothing before them.
+    # Two status bits and 22 of (25 + 16384) / 0.0078125 = 0x200C80, twice; zeros before them.
     "css_canmod_temp": ({}, None, bytes([0, 0, 0x00, 0x32, 0x80, 0x00, 0x32, 0x80]), [
         ("channel_error", 1, ERROR, None, None), ("open_circuit", 2, OPEN, None, None),
         ("over_range", 3, RANGE, None, None)]),
@@ -121,7 +120,7 @@ def toml(head, **keys):
 
 
 class Plan:
-    """Which simulated devices there are, what they show, and how the daemon is to read them."""
+    """The simulated devices, their values, and the daemon's configuration."""
 
     def __init__(self):
         self.machine = "format = 1\n" + toml("[[bus]]", name="plain", kind="can", interface=CAN_BUS)
@@ -158,7 +157,7 @@ class Plan:
                 f"d{number}", channel["channel"], fault if i == 0 and event else None)
 
     def add_plain(self, name, preset):
-        """Codes on different channels, because identifiers are those of the manual."""
+        """Codes on different channels, since identifiers are fixed by the manual."""
         self.machine += toml("[[device]]", name=name, bus="plain", preset=name, period_s=0.2)
         self.devices += toml("[[device]]", name=name, bus="can", preset=name)
         cases = [None, *PRESETS[name][3]]
@@ -204,7 +203,7 @@ def plan(tmp_path_factory):
         lab.end()
 
 
-# What a person is shown of a first channel: (preset, event, code): bytes, why.
+# Displayed raw value of a first channel: (preset, event, code): bytes, reason.
 SHOWN = {
     ("jumo_cantrans_t", None, None): ("FA 00 00 00 00", ""),
     ("jumo_cantrans_t", "over_range", 2): ("FA 00 00 00 02", "the status beside it is 0x02"),
@@ -228,7 +227,7 @@ def scan(path):
 
 
 def test_every_preset_gives_the_temperature_and_each_code_its_fault(plan):
-    """A slow machine may need several scans; but no scan ever shows a code as a temperature."""
+    """A slow machine may need several scans, but no scan may show a code as a temperature."""
     missing = dict(plan.sensors)
     end = time.monotonic() + PATIENCE_S
     while missing:
@@ -241,7 +240,7 @@ def test_every_preset_gives_the_temperature_and_each_code_its_fault(plan):
                 assert channel["temp_degC"] == pytest.approx(ROOM_DEGC, abs=0.05), (name, channel)
             if channel["fault"] == (fault or "none"):
                 missing.pop(name, None)
-                # The bytes, and why they are no temperature.
+                # The bytes, and the reason why they are not a temperature.
                 assert channel["raw"] and bool(channel["why"]) == bool(fault), (name, channel)
                 if name in plan.shown:
                     assert (channel["raw"], channel["why"]) == plan.shown[name]
@@ -258,8 +257,8 @@ def test_the_text_for_a_person_has_the_bytes_too(plan):
 
 
 def frames(interface, sent=None):
-    """What comes on an interface, with the identifier as it is written; `sent` is sent now and
-    then, because nobody may have listened the first time."""
+    """Frames of an interface, with identifiers as displayed; `sent` is repeated, in case nobody
+    listened the first time."""
     with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as link:
         link.bind((interface,))
         link.settimeout(0.5)
@@ -292,7 +291,7 @@ def look_at_node(number, asked, data):
     elif asked:
         expect(CANOPEN_BUS, 0x580 + number, data, (0x600 + number, asked))
     else:
-        # TPDOs of a node that nobody started are not sent.
+        # A node that is not started sends no TPDOs.
         expect(CANOPEN_BUS, 0x180 + number, data, (0, bytes([1, number])))
 
 

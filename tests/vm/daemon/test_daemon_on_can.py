@@ -1,5 +1,5 @@
-"""thermocompd between two CAN buses: thermocouples on vcan0, a controller on vcan1. Needs both
-(tests/vm/run_with_can.sh makes them)."""
+"""thermocompd between two CAN buses: thermocouples on vcan0, a controller on vcan1 (both made by
+tests/vm/run_with_can.sh)."""
 
 import pathlib
 import re
@@ -82,7 +82,7 @@ def send_temperatures(column_degC, spindle_degC):
 
 
 class Controller:
-    """Applies what the offset frame says and shows it; by python3-can, on vcan1."""
+    """Applies the offset frame and reports it, with python3-can on vcan1."""
 
     def __init__(self):
         self.applied = 0
@@ -111,7 +111,7 @@ class Controller:
 
 
 class Candump:
-    """What passes on vcan1, as can-utils sees it."""
+    """Frames on vcan1, from can-utils."""
 
     def __init__(self, path):
         self.path = path
@@ -188,6 +188,6 @@ def test_a_message_of_the_controller_ends_a_machining_cycle(lab):
 
 @pytest.mark.skipif(not spindle.is_here(), reason=spindle.MISSING)
 def test_offsets_over_can_are_the_model_of_every_row(lab):
-    # One slow processor for all: rows stand longer than on the host.
+    # One slow processor for all: rows take longer than on the host.
     spindle.replay_spindle(lab, spindle.can_bus("vcan0", "vcan1"), 600, 0.1, rate_hz=200,
                            tick_ms=10)

@@ -1,5 +1,5 @@
-"""The error states of a real CAN interface, told by its driver: a serial adapter on a pseudo
-terminal that goes to error warning, error passive and bus-off."""
+"""Error states of a real CAN interface, reported by its driver: a serial adapter on a pseudo
+terminal goes to error warning, error passive and bus-off."""
 
 import pytest
 
@@ -76,7 +76,7 @@ def test_cable_out_and_in(adapter):
 
 
 def test_a_daemon_that_starts_on_a_bus_that_is_off_says_so(adapter):
-    """No error frame tells what was before: the missing carrier does."""
+    """Error frames do not report an earlier bus-off; the missing carrier does."""
     rig = adapter.rig
     bus_off(adapter)
     rig.daemon.end()

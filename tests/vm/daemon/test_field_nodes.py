@@ -1,5 +1,5 @@
 """thermocompd between simulated CANopen and J1939 nodes on vcan0 and vcan1, with faults, reboots
-and doubles of the nodes. Each state is waited for; nothing is assumed to happen within a time."""
+and duplicates of the nodes. The tests wait for each state and assume no times."""
 
 import pathlib
 import threading
@@ -132,7 +132,7 @@ def j1939_machine(open_circuit=None, address=0x80):
 
 
 class Watch:
-    """Looks at the sensors all the time: a reading without a fault is the very temperature."""
+    """Polls the sensors continually: a reading without a fault is the right temperature."""
 
     def __init__(self, daemon):
         self.daemon = daemon
@@ -224,7 +224,7 @@ def test_a_rebooted_node_is_set_up_again(nodes):
     before = nodes.unit("modules")["requests"]
     nodes.switch_off("canopen")
     nodes.become(CANOPEN, "no_answer", "a node that is off has no temperature")
-    nodes.says("modules", "no ")  # heartbeat, or answer to a question
+    nodes.says("modules", "no ")  # heartbeat, or answer to a request
     nodes.switch_on("canopen", canopen_machine())
     nodes.become(CANOPEN, "none", "it is read again")
     assert nodes.unit("modules")["requests"] > before
@@ -242,7 +242,7 @@ def test_j1939_error_code_silence_and_another_address(nodes):
     nodes.again("j1939", j1939_machine(open_circuit=1))
     nodes.become(("single",), "open_circuit", "the standard's error code")
     nodes.become(("packets",), "none", "the other channel is well")
-    nodes.again("j1939", j1939_machine())  # a fault that is not renewed stays that fault
+    nodes.again("j1939", j1939_machine())  # a fault that is not renewed remains
     nodes.become(J1939, "none", "it is well again")
     nodes.switch_off("j1939")
     nodes.become(J1939, "stale", "nothing is renewed")

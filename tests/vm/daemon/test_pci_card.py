@@ -1,5 +1,5 @@
-"""CAN cards on a PCI bus (emulated): link down and up, and a card that is removed and found again.
-The daemon is on can0, its machine on can1; both cards are on one bus."""
+"""Emulated PCI CAN cards: link down and up, a card removed and found again. The daemon is on can0,
+its machine on can1; both cards are on one bus."""
 
 import pathlib
 

@@ -1,4 +1,4 @@
-"""`thermocomp scan` on CAN: what came is shown, what did not is told, and nodes are found."""
+"""`thermocomp scan` on CAN: received and missing frames are reported, and nodes are found."""
 
 import json
 import os
@@ -20,7 +20,7 @@ matrix_um_per_K = [[1.0]]
 
 
 class Bus:
-    """Sends frames over and over, and answers to identifiers."""
+    """Sends frames repeatedly, and answers to identifiers."""
 
     def __init__(self, frames, answers=None):
         self.frames, self.answers = frames, answers or {}

@@ -1,5 +1,5 @@
-"""A controller on CAN that interpolates its offset along the travel: real frames, a moving slide, a
-bus that loses frames. A thermocouple on vcan0, the controller on vcan1."""
+"""A CAN controller that interpolates its offset along the travel: real frames, a moving slide, lost
+frames. A thermocouple on vcan0, the controller on vcan1."""
 
 import contextlib
 import pathlib
@@ -35,7 +35,7 @@ def places(*each):
     return "[" + ", ".join(each) + "]"
 
 
-# A value of 24 bits and the number behind it; of a table two values in a frame, or what is left.
+# A 24-bit value followed by the number; for a table two values per frame, or the remaining one.
 LINE = f"""[axis.line]
 position = "x_mm"
 travel_mm = [0.0, 800.0]
@@ -119,19 +119,19 @@ def open_bus(interface, *identifiers):
 
 
 def number_in(data):
-    """A value of 24 bits with its sign, and the number behind it."""
+    """A signed 24-bit value and the number after it."""
     return int.from_bytes(data[:3], "little", signed=True), data[3]
 
 
 def whole_sets(seen, k0, slope):
-    """{(K0, slope)} of the frames of a line that followed one another with the same number."""
+    """{(K0, slope)} from consecutive frames of a line with the same number."""
     seen = [each for each in seen if each[0] in (k0, slope)]
     return {(a[1], b[1]) for a, b in zip(seen, seen[1:])
             if a[0] == k0 and b[0] == slope and a[2] == b[2]}
 
 
 class Listener:
-    """What one side sends of a line, as anybody on the interface sees it."""
+    """Frames of a line sent by one side, received on the interface."""
 
     def __init__(self, interface, k0, slope):
         self.seen = []  # (identifier, counts, number), in order
@@ -173,7 +173,7 @@ def test_a_daemon_that_was_killed_goes_on_half_way_round(lab):
     assert time.monotonic() - killed_at > 1.0
     first = next(each for each in sets.seen[begun:] if each[0] == K0)
     assert 128 <= (first[2] - last[2]) % 256 < 160, (last, first)
-    assert abs(first[1] - last[1]) <= 2000, (last, first)  # where the axis stands
+    assert abs(first[1] - last[1]) <= 2000, (last, first)  # the axis position
     daemon.wait_for_mode("compensating")
     status = daemon.status()
     assert not any(axis["mismatch"] for axis in status["axes"])
@@ -181,15 +181,15 @@ def test_a_daemon_that_was_killed_goes_on_half_way_round(lab):
     assert far["axis"] == "x" and far["at_mm"] == 800.0
     eventually(lambda: abs(daemon.axis("x_2")["applied"] + 4.0 * WARM_K + LINE_DEVIATION_UM) < 0.1,
                "applied")
-    # One axis to an operator, whatever it is called.
+    # One axis for an operator, whatever its name.
     assert daemon.cli("prove", "x", "3")[0] == 0
     assert daemon.cli("prove", "y", "3")[0] != 0
     daemon.end()
 
 
 class LossyWire:
-    """Carries frames between the daemon's interface and the controller's and loses a share of those
-    with values of the line, both ways."""
+    """Forwards frames between the daemon's and the controller's interface and loses a share of
+    those with values of the line, in both directions."""
 
     def __init__(self, ours, theirs, share, seed):
         self.buses = [open_bus(ours), open_bus(theirs)]
@@ -242,8 +242,8 @@ def test_a_bus_that_loses_frames_never_makes_a_mixture(lab):
         if wire:
             wire.close()
         rigs.ip("del", "vcan7")
-    # The controller steps to a set at once, so what it shows is what one set said, the rounding
-    # between nodes and line apart.
+    # The controller changes to a set at once: its read-back equals one sent set, except for
+    # rounding between nodes and line.
     sent = whole_sets(wire.seen, K0, SLOPE)
     shown = whole_sets(wire.seen, K0_APPLIED, SLOPE_APPLIED) - {(0, 0)}
     print(f"{wire.lost} of {len(wire.seen)} frames with values lost, {len(shown)} sets in effect")
@@ -264,7 +264,7 @@ def test_frames_of_two_sets_are_never_applied(lab):
         bus.send(struct.pack("=IB3x8s", identifier, len(data), data))
 
     def shown():
-        """The newest frames of the controller, once each has come twice."""
+        """The newest frames of the controller, after each has come twice."""
         begun = len(applied.seen)
         eventually(lambda: len(applied.seen) >= begun + 6, "frames of the controller")
         newest = {identifier: rest for identifier, *rest in applied.seen[begun:]}
@@ -274,7 +274,7 @@ def test_frames_of_two_sets_are_never_applied(lab):
     send(K0, 1000, 7)
     send(SLOPE, 2000, 7)
     eventually(lambda: shown() == ([1000, 7], [2000, 7]), "the whole set")
-    # Of the next set one frame alone, twice, in either order; then of one that is older.
+    # Only one frame of the next set, twice, in either order; then one of an older set.
     for k0, slope in ((8, None), (None, 9), (10, 9), (6, None), (None, 255)):
         if k0 is not None:
             send(K0, -500, k0)
@@ -284,12 +284,12 @@ def test_frames_of_two_sets_are_never_applied(lab):
     send(SLOPE, 9000, 20)
     send(K0, -500, 20)
     eventually(lambda: shown() == ([-500, 20], [9000, 20]), "the next whole set")
-    # A number that has come round, with a frame that is older than a second.
+    # A number that has wrapped around, with a frame older than a second.
     send(K0, 777, 21)
     time.sleep(1.3)
     send(SLOPE, 888, 21)
     assert shown() == ([-500, 20], [9000, 20])
-    # While the valid bit is 0 a whole set stays where it is.
+    # While the valid bit is 0 a complete set is not applied.
     rigs.write_frame("vcan1", ORDER, bytes([0, 0]))
     send(K0, 111, 22)
     send(SLOPE, 222, 22)
