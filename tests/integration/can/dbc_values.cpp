@@ -1,6 +1,6 @@
-// dbc_values FILE.dbc: reads frames as candump -L writes them (123#0102, 00000123#, 123##1FF) from
-// stdin, one a line, and prints for each the message's name and "NAME RAW VALUE" of every signal in
-// it, tab separated; of a fault its name instead of the value. Exit status 2: the file has
+// dbc_values FILE.dbc: decodes frames from stdin, one per line in the form of candump -L (123#0102,
+// 00000123#, 123##1FF), and prints for each the message's name and "NAME RAW VALUE" of every signal
+// in it, tab separated, with a fault's name instead of a value. Exit status 2: the file has
 // problems.
 #include <cinttypes>
 #include <cstdint>

@@ -7,7 +7,7 @@ import struct
 import warnings
 
 with warnings.catch_warnings(), contextlib.redirect_stdout(io.StringIO()):
-    warnings.simplefilter("ignore")  # it tells of formats that it cannot read
+    warnings.simplefilter("ignore")  # it warns of formats that it cannot read
     import canmatrix.formats
 
 
@@ -18,12 +18,12 @@ class Encoded:
     extended: bool
     fd: bool
     data: bytes
-    raw: dict  # signal -> what was put in
-    value: dict  # signal -> the same by canmatrix's factor and offset
+    raw: dict  # signal -> encoded raw value
+    value: dict  # signal -> physical value by canmatrix's factor and offset
 
     @property
     def text(self):
-        """As candump -L writes it."""
+        """In the form of candump -L."""
         return (f"{self.identifier:0{8 if self.extended else 3}X}{'##1' if self.fd else '#'}"
                 f"{self.data.hex().upper()}")
 
@@ -35,7 +35,7 @@ def load(path):
 
 
 def random_raw(signal, random):
-    """A value of all bits, more often than by chance one of the ends."""
+    """A value from all bit patterns, with the end values more frequent."""
     if signal.is_float:
         value = random.choice([0.0, -1.5, random.uniform(-1e3, 1e3),
                                random.uniform(-1, 1) * 10.0 ** random.randint(-30, 30)])
@@ -46,7 +46,7 @@ def random_raw(signal, random):
 
 
 def nearest_raw(signal, value):
-    """What the signal can hold that is nearest to a raw value."""
+    """The signal's nearest representable value."""
     if not signal.is_float:
         return round(value)
     return value if signal.size == 64 else struct.unpack("<f", struct.pack("<f", value))[0]
@@ -57,7 +57,7 @@ def in_ranges(value, signal):
 
 
 def present(frame, raw):
-    """The names of the signals that are in a frame with these multiplexors."""
+    """The signals present in a frame with these multiplexor values."""
     by_name = {signal.name: signal for signal in frame.signals}
 
     def shown(signal):
@@ -75,7 +75,7 @@ def present(frame, raw):
 
 
 def pages_of(frame):
-    """Numbers that a multiplexor of the frame may well show."""
+    """Multiplexor values used by the frame's signals."""
     pages = {0}
     for signal in frame.signals:
         pages.update(end for group in signal.mux_val_grp for end in group)
@@ -92,7 +92,7 @@ def random_frame(frame, random):
             raw[signal.name] = random.choice(fitting)
     shown = present(frame, raw)
     raw = {signal.name: raw[signal.name] for signal in shown}
-    # encode() of canmatrix refuses nested multiplexors; what it calls below does not.
+    # canmatrix's encode() refuses nested multiplexors; the function that it calls does not.
     encode = frame.signals_to_bytes if frame.is_complex_multiplexed else frame.encode
     data = bytes(encode(raw))
     value = {signal.name: float(raw[signal.name]) * float(signal.factor) + float(signal.offset)
@@ -103,13 +103,13 @@ def random_frame(frame, random):
 
 
 def raw_bits(signal, raw):
-    """The bits of a raw value as an unsigned number."""
+    """Bits of a raw value as an unsigned number."""
     if signal.is_float:
         return int.from_bytes(struct.pack("<f" if signal.size == 32 else "<d", raw), "little")
     return raw & ((1 << signal.size) - 1)
 
 
 def same(ours, theirs, signal, raw):
-    """Equal but for the rounding of a product and a sum."""
+    """Equal except for the rounding of a product and a sum."""
     size = abs(float(raw) * float(signal.factor)) + abs(float(signal.offset))
     return abs(ours - theirs) <= 1e-15 * size

@@ -1,4 +1,4 @@
-"""Our reading of DBC files and frames beside python3-canmatrix: it encodes, we decode."""
+"""Our decoding of DBC files and frames, compared with python3-canmatrix, which encodes them."""
 
 import os
 import pathlib

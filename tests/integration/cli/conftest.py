@@ -1,4 +1,4 @@
-"""What the tests of the command share: running it, and a status socket that is not a daemon's."""
+"""Common parts of the command's tests: running it, and a fake status socket."""
 import json
 import os
 import pathlib
@@ -14,14 +14,14 @@ PROGRAM = os.environ["THERMOCOMP"]
 
 
 def run(*arguments, program=PROGRAM, env=None, **options):
-    """Runs thermocomp; the answer has returncode, stdout and stderr."""
+    """Runs thermocomp; the result has returncode, stdout and stderr."""
     return subprocess.run([program, *map(str, arguments)], capture_output=True, text=True,
                           timeout=120, env={**os.environ, **(env or {})}, **options)
 
 
 class FakeDaemon:
     """Answers methods of the status socket from a table. A tuple is an error (code, text); a list
-    is one answer after the other, of which the last stays."""
+    holds consecutive answers, of which the last is repeated."""
 
     def __init__(self):
         self.folder = tempfile.TemporaryDirectory(prefix="tc")

@@ -1,13 +1,13 @@
-"""Devices of a machine made of pymodbus, software that is not ours: thermocouple modules on one port, a
-PLC on another. The machine's room is at 20 degC; a module's channels are tenths of a degree.
+"""Devices of a machine made with pymodbus: thermocouple modules on one port, a PLC on another. The
+room is at 20 degC; a module's channels are tenths of a degree.
 
     foreign_machine.py MODULES_PORT PLC_PORT
 
-Unit 3: a module as WAGO's 750-458 (input registers 0 to 7, 32767: broken): three thermocouples, five open
-channels. Unit 4: one without a preset, float32 with the low word first in holding registers 100 to 103.
-PLC, unit 1: docs/controllers/plc.md. It shows at input 0 and 1 what stands in holding 0 and 1 while valid
-bit 0 is set and the heartbeat changes, a feed at input 6 and a spindle speed at input 26; it has no other
-input register.
+Unit 3: like WAGO's 750-458 (input registers 0 to 7, 32767: broken): three thermocouples, five open
+channels. Unit 4: without a preset, float32 with the low word first in holding registers 100 to 103.
+PLC, unit 1: docs/controllers/plc.md. Inputs 0 and 1 show holding registers 0 and 1 while valid bit
+0 is set and the heartbeat changes, input 6 a feed, input 26 a spindle speed; no other input
+registers exist.
 """
 
 import asyncio
@@ -50,7 +50,7 @@ def modules():
 
 
 async def act(plc):
-    """One turn of the PLC each 10 ms: it follows the offset, and only while the daemon lives."""
+    """PLC cycle of 10 ms: applies the offset only while the daemon's heartbeat changes."""
     heartbeat, silent_turns, turn_s = None, 0, 0.01
     while True:
         valid, beat = plc.getValues(3, 10, 2)

@@ -1,4 +1,4 @@
-"""`thermocomp init`: from foreign devices to a daemon that compensates, without an edit by hand."""
+"""`thermocomp init`: from other projects' devices to a compensating daemon, without manual edits."""
 import json
 import contextlib
 import os
@@ -44,13 +44,13 @@ def foreign():
 
 @pytest.fixture
 def folder(tmp_path):
-    """Short, because the socket comes into it; with the presets beside the configuration."""
+    """A short path, since it contains the socket; with the presets beside the configuration."""
     (tmp_path / "devices").symlink_to(SOURCE / "config" / "devices")
     return tmp_path
 
 
 def converse(arguments, answers):
-    """Runs thermocomp on a terminal and answers each question; (exit status, all that was shown)."""
+    """Runs thermocomp on a terminal and answers each question; (exit status, all output)."""
     ours, theirs = pty.openpty()
     program = subprocess.Popen([PROGRAM, *map(str, arguments)], stdin=theirs, stdout=theirs,
                                stderr=theirs)
@@ -86,13 +86,13 @@ def running(config):
 
 
 def assert_in_this_order(shown, *steps):
-    """What is to be done next, as docs/first_machine.md and the README have it."""
+    """The next steps, in the order of docs/first_machine.md and the README."""
     places = [shown.find(step, shown.index("Next:")) for step in steps]
     assert -1 not in places and places == sorted(places), (steps, places, shown)
 
 
 def assert_runs(config):
-    """No edit: check, start, enable. Init's model of zeros waits for one that was fitted, and says so."""
+    """Without edits: check, start, enable. Init's model of zeros must report that a fitted one is missing."""
     answer = run("check", config)
     assert answer.returncode == 0, answer.stderr
     sock = config.parent / "status.sock"
@@ -110,7 +110,7 @@ def assert_runs(config):
 
 def test_what_is_no_bus_no_axis_and_another_word_for_a_sensor(foreign, folder):
     modules, plc = foreign
-    answers = [f"tcp:127.0.0.1:{modules}", "?pt100", "",  # no host of this name
+    answers = [f"tcp:127.0.0.1:{modules}", "?pt100", "",  # no such host
                "?pt100", "?rtd", "wago_750_458", NAMES, "holding:float32/CDAB:1:100,102", "",
                f"tcp:127.0.0.1:{plc}", "yes", "none", "spindle", "z"]
     status, shown = converse(["init", folder / "thermocompd.toml"], answers)
@@ -141,13 +141,13 @@ def test_asked_on_a_terminal(foreign, folder):
 
 
 def test_nothing_answered_is_lost_to_a_mistake_or_a_step_back(foreign, folder):
-    """From init to a scan without a complaint: 3 commands and no edit."""
+    """From init to a scan without complaints: 3 commands and no edit."""
     modules, plc = foreign
     config = folder / "thermocompd.toml"
     bus = f"tcp:127.0.0.1:{modules}"
-    answers = [bus, f"udp:127.0.0.1:{free_port()}", "",  # a bus that has no module in the end
+    answers = [bus, f"udp:127.0.0.1:{free_port()}", "",  # a bus that finally has no module
                "?Wago", "wago_750", "wago_750_458", "bed bed spindle", NAMES,
-               "holding:float32:1:100,102", "yes",  # the low word comes first: offered
+               "holding:float32:1:100,102", "yes",  # offered: low word first
                "ram table", "<", "ram bed", "ram slide",
                "1", "",  # on the second bus: left out
                f"tcp:127.0.0.1:{plc}", "yes", "spindle_rpm=input:26:uint16 feed_mm_per_min=input:6:uint16",
@@ -159,10 +159,10 @@ def test_nothing_answered_is_lost_to_a_mistake_or_a_step_back(foreign, folder):
                  f"Module of unit 4 on bus1 (127.0.0.1:{modules})", "In word order CDAB all give",
                  "is left out: no module is on it"):
         assert said in shown, (said, shown)
-    assert "pixsys" not in shown  # has no word "Wago"
+    assert "pixsys" not in shown  # does not match "Wago"
     text = config.read_text()
     assert text.count('\n[[bus]]\n') == 1 and 'word_order = "CDAB"' in text
-    assert "gap_registers_max = 0 " in text  # the PLC refuses to have input 0 to 6 read together
+    assert "gap_registers_max = 0 " in text  # the PLC refuses a common read of inputs 0 to 6
     assert 'name = "Z"\noutput = "z_um"' in text
     for command in ("check", "scan"):
         answer = run(command, config)
@@ -188,7 +188,7 @@ def test_by_options_without_a_terminal(foreign, folder):
     assert run(*arguments, "--force").returncode == 0
     assert (folder / "thermocompd.toml.old").read_text() == before
     assert (folder / "model.toml.old").exists()
-    arguments[5] = "bus1/" + arguments[5]  # as the configuration names it
+    arguments[5] = "bus1/" + arguments[5]  # as named by the configuration
     assert run(*arguments, "--force").returncode == 0
     assert config.read_text() == before
 

@@ -1,5 +1,5 @@
-"""What reads meshes and what factorises is loaded when it is needed: where it lies, and what is said
-without it."""
+"""Modules for reading meshes and factorising, loaded when needed: their places, and the message
+without them."""
 import pathlib
 import shutil
 import tomllib
@@ -14,7 +14,7 @@ FACTORISES = "thermocomp-cholmod.so"
 
 
 def reads_meshes():
-    """Whether the build has thermocomp-modelling with `structure`."""
+    """True if the build has thermocomp-modelling with `structure`."""
     program = BIN / "thermocomp-modelling"
     return program.exists() and "  structure " in run("--help", program=program).stdout
 
@@ -25,7 +25,7 @@ CUBE = pathlib.Path(__file__).parent / "cube"  # grows by 1.1 um/K
 
 @pytest.fixture
 def alone(tmp_path):
-    """The program where nothing lies beside it."""
+    """The program without modules beside it."""
     (tmp_path / "bin").mkdir()
     return pathlib.Path(shutil.copy(BIN / "thermocomp-modelling", tmp_path / "bin"))
 
@@ -45,7 +45,7 @@ def growth_um_per_K(answer, folder):
 
 
 def said(answer):
-    """What is said after the progress."""
+    """The message after the progress."""
     assert answer.returncode == 2
     lines = [line for line in answer.stderr.splitlines() if "thermocomp" in line]
     assert len(lines) == 1, answer.stderr
@@ -74,7 +74,7 @@ def test_what_cannot_be_loaded_is_one_line_with_the_file_and_the_reason(alone, t
     module = tmp_path / "bin" / MODULE
     module.write_text("no library")
     assert f"{module}: " in said(structure(alone, tmp_path))
-    # A library, but another one: it has no functions for meshes.
+    # A library without the functions for meshes.
     shutil.copy(next(pathlib.Path("/usr/lib").glob("*/libdl.so.2")), module)
     line = said(structure(alone, tmp_path))
     assert str(module) in line and "thermocomp_gmsh_functions" in line
@@ -88,7 +88,7 @@ def test_a_mesh_in_text_needs_no_reader_but_what_factorises(alone, tmp_path):
     shutil.copy(BIN / FACTORISES, tmp_path / "bin")
     answer = structure(alone, tmp_path, mesh="cube.inp")
     assert growth_um_per_K(answer, tmp_path) == pytest.approx(1.1, rel=1e-9)
-    # A mesh file that is not there is told as such.
+    # A missing mesh file is reported as such.
     absent = structure(alone, tmp_path, mesh="nowhere.msh")
     assert absent.returncode == 2 and "nowhere.msh: no such file" in absent.stderr
 

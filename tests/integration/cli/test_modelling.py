@@ -1,4 +1,4 @@
-"""plan, group, fit and tiebar as their users meet them: answers, files, exit statuses."""
+"""Answers, files and exit statuses of plan, group, fit and tiebar."""
 import csv
 import json
 import math
@@ -93,7 +93,7 @@ def test_group_names_places_that_move_alike(tmp_path):
 
 def test_the_place_of_the_room_stays_out_of_the_choice_by_itself(tmp_path):
     files = write_tests(tmp_path)
-    for file in files:  # a room that would say it all: z = 5 (room - 20)
+    for file in files:  # a room that would explain all: z = 5 (room - 20)
         rows = list(csv.reader(file.open()))
         with file.open("w", newline="") as out:
             csv.writer(out).writerows(
@@ -134,7 +134,7 @@ def test_fit_without_options_compares_families_and_says_where_its_model_holds(tm
     assert [each["family"] for each in said["families"]] == [
         "none", "static_few", "lagged_few", "physical", "lag_bank"]
     assert sum(each["chosen"] for each in said["families"]) == 1
-    assert said["families"][3]["left_out_rms_um"] is None  # no signal is there
+    assert said["families"][3]["left_out_rms_um"] is None  # there is no signal
     assert said["left_out_rms_um"]["z_um"] < 1.0
     out = tmp_path / "out.csv"
     predicted = run("predict", "--model", model, files[0], "-o", out)
@@ -159,7 +159,7 @@ def test_probings_that_missed_are_left_out_by_diagnose_with_a_line(tmp_path):
     model.write_text('format = 1\ninputs = ["t1_degC", "t3_degC"]\noutputs = ["z_um"]\n'
                      'reference = "first_sample"\nmatrix_um_per_K = [[5.0, -2.0]]\n')
     lines = files[0].read_text().splitlines()
-    for row in (1, 90, 150):  # the first one, from which displacement counts, too
+    for row in (1, 90, 150):  # also the first one, the zero of displacement
         rest, z_um = lines[row].rsplit(",", 1)
         lines[row] = f"{rest},{float(z_um) + 4300.0}"
     missed = tmp_path / "missed.csv"

@@ -1,4 +1,4 @@
-"""Exit statuses and output of the commands that need no daemon."""
+"""Exit statuses and output of the commands without a daemon."""
 import csv
 import os
 import pathlib
@@ -159,8 +159,8 @@ def test_simulate_is_repeated_by_its_seed(tmp_path):
                          [(1, 52, 44, (1, 3)), (2, 49, 42, (1, 3)), (3, 60, 42, (1,))])
 def test_the_gate_machine_moves_and_its_tie_cools_as_published(condition, range_um, peak_um,
                                                                off_hours, tmp_path):
-    """Teratani et al. 1995: the first peak after 15 min; the tie is nearly constant while the oil does
-    not heat, and goes on rising while it is cold (condition 3, from 1 h to 2 h)."""
+    """Teratani et al. 1995: the first peak after 15 min; the tie is nearly constant while the oil
+    does not heat, and rises further while it is cold (condition 3, from 1 h to 2 h)."""
     gate = SOURCE / "config/gate_machine"
     machine = tmp_path / "machine.toml"
     machine.write_text("\n".join((gate / name).read_text() for name in (
@@ -205,7 +205,7 @@ def test_what_is_no_history_is_refused(tmp_path, command):
 
 @pytest.fixture
 def alone(tmp_path):
-    """The program where thermocomp-modelling does not lie beside it."""
+    """The program without thermocomp-modelling beside it."""
     (tmp_path / "bin").mkdir()
     return shutil.copy(PROGRAM, tmp_path / "bin")
 

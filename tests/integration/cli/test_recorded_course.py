@@ -1,5 +1,4 @@
-"""`thermocomp correction`: gains from probed days into the model, and from there into the daemon's
-estimator."""
+"""`thermocomp correction`: gains from probed days, applied to the model and used by the daemon's estimator."""
 import math
 import re
 
@@ -11,7 +10,7 @@ GROUPS = '[[correction.group]]\ninputs = ["spindle_degC"]\n[[correction.group]]\
 
 
 def day(path, gain, tau_s=1800.0):
-    """Spindle heat for two hours; the tool follows `gain` times what the model says."""
+    """Two hours of spindle heat; displacement is `gain` times the model's."""
     lines = ["time_s,column_degC,spindle_degC,x_um,z_um"]
     for i in range(240):
         time_s = 60.0 * i
@@ -59,7 +58,7 @@ def test_two_days_stand_in_for_probings_on_a_third(lab):
                      r"\(without a record ([\d.]+) um\)", answer.stderr)
     assert said, answer.stderr
     assert float(said[3]) < 0.5 * float(said[4])
-    # The third day without its probings: its gain is 1.3, the bare model's 1.
+    # The third day without its probings: its gain is 1.3, the model's 1.
     text = (lab / "day_3.csv").read_text().splitlines()
     (lab / "unprobed.csv").write_text(
         "\n".join([text[0]] + [line.rsplit(",", 1)[0] + "," for line in text[1:]]) + "\n")

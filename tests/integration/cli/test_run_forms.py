@@ -1,6 +1,5 @@
-"""Files as people have them: `fit` and `diagnose` say line by line what they understood, and answer
-as they do on the same rows in the form that programs write. What may mean two things is asked
-for."""
+"""Run files in foreign forms: `fit` and `diagnose` report how each was read, and give the same
+answers as on the same rows in our form. Ambiguous files cause a question."""
 import csv
 import datetime
 import json
@@ -21,7 +20,7 @@ RUNS = 3
 
 
 def simulated(test):
-    """[time_s, t1, t2, rpm, z]: two bodies behind a spindle that starts and stops."""
+    """[time_s, t1, t2, rpm, z]: two bodies heated by a spindle that starts and stops."""
     chance = random.Random(test)
     quick = slow = 0.0
     rows = []
@@ -74,7 +73,7 @@ def without_units(rows):
 
 
 def mapped(*lines, names=True):
-    """A file of --columns; the names as the model has them."""
+    """A file for --columns, with the model's names."""
     columns = [f'"{name}" = "{ours}"' for name, ours in NAMES_OF_UNITS.items()]
     return "\n".join([*lines, "[columns]", *(columns if names else [])]) + "\n"
 
@@ -89,8 +88,8 @@ def named(header):
                                    for name, ours in zip(header, PLAIN[1:]))
 
 
-# How rows are written, the map (None: the file says everything itself), and words of what was
-# understood. A name that is not ours is mapped, so that answers can be laid beside each other.
+# Writer of the rows, map (None: not needed), and words of the report on how they were read. Foreign
+# names are mapped so that answers can be compared.
 FORMS = {
     "german_dates": (german_dates, NAMED, ["day.month.year", "Latin-1"]),
     "minutes_and_kelvin": (minutes_and_kelvin,
@@ -103,7 +102,7 @@ FORMS = {
 
 @pytest.fixture(scope="module", name="plain")
 def plain_fixture(tmp_path_factory):
-    """The rows as programs write them; what `fit` and `diagnose` answer on them."""
+    """Our form of the rows, with the answers of `fit` and `diagnose`."""
     folder = tmp_path_factory.mktemp("plain")
     files = []
     for test in range(RUNS):
@@ -158,7 +157,7 @@ def test_a_file_of_another_form_is_told_and_answered_like_the_plain_one(form, pl
 
 
 def slashes(rows):
-    # A row a month: both orders are days of the calendar, as far apart.
+    # One row per month: both orders are valid and equidistant dates.
     own = with_time(rows[:5], lambda s: f"{s // 60 + 3:02d}/{s // 60 + 4:02d}/2026 08:00:00")
     return joined(["Zeit", *UNITS[1:]], own)
 

@@ -1,4 +1,4 @@
-"""series, fit --prior and inspect --series as processes: files, answers, exit statuses."""
+"""Files, answers and exit statuses of series, fit --prior and inspect --series."""
 import json
 import pathlib
 import random
@@ -14,7 +14,7 @@ pytestmark = pytest.mark.skipif(
 
 
 def write_run(path, seed, gain, hours=10, swap=False):
-    """One heated place and one that follows; z = gain * first - 2 * second."""
+    """A heated place and one that follows; z = gain * first - 2 * second."""
     chance = random.Random(seed)
     quick = slow = heat = 0.0
     lines = ["time_s,head_degC,column_degC,z_um"]

@@ -1,4 +1,4 @@
-"""scripts/setup.sh against package tools that only pretend."""
+"""scripts/setup.sh with fake package tools."""
 import os
 import subprocess
 

@@ -1,5 +1,5 @@
-"""From a machine to what is wrong with its heat flow: structure --plant-parts, simulate,
-diagnose --thermal, and the machine file that it corrects."""
+"""From a machine to errors in its modelled heat flow: structure --plant-parts, simulate, diagnose
+--thermal, and the corrected machine file."""
 import csv
 import json
 import math
@@ -156,7 +156,7 @@ def lumped_machine(folder, head_film=8.0, joint=10.0, heat_W=200.0, lag_s=0.0):
 
 
 def machine(folder, size=150, joint=300.0, column_film=8.0):
-    """machine.toml and body.toml of a structure, its elements so large [mm]."""
+    """machine.toml and body.toml of a structure, with the element size [mm]."""
     folder.mkdir()
     text = STRUCTURE.format(size=size, joint=joint, column_film=column_film)
     (folder / "structure.toml").write_text(text)
@@ -168,7 +168,7 @@ def machine(folder, size=150, joint=300.0, column_film=8.0):
 
 
 def measured(folder):
-    """Runs of the machine: for training and for testing."""
+    """Runs of the machine for training and testing."""
     text = (folder / "machine.toml").read_text()
     files = []
     for seed, hours in ((11, 14.0), (12, 8.0)):
@@ -208,7 +208,7 @@ def test_a_body_that_is_right_is_left_alone(model, tmp_path):
     ("wrong_conductance", "head_on_column", {"joint": 90.0}, 0.3),
     ("wrong_film_coefficient", "part column|room", {"column_film": 20.0}, 2.5)])
 def test_what_is_wrong_with_a_body_is_named(model, tmp_path, cause, subject, changed, factor):
-    """The machine has finer elements than the model that is given to the diagnosis."""
+    """The machine has finer elements than the model given to the diagnosis."""
     answer = diagnosis(model, measured(machine(tmp_path / "truth", size=100, **changed)))
     finding = answer["findings"][0]
     assert (finding["cause"], finding["subject"]) == (cause, subject), answer
@@ -240,7 +240,7 @@ def test_the_corrected_machine_file_gives_what_was_measured(tmp_path, changed, k
 
 
 def rises_at(page, at_mm):
-    """What the page of a body shows at the node nearest to a place: {group: {time_s: rise_K}}."""
+    """Rises on a body's page at the node nearest to a place: {group: {time_s: rise_K}}."""
     body = json.loads(re.search(r'<script id="body" type="application/json">(.*?)</script>',
                                 page.read_text(), re.DOTALL)[1])
     node = min(range(len(body["nodes_mm"]) // 3),

@@ -1,4 +1,4 @@
-"""Commands over the status socket, against answers chosen by the test."""
+"""Commands over the status socket, with answers chosen by the test."""
 import contextlib
 import json
 import os
@@ -135,7 +135,7 @@ def test_prove_waits_until_the_move_is_over_and_tells_what_was_read(daemon, ther
 
 def test_prove_gives_up_on_a_move_that_does_not_end(daemon):
     daemon.answers["offsets"] = [offsets(0.0, 0.0, False), offsets(2.0, 1.9, True)]
-    daemon.answers["prove"] = {"done": True, "takes_s": -3.5}  # 3 s are left of its patience
+    daemon.answers["prove"] = {"done": True, "takes_s": -3.5}  # leaves 3 s until the timeout
     answer = run("--socket", daemon.path, "prove", "z", "5")
     assert answer.returncode == 1 and "the move is not over" in answer.stdout
     assert "axis z: sent +2.00 um, read back +1.90 um\n" in answer.stderr
@@ -168,7 +168,7 @@ def test_watch_prints_plain_lines_when_it_is_no_terminal(daemon):
 
 
 def test_watch_shows_what_comes(daemon):
-    # The connection stays silent after three notifications: the watch ends as unreachable.
+    # The connection is silent after three notifications: the watch ends as unreachable.
     answer = run("--socket", daemon.path, "watch", "--period", "0.1")
     assert answer.returncode == 2 and daemon.path in answer.stderr, answer.stderr
     assert answer.stdout.count("compensating") == 3

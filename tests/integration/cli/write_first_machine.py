@@ -1,4 +1,4 @@
-"""Fills the outputs of docs/first_machine.md with what the programs say now.
+"""Replaces the outputs in docs/first_machine.md by the programs' current ones.
 
     THERMOCOMP=build/release/bin/thermocomp THERMOCOMP_SOURCE=. write_first_machine.py
 
@@ -18,12 +18,12 @@ PORTS = 5020, 5021
 
 
 def block(text):
-    plain = re.sub("\033\\[[0-9;]*m", "", text.replace("\r", ""))  # no colours on paper
+    plain = re.sub("\033\\[[0-9;]*m", "", text.replace("\r", ""))  # without colours
     return "```\n" + plain.rstrip() + "\n```\n"
 
 
 def said(folder, *arguments):
-    """A command as typed in the folder, and all that it printed."""
+    """A command as typed in the folder, with its output."""
     answer = subprocess.run([PROGRAM, *map(str, arguments)], cwd=folder, text=True, timeout=120,
                             stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
     typed = "thermocomp " + " ".join(map(str, arguments))

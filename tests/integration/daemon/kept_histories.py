@@ -1,14 +1,13 @@
 #!/usr/bin/python3
-"""Histories of one build, replayed by another: whether a change of the code changed an offset.
+"""Replays histories of one build with another: has a change of the code changed an offset?
 
     kept_histories.py record BIN FOLDER    runs the tests of this folder that record every kind of
-                                           history, with the programs in BIN, and keeps what the
-                                           daemons wrote: Modbus TCP and RTU, corrections, cycle
-                                           ends, lost sensors, reloads in mid run, restarts, kills
-    kept_histories.py replay BIN FOLDER    replays each with the programs in BIN; exit status 1 when
-                                           an offset differs or a history cannot be read
+        history, with the programs in BIN, and keeps the histories: Modbus TCP and RTU, corrections,
+        cycle ends, lost sensors, reloads during a run, restarts, kills
+    kept_histories.py replay BIN FOLDER    replays each with the programs in BIN; exit status 1 if
+        an offset differs or a history cannot be read
 
-A test that fails while it records is told and keeps its history all the same.
+A test that fails while recording is reported, and its history is kept.
 """
 import os
 import pathlib

@@ -1,21 +1,21 @@
-"""kill -9 at random moments, again and again, on one history and one machine that keeps moving.
+"""Repeated kill -9 at random times, with one history and one continually moving machine.
 
-  kill_rounds.py --rounds 200 --seed 1     prints, last, "NAME VALUE UNIT" lines; 1: something lost
-    --controller registers                 nothing is read back but the registers that are written
-    --controller silent                    nor can these be read
-    --power-cuts                           of a silent one: the record of the runtime folder goes,
-                                           and the state file is the one that was flushed last
-    --no-history                           quicker: only the offsets are judged
+    kill_rounds.py --rounds 200 --seed 1   prints, last, "NAME VALUE UNIT" lines; 1: something lost
+        --controller registers             no read-back except the written registers
+        --controller silent                these cannot be read either
+        --power-cuts    of a silent one: the record of the runtime folder is lost, and the state
+                        file is the one last flushed
+        --no-history    faster: checks only the offsets
 
-What is checked in every round, against notes taken from outside just before the kill:
-  * every row of the history that a reader could see is there afterwards, byte for byte;
-  * reference and switch are those of before; of a command under way, before or after, and after
-    when it had been answered;
-  * the first order to the controller is no farther from the last one than the slew rate allows for
-    the time since the daemon was first told what the controller applies, and one cycle more. No
-    slack: both times are taken at the controller, the earlier one before it answers, the later one
-    after it was written. Of a silent controller the time from its last order to the kill counts
-    too, and after a power cut restart_leap_um_max.
+Checked in every round against observations just before the kill:
+  * all rows of the history visible to a reader are still there, byte for byte;
+  * reference and switch are those of before; those of a command under way are those before or
+    after it, or after it if it had been answered;
+  * the first order to the controller differs from the last one at most by the slew limit times
+    the time since the daemon's first read-back, plus one cycle. No slack: both times are taken
+    at the controller, the earlier before it answers, the later after it was written. For a
+    silent controller the time from its last order to the kill counts too, and after a power cut
+    restart_leap_um_max.
 """
 
 import argparse
@@ -41,11 +41,11 @@ from plain_devices import RATE_UM_PER_S, Machine, PlainController  # noqa: E402
 
 RESOLUTION_UM = 0.001
 PERIOD_S = 0.02  # of the controller's link
-CYCLE_S = 0.01  # the offset moves at its ticks, the first of which may come at once
+CYCLE_S = 0.01  # offsets move at its ticks, the first possibly at once
 LEAP_UM = 1.0  # restart_leap_um_max
 MOMENTS = ("running", "start", "commit", "reload", "command")
 
-# When a folder has been flushed, so has the file that was renamed in it before.
+# When a folder has been flushed, so has a file renamed in it before.
 DURABLE = r"""
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -72,7 +72,7 @@ int fsync(int fd) {
 
 
 class WatchedController(PlainController):
-    """Notes also when the applied offset was asked for, or what it was told."""
+    """Also records the times at which the applied offset was read or written."""
 
     silent = False
     asked_by = (4,)
@@ -131,21 +131,21 @@ class KillRounds:
         self.mover.start()
 
     def move(self):
-        """The target swings much faster than the slew rate: the offset never stands."""
+        """Moves the target much faster than the slew limit, so that the offset never rests."""
         begun = time.monotonic()
         while self.moving:
             self.machine.warm_by(25.0 * math.sin((time.monotonic() - begun) * 2.0 * math.pi / 6.0))
             time.sleep(0.02)
 
     def note_rows(self):
-        """What a reader sees committed now; also finds what is gone."""
+        """Reads the committed rows; counts the lost ones."""
         if not self.history or not self.daemon.history.exists():
             return
         with contextlib.closing(sqlite3.connect(f"file:{self.daemon.history}?mode=ro",
                                                 uri=True)) as base:
             base.execute("BEGIN")
             seen = {}
-            # Of a segment only what never changes; its end moves with every commit.
+            # Constant columns of a segment only; its end moves with every commit.
             for row in base.execute("SELECT id, run, token, setup, reason, first_cycle, inputs, "
                                     "estimator_state FROM segment"):
                 seen["segment", row[0]] = zlib.crc32(repr(row).encode())
@@ -163,8 +163,8 @@ class KillRounds:
         return status["enabled"], [each["reference_degC"] for each in status["inputs"]]
 
     def start_ready(self):
-        """Restart and what the controller saw of it."""
-        time.sleep(0.05)  # what the daemon has left in the line is taken
+        """Restarts the daemon and checks the first step at the controller."""
+        time.sleep(0.05)  # until bytes in transit have arrived
         with self.controller.lock:
             reads, orders = len(self.controller.read_log), len(self.controller.order_log)
             before_at, before = self.controller.order_log[-1] if orders else (0.0, None)
@@ -183,7 +183,7 @@ class KillRounds:
         if self.power_cuts:
             allowed = max(allowed, LEAP_UM + RATE_UM_PER_S * CYCLE_S)
         elif self.controller.silent:
-            # What was recorded need not have been sent yet.
+            # A recorded offset may not have been sent yet.
             allowed += RATE_UM_PER_S * (max(0.0, self.killed_at - before_at) + CYCLE_S)
         self.away.append(step / (RATE_UM_PER_S * (ordered_at - before_at)))
         self.shares.append(step / allowed)
@@ -191,7 +191,7 @@ class KillRounds:
             self.restarts_wrong.append(f"a step of {step} um, {allowed} um allowed")
 
     def cut_power(self):
-        """Of what was not flushed nothing need be left, but may."""
+        """Unflushed data may or may not survive."""
         self.daemon.socket.with_name(self.daemon.socket.name + ".sent").unlink(missing_ok=True)
         if self.random.random() < 0.8:
             shutil.copyfile(self.durable, self.daemon.state)
@@ -201,7 +201,7 @@ class KillRounds:
         self.daemon.kill()
 
     def release_where_unknown(self):
-        """A first start, of which nothing is known: the operator has looked, the offset is 0."""
+        """A first start with nothing known: the operator has checked that the offset is 0."""
         def started():
             status = self.daemon.status()
             if "start_unknown" in status["reasons"]:
@@ -211,7 +211,7 @@ class KillRounds:
         eventually(started, "the axis is driven")
 
     def send_command(self, method):
-        """Sends without waiting; the socket, on which the answer may come."""
+        """Sends without waiting; returns the socket of the answer."""
         link = socket.socket(socket.AF_UNIX)
         link.connect(str(self.daemon.socket))
         params = b',"params":{"force":true}' if method == "reference" else b""
@@ -228,7 +228,7 @@ class KillRounds:
             time.sleep(0.0002)
 
     def kill_at(self, moment, expected):
-        """Returns what may be found after the restart: a list of (enabled, reference or None)."""
+        """Returns the allowed states after the restart: a list of (enabled, reference or None)."""
         self.note_rows()
         pause = self.random.random()
         if moment == "running":
@@ -268,12 +268,12 @@ class KillRounds:
         self.counts[moment] += 1
         if not self.daemon.status()["enabled"]:
             self.daemon.call("enable")
-        # Now and then for long, so that what is saved now and then is old.
+        # Sometimes long, so that periodically saved values are old.
         longest_s = 4.0 if self.random.random() < 0.1 else 0.2
         time.sleep(longest_s * self.random.random())
         expected = self.expectation()
         if moment == "start":
-            # Killed once running, then again somewhere in its start.
+            # Killed while running, then again during its start.
             allowed = self.kill_at("running", expected)
             self.note_rows()
             self.daemon.start(wait=False)

@@ -17,12 +17,12 @@ import time
 BIN = pathlib.Path(os.environ.get("THERMOCOMP_BIN", "build/release/bin")).resolve()
 SOURCE = pathlib.Path(__file__).resolve().parents[3]
 DATA = pathlib.Path(os.environ.get("THERMOCOMP_DATA", SOURCE.parent / "shared" / "data"))
-# What a busy machine or a sanitizer may take before something that must happen has happened.
+# Timeout for required events on a busy machine or with a sanitizer.
 PATIENCE_S = float(os.environ.get("THERMOCOMP_PATIENCE_S", "30"))
 
 
 def eventually(check, what, patience_s=PATIENCE_S):
-    """Polls until check() gives something true; that value."""
+    """Polls check() until it is true; returns its value."""
     end = time.monotonic() + patience_s
     while time.monotonic() < end:
         value = check()
@@ -53,7 +53,7 @@ class Daemon:
         self.socket = sockets / "status.sock"
         self.log = folder / (name + ".log")
         self.process = None
-        self.environment = {}  # besides the test's own
+        self.environment = {}  # in addition to the test's own
         self.write_config(config)
 
     def write_config(self, text):
@@ -74,7 +74,7 @@ class Daemon:
         return self
 
     def log_text(self):
-        """What this start of the daemon logged."""
+        """Log of this start of the daemon."""
         with self.log.open() as log:
             log.seek(self.log_start)
             return log.read()
@@ -109,8 +109,7 @@ class Daemon:
         return next(axis for axis in self.status()["axes"] if axis["name"] == name)
 
     def wait_for_offset(self, offset_um, tolerance_um=0.01, name="z"):
-        """Patience begins anew with each um that the offset comes nearer: how long the way takes is
-        no matter of this test."""
+        """The timeout restarts with each um of approach: the duration is not tested here."""
         def beside():
             return abs(self.axis(name)["offset"] - offset_um)
 
@@ -128,17 +127,17 @@ class Daemon:
         self.process.send_signal(signal.SIGHUP)
 
     def kill(self):
-        """As a power cut would, for this process."""
+        """Like a power cut, for this process."""
         self.process.kill()
         self.process.wait(PATIENCE_S)
 
     def end(self):
-        """As systemd would; its exit status must be 0."""
+        """Like systemd; the exit status must be 0."""
         self.process.send_signal(signal.SIGTERM)
         assert self.process.wait(PATIENCE_S) == 0, self.log_text()
 
     def committed(self):
-        """Waits until everything up to now is on disk."""
+        """Waits until all records so far are on disk."""
         mark = time.monotonic_ns()
 
         def through():
@@ -191,17 +190,17 @@ class Simulator:
         self.process.communicate(timeout=PATIENCE_S)
 
     def end(self):
-        """Stops it as an operator would; the rest of what it printed."""
+        """Stops it as an operator would; returns the remaining output."""
         self.process.terminate()
         return self.wait(PATIENCE_S)
 
 
 class Lab:
-    """Starts things in one folder and ends all of them."""
+    """Starts processes in one folder and ends all of them."""
 
     def __init__(self, folder):
         self.folder = folder
-        # A socket's path has 107 characters, pytest's folders may be longer.
+        # A socket's path is limited to 107 characters; pytest's folders may be longer.
         self.sockets = pathlib.Path(tempfile.mkdtemp(prefix="tc"))
         self.started = []
 
@@ -211,7 +210,7 @@ class Lab:
         return self.started[-1]
 
     def daemon(self, config, name="thermocompd"):
-        """Not started yet."""
+        """Not yet started."""
         self.started.append(Daemon(self.folder, self.sockets, config, name))
         return self.started[-1]
 
@@ -245,7 +244,7 @@ def read_columns(path):
 
 
 def replay(history, out):
-    """Exact replay: (exit status, columns, what it said)."""
+    """Exact replay: (exit status, columns, stderr)."""
     status, _, said = run_tool("replay", history, "-o", out)
     return status, read_columns(out) if status in (0, 1) else {}, said
 
@@ -260,7 +259,7 @@ def first_cycle_s(history):
 
 
 def count_rows(history):
-    """(segments, chunks, records) that are committed."""
+    """Counts of committed (segments, chunks, records)."""
     with contextlib.closing(sqlite3.connect(history)) as base:
         assert base.execute("PRAGMA integrity_check").fetchone() == ("ok",)
         segments = base.execute("SELECT count(*) FROM segment").fetchone()[0]
@@ -269,8 +268,8 @@ def count_rows(history):
 
 
 def same_bits(columns):
-    """Every pair of columns *_offset_um and *_recorded_um, compared as the text's numbers (the
-    shortest text that reads back to the same bits): (compared, different)."""
+    """Compares every pair of columns *_offset_um and *_recorded_um as numbers (texts are the
+    shortest that restore the same bits): (compared, different)."""
     compared = different = 0
     for name, values in columns.items():
         if not name.endswith("_offset_um"):
@@ -285,7 +284,7 @@ def same_bits(columns):
 
 
 def assert_replays_exactly(history, out):
-    """`thermocomp replay` says so, and so do its columns. Returns the columns."""
+    """Checks the statement of `thermocomp replay` and its columns. Returns the columns."""
     status, columns, said = replay(history, out)
     print(said.strip())
     assert status == 0, said

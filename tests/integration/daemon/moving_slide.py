@@ -1,9 +1,9 @@
-"""A slide at 10 m/min over a bed that bends: the machine of the tests of controllers that interpolate
-along the travel, on whatever bus."""
+"""A slide at 10 m/min over a bending bed, for tests of controllers that interpolate along the
+travel, on any bus."""
 
 from lab import assert_replays_exactly, read_columns
 
-# um/K along the travel; 10 K bend it by 40 um from end to end, and it is no straight line.
+# um/K along the travel, not linear; 10 K bend it by 40 um from end to end.
 NODES_MM = [0.0, 200.0, 400.0, 600.0, 800.0]
 ROWS_UM_PER_K = [0.0, 1.5, 2.5, 3.3, 4.0]
 WARM_K = 10.0
@@ -11,9 +11,9 @@ LINE_DEVIATION_UM = 2.5
 SPEED_MM_PER_S = 10_000.0 / 60.0
 ROW_S = 0.02
 REST_S = 3.0  # cold, for the reference
-WARM_S = 4.0  # at rest, until the offsets are there
+WARM_S = 4.0  # at rest, until the offsets are applied
 MOVING_S = 12.0
-# Counts of 0.001 um and 0.001 um/m, and what a row's rounding adds.
+# Resolution of 0.001 um and 0.001 um/m, plus the rounding of a row.
 ROUNDING_UM = 0.02
 
 MODEL = f"""format = 1
@@ -26,7 +26,7 @@ axis = "x_mm"
 positions_mm = {NODES_MM}
 rows_um_per_K.x_um = {[[row] for row in ROWS_UM_PER_K]}
 """
-# The daemon's file from its sensor on.
+# The daemon's configuration from its sensor on.
 FILTER = """[screening]
 settle_s = 0.0
 stale_after_s = 2.0
@@ -54,7 +54,7 @@ def axis_text(form_text):
 
 
 def simulated_axis_text(form_text):
-    """The controller refuses beyond its own bound and steps no faster than 100 um/s by itself."""
+    """The controller refuses offsets beyond its bound and slews by at most 100 um/s itself."""
     axis = axis_text(form_text).replace("rate_um_per_s_max = 40.0", "rate_um_per_s_max = 100.0")
     for key in ("[axis.line]\n", "[axis.table]\n"):
         axis = axis.replace(key, key + "interpolation_um_per_s_max = 100.0\n")
@@ -62,7 +62,7 @@ def simulated_axis_text(form_text):
 
 
 def machine_text(bus, bed, controller, form_text):
-    """The simulator's file. bus: with its device; bed: the place of its temperature there."""
+    """The simulator's configuration. bus: with its device; bed: place of its temperature."""
     return ("format = 1\n" + bus + '[[channel]]\ncolumn = "bed_degC"\n' + bed + controller +
             simulated_axis_text(form_text))
 
@@ -79,7 +79,7 @@ def curve_um(position_mm):
 
 
 def left_um(form, at_mm):
-    """Of the curve, by the line nearest to it, which lies beside both ends; by the table nothing."""
+    """Remainder at a place: of the curve less its nearest line; zero for the table."""
     if form == "table":
         return 0.0
     return curve_um(at_mm) - (LINE_DEVIATION_UM + 4.0 * WARM_K * at_mm / NODES_MM[-1])
@@ -112,7 +112,7 @@ class Moving:
     """The simulated controller with its slide, and the daemon."""
 
     def __init__(self, lab, machine, daemon_text, stay=True, tick_ms=5):
-        """daemon_text: made of the ports that the simulator has."""
+        """daemon_text: function of the simulator's ports."""
         self.lab = lab
         run = lab.folder / "run.csv"
         write_run(run)
@@ -124,7 +124,7 @@ class Moving:
         self.daemon = lab.daemon(daemon_text(self.simulator.ready["ports"]))
 
     def errors_beside(self, expected_um):
-        """|error| of the tool in each row on the way, less what is expected at that place."""
+        """|error| of the tool in each row of the motion, less the expected one."""
         columns = read_columns(self.truth)
         errors = [abs(error - expected_um(position_mm(time_s)))
                   for time_s, error in zip(columns["time_s"], columns["x_error_um"])
@@ -133,7 +133,7 @@ class Moving:
         return errors
 
     def assert_interpolates(self, form, patience_s):
-        """The whole run, from the first start on: axes, error at the tool, replay."""
+        """Runs everything from the first start on: axes, error at the tool, replay."""
         daemon = self.daemon.start()
         self.simulator.wait(patience_s)
         names = [axis["name"] for axis in daemon.status()["axes"]]
@@ -144,8 +144,7 @@ class Moving:
         assert_replays_exactly(daemon.history, self.lab.folder / "out.csv")
 
     def assert_error_is_of(self, form):
-        """On a busy machine the simulator's own looks at the slide come late: of half of the rows none
-        was."""
+        """On a busy machine the simulator samples the slide late, but in less than half of the rows."""
         off_um = sorted(self.errors_beside(lambda at_mm: left_um(form, at_mm)))
         peak_um = max(self.errors_beside(lambda _at_mm: 0.0))
         print(f"{form}: peak error {peak_um:.3f} um at 10 m/min, beside what is expected "
@@ -153,6 +152,6 @@ class Moving:
         assert off_um[len(off_um) // 2] <= ROUNDING_UM
 
     def wait_for_warm_line(self):
-        """Nearest to a curve of 0 to -40 um with its bend of 5 um: 2.5 um beside both ends."""
+        """The line nearest to a curve of 0 to -40 um with a bend of 5 um: 2.5 um off at both ends."""
         self.daemon.wait_for_offset(-LINE_DEVIATION_UM, 0.01, "x_1")
         self.daemon.wait_for_offset(-4.0 * WARM_K - LINE_DEVIATION_UM, 0.01, "x_2")

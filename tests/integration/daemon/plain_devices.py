@@ -1,5 +1,5 @@
-"""A thermocouple module and a controller on Modbus TCP that do what a test tells them, at once, and
-note every write. Small on purpose, and not the simulator's code."""
+"""A thermocouple module and a controller on Modbus TCP, set by a test at any time, that record
+every write. Intentionally small and independent of the simulator."""
 
 import socket
 import struct
@@ -8,11 +8,11 @@ import time
 
 
 class PlainDevice:
-    """Tables of one Modbus TCP device. The same port after a restart; registers are then 0."""
+    """Tables of one Modbus TCP device. Restarts keep the port; registers are then 0."""
 
     def __init__(self, port):
         self.port = port
-        self.refused = set()  # functions that are answered with exception 1
+        self.refused = set()  # functions answered with exception 1
         self.lock = threading.Lock()
         self.server = None
         self.start()
@@ -26,7 +26,7 @@ class PlainDevice:
         self.threads[0].start()
 
     def stop(self):
-        """As a switched-off device: connections are closed, new ones refused."""
+        """Like a switched-off device: connections are closed, new ones refused."""
         server, self.server = self.server, None
         if server is None:
             return
@@ -126,7 +126,7 @@ class PlainController(PlainDevice):
             self.show_applied()
 
     def show_more_um(self, um):
-        """What is shown is so much more than what is applied."""
+        """Adds a constant to the read-back."""
         with self.lock:
             self.shown_more_um = um
             self.show_applied()
@@ -147,7 +147,7 @@ outputs = ["z_um"]
 reference = "first_sample"
 matrix_um_per_K = [[3.0, -1.5]]
 """
-# A block a sensor, and readings that are used as they are.
+# One block per sensor, without screening and smoothing of readings.
 BLOCKS = """[screening]
 settle_s = 0.0
 stale_after_s = {stale_after_s}
@@ -224,7 +224,7 @@ commit_s = 0.2
 
 
 class Machine:
-    """Module, controller and a daemon between them; the daemon is started by the test."""
+    """Module, controller and a daemon between them; the test starts the daemon."""
 
     def __init__(self, lab, controller=PlainController):
         from lab import free_port
@@ -237,7 +237,7 @@ class Machine:
         self.daemon = lab.daemon(self.config)
 
     def warm_by(self, offset_um):
-        """The column is so warm, over the 20 degC of the reference, that this is the offset."""
+        """Sets the column temperature for this offset, relative to the 20 degC of the reference."""
         self.module.show(20.0 - offset_um / 3.0, 20.0)
 
     def start(self):
@@ -246,8 +246,8 @@ class Machine:
 
 
 def assert_slewed(orders, slack_s=0.7):
-    """No two orders are farther apart than the slew rate allows; between the computation of an
-    offset and its arrival this machine may have done something else for so long."""
+    """Consecutive orders differ by at most the slew limit; the slack covers a busy machine's delay
+    between computing an offset and its arrival."""
     assert len(orders) > 1
     for (earlier_s, earlier), (later_s, later) in zip(orders, orders[1:]):
         allowed = RATE_UM_PER_S * (later_s - earlier_s + slack_s) + 0.001
@@ -255,17 +255,16 @@ def assert_slewed(orders, slack_s=0.7):
 
 
 class PlainAmplifier(PlainController):
-    """The amplifier of a piezo: register 0 is the voltage to give, in 0.01 V. What the piezo does
-    with it hangs on its past: it lags by PLAY_V behind a voltage unless that was reached from 0 V.
-    Input register 10 shows the voltage it gives."""
+    """A piezo amplifier: register 0 is the voltage in 0.01 V. The piezo has hysteresis: it lags by
+    PLAY_V behind a voltage not approached from 0 V. Input register 10 shows the voltage."""
 
     CURVE = ((0.0, -22.0), (25.0, -16.5), (50.0, -9.4), (75.0, -1.3), (100.0, 7.2),
              (125.0, 15.4), (150.0, 22.8))
     PLAY_V = 8.0
 
     def start(self):
-        self.volts = []  # each voltage that differs from the one before
-        self.bent_V = 0.0  # what the ceramic has followed
+        self.volts = []  # without repetitions
+        self.bent_V = 0.0  # voltage followed by the ceramic
         self.obeys = True
         super().start()
 
@@ -274,7 +273,7 @@ class PlainAmplifier(PlainController):
             self.follow(0.01 * self.tables[3].get(0, 0))
 
     def give(self, voltage):
-        """This voltage, whatever is written, until it obeys."""
+        """Keeps this voltage, whatever is written, until obey()."""
         with self.lock:
             self.obeys = False
             self.follow(voltage)
@@ -289,7 +288,7 @@ class PlainAmplifier(PlainController):
             self.volts.append(voltage)
         if voltage == 0.0:
             self.bent_V = 0.0
-        else:  # upwards it follows, downwards it stays behind
+        else:  # follows upwards, lags downwards
             self.bent_V = max(voltage, min(self.bent_V, voltage + self.PLAY_V))
 
     def displacement_um(self):
@@ -304,7 +303,7 @@ class PlainAmplifier(PlainController):
         with self.lock:
             return list(self.volts)
 
-# The same module and controller as thermocomp-sim has them.
+# The same module and controller for thermocomp-sim.
 SIMULATED = """format = 1
 [[bus]]
 name = "sensors"

@@ -1,5 +1,4 @@
-"""Reloads, one after the other, while clients ask and operate: by socket and by SIGHUP, with a model
-that changes each time."""
+"""Consecutive reloads by socket and SIGHUP, each with another model, while clients query and operate."""
 
 import statistics
 import threading
@@ -14,7 +13,7 @@ CLIENTS = 4
 
 
 class ReloadRounds:
-    """A daemon at a rate, reloaded again and again."""
+    """A daemon with a given cycle rate, reloaded repeatedly."""
 
     def __init__(self, lab, rate_hz):
         self.lab = lab
@@ -32,7 +31,7 @@ class ReloadRounds:
         self.hung_up_at = 0
 
     def ask(self, number):
-        """Each client asks; the first also switches off and on, and sees that it holds."""
+        """Each client queries; the first also switches off and on and checks that it holds."""
         while self.running:
             begun = time.monotonic()
             status = self.daemon.status()
@@ -52,7 +51,7 @@ class ReloadRounds:
             self.wrong.append(f"{method} was done, and is not")
 
     def reload(self, number):
-        """Another gain each time; what is shown must be what was written."""
+        """Another gain each time, which the status must show."""
         self.machine.model.write_text(MODEL.replace("3.0,", f"{3.0 + 0.001 * (number % 7)},"))
         begun = time.monotonic()
         if len(self.reloads_s) % 5 == 4 and self.hung_up_at != len(self.reloads_s):

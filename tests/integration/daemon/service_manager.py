@@ -1,4 +1,4 @@
-"""Listens where systemd would, and notes what the daemon tells it and when."""
+"""Receives notifications in place of systemd and records them with their times."""
 
 import socket
 import threading
@@ -8,7 +8,7 @@ WATCHDOG_S = 6.0
 
 
 class ServiceManager:
-    """As systemd with WatchdogSec=6; a daemon that is given `environment` talks to it."""
+    """Like systemd with WatchdogSec=6, for a daemon started with `environment`."""
 
     def __init__(self, path):
         self.environment = {"NOTIFY_SOCKET": str(path),
@@ -40,7 +40,7 @@ class ServiceManager:
 
 
 class Metronome:
-    """How late this computer is: a thread that wants to wake every 20 ms."""
+    """Latency of this computer, from a thread that wakes every 20 ms."""
 
     PERIOD_S = 0.02
 

@@ -1,9 +1,8 @@
-"""The measured spindle run, served over a bus into the daemon, and what must come out.
+"""The measured spindle run, served to the daemon over a bus, with the required offsets.
 
-Every row of the run stands for a while on the simulated devices. The offset that the daemon has at
-the end of that while must be the negative of the model's prediction for that row, relative to the
-first row, as `thermocomp predict` computes it from the file, to within the resolution of the
-registers in between."""
+The simulated devices show every row for a period. The daemon's offset at its end must be the
+negative of the model's prediction for that row, relative to the first row, as computed by
+`thermocomp predict` from the file, within the resolution of the registers."""
 
 import csv
 import dataclasses
@@ -19,11 +18,11 @@ MODEL = DATA / "spindle_46h" / "static_model.toml"
 MISSING = f"the measured spindle run is not there: {RUN}"
 SENSORS = 16
 AXES = 5
-# The first row stands so long that the daemon has its reference before the second comes.
+# Long enough for the daemon to take its reference before the second row.
 FIRST_ROW_S = 3.0
-# Of the controller's registers. In the history an offset has all its digits.
+# Resolution of the controller's registers. The history has offsets with all digits.
 OFFSET_RESOLUTION_UM = 0.001
-# What the order of additions may change: some 16 terms of 100 um in doubles.
+# Effect of another order of additions: some 16 terms of 100 um in doubles.
 ARITHMETIC_UM = 1e-11
 
 
@@ -33,16 +32,16 @@ def is_here():
 
 @dataclasses.dataclass
 class Bus:
-    """The texts in which the buses differ, and what a transmitted temperature looks like."""
+    """Configuration texts and temperature encoding of a bus."""
     name: str
     machine: str  # of thermocomp-sim: bus, device, controller
     daemon: str  # of thermocompd: the same
-    place: typing.Callable  # index of a sensor -> keys that say where its value is
+    place: typing.Callable  # index of a sensor -> keys of its value's place
     offset: typing.Callable  # index of an axis -> value of the key `offset`
     applied: typing.Callable
-    transmitted: typing.Callable  # temperatures -> as they arrive
-    half_step_K: typing.Callable  # temperatures -> largest error of one that arrives
-    whole_rows: bool = True  # never temperatures of two rows at once: they come in one answer
+    transmitted: typing.Callable  # temperatures -> as received
+    half_step_K: typing.Callable  # temperatures -> largest error of a received one
+    whole_rows: bool = True  # one answer has temperatures of one row only
 
 
 def as_float32(temps):
@@ -73,7 +72,7 @@ encoding = "uint16"
 
 
 def modbus_bus(kind, order, sensors, controller):
-    """`sensors` and `controller`: pairs of the keys of the place, simulator's and daemon's."""
+    """`sensors` and `controller`: pairs of address keys, simulator's and daemon's."""
     def texts(who, conversion, cycle):
         return (f'[[bus]]\nname = "sensors"\nkind = "{kind}"\n{sensors[who]}\n' +
                 MODBUS_DEVICE + f'word_order = "{order}"\nperiod_s = {conversion}\n' +
@@ -89,7 +88,7 @@ def modbus_bus(kind, order, sensors, controller):
 
 
 def can_bus(interface, controller_interface):
-    """Four temperatures a frame of 16-bit numbers; two offsets a frame."""
+    """Four temperatures per frame of 16-bit numbers; two offsets per frame."""
     def offset(i, first_id):
         return (f"{{ id = {first_id + i // 2}, start_bit = {32 * (i % 2)}, length_bits = 32, "
                 "scale = 0.001 }")
@@ -138,7 +137,7 @@ def daemon_text(bus, rate_hz=500, smoothing=NO_SMOOTHING, model=MODEL, limits=AM
     sensors = (f'[[sensor]]\nname = "t{i + 1}"\ndevice = "module"\n{bus.place(i)}\n'
                f'[[block]]\nname = "t{i + 1}"\ninput = "t{i + 1}_degC"\nsensors = ["t{i + 1}"]\n'
                for i in range(SENSORS))
-    # Hours of the run go by in seconds: the screening must not mind.
+    # The accelerated run must pass screening.
     return (f'format = 1\n@STATE@\n[loop]\nrate_hz = {rate_hz}\n[model]\nfile = "{model}"\n' +
             bus.daemon + "".join(axis_text(bus, i, limits) for i in range(AXES)) +
             "".join(sensors) +
@@ -148,8 +147,7 @@ def daemon_text(bus, rate_hz=500, smoothing=NO_SMOOTHING, model=MODEL, limits=AM
 
 
 def write_replay_file(path, rows, row_period_s):
-    """The run's first rows, of which the very first stands for FIRST_ROW_S. Returns how often that
-    one is repeated."""
+    """Writes the run's first rows; the first one lasts FIRST_ROW_S. Returns its number of repetitions."""
     repeats = round(FIRST_ROW_S / row_period_s)
     with RUN.open(newline="") as text:
         lines = list(csv.reader(text))[:rows + 1]
@@ -163,7 +161,7 @@ def write_replay_file(path, rows, row_period_s):
 
 
 def predicted_um(folder, rows):
-    """(rows, axes): the model's word, relative to the first row."""
+    """(rows, axes): predicted displacement, relative to the first row."""
     out = folder / "predicted.csv"
     status, _, said = run_tool("predict", "--model", MODEL, RUN, "-o", out)
     assert status == 0, said
@@ -180,14 +178,14 @@ def offsets_um(columns, part):
 
 
 def bound_um(bus, temps):
-    """An axis: sum |P| times the error of a temperature, now and when the reference was taken."""
+    """Per axis: sum |P| times the temperature error, now and at the reference."""
     matrix = np.array(tomllib.loads(MODEL.read_text())["matrix_um_per_K"])
     return 2.0 * np.sum(np.abs(matrix), axis=1) * bus.half_step_K(temps) + ARITHMETIC_UM
 
 
 @dataclasses.dataclass
 class Agreement:
-    """Of one place where the offsets were looked at."""
+    """Agreement of the offsets at one place."""
     place: str
     rows: int
     settled: int
@@ -202,10 +200,10 @@ class Agreement:
 
 
 def agreement_in_history(bus, folder, history, rows, repeats, row_log, rate_hz):
-    """The last noted cycle before the next row became visible. A row is settled if all its
-    temperatures, and none of another row, had been read in that cycle, and the slew rate did not hold
-    the offset back (after several rows at once); how many are so depends on how busy this machine
-    is."""
+    """Compares the last recorded cycle before the next row became visible. A row is settled if all
+    its temperatures, and none of another row, had been read in that cycle, and the slew limit did
+    not limit the offset (after several rows at once). The number of settled rows depends on how
+    busy this machine is."""
     run = folder / "exported.csv"
     status, _, said = run_tool("export", history, "-o", run)
     assert status == 0, said
@@ -225,7 +223,7 @@ def agreement_in_history(bus, folder, history, rows, repeats, row_log, rate_hz):
     assert len(log["row"]) == rows + repeats - 1
     visible_s = 1e-9 * np.array(log[next(name for name in log if name != "row")])
     ends = np.searchsorted(times_s, visible_s[repeats:]) - 1
-    ends = np.append(ends, len(times_s) - 1)  # the last row stood until all was over
+    ends = np.append(ends, len(times_s) - 1)  # the last row stays until the end
     settled = np.all(np.abs(read[ends] - arriving) < 1e-9, axis=1)
     steps = np.abs(offsets[ends] - offsets[ends - 1])
     settled &= np.all(steps < 0.9 * RATE_UM_PER_S / rate_hz, axis=1)
@@ -236,10 +234,10 @@ def agreement_in_history(bus, folder, history, rows, repeats, row_log, rate_hz):
 
 
 def agreement_at_controller(bus, folder, truth, rows, repeats):
-    """What the simulated controller applied when the next row came: this row's offsets, or, where
-    this machine was too busy for the row's time, those of a row shortly before."""
+    """Compares the offsets that the simulated controller applied when the next row came: those of
+    this row or, on a busy machine, of a recent one."""
     wanted = -predicted_um(folder, rows)
-    # The simulator notes a row when the next one comes, so all rows but their order are alike.
+    # The simulator records a row when the next one comes: only their order matters.
     applied = offsets_um(read_columns(truth), "offset")[repeats - 1:]
     assert len(applied) == rows
     file_columns = {name: values[:rows] for name, values in read_columns(RUN).items()}
@@ -284,7 +282,7 @@ def replay_spindle(lab, bus, rows, row_period_s, rate_hz=500, tick_ms=1):
 
 
 def with_ports(text, ready):
-    """@NAME@ stands for the port that the simulator took for the bus NAME."""
+    """Replaces @NAME@ by the simulator's port for the bus NAME."""
     for name, port in ready["ports"].items():
         text = text.replace(f"@{name}@", str(port))
     return text

@@ -1,18 +1,18 @@
-"""A cycle that stands still while it is told to."""
+"""A cycle that stalls on request."""
 
 import os
 import time
 
 
 class Stall:
-    """While it lasts, the cycle of a daemon with this environment does not run. The daemon waits 5 s
-    for its cycle."""
+    """A context in which the cycle of a daemon with this environment does not run. The daemon waits
+    5 s for its cycle."""
 
     def __init__(self, file):
         self.file = file
         self.environment = {"THERMOCOMP_STALL": str(file),
                             "LD_PRELOAD": os.environ["THERMOCOMP_STALLED_CYCLE"],
-                            # What is preloaded comes before the sanitizer's own library.
+                            # Preloaded libraries come before the sanitizer's.
                             "ASAN_OPTIONS": os.environ.get("ASAN_OPTIONS", "") +
                                             ":verify_asan_link_order=0"}
 

@@ -1,5 +1,5 @@
-// Preloaded into thermocompd by tests: while the file that THERMOCOMP_STALL names exists, the
-// cycle's sleep to the next point of its grid does not end. Everything else goes on.
+// Preloaded into thermocompd by tests: while the file named by THERMOCOMP_STALL exists, the cycle's
+// sleep to the next cycle does not end. All other threads continue.
 #undef _FORTIFY_SOURCE
 #include <cstdlib>
 #include <ctime>
@@ -10,7 +10,7 @@ extern "C" int clock_nanosleep(clockid_t clock, int flags, const timespec* time,
   static const auto real =
       reinterpret_cast<decltype(&clock_nanosleep)>(::dlsym(RTLD_NEXT, "clock_nanosleep"));
   if (real == nullptr) std::abort();
-  // Nobody else in the daemon sleeps to a time.
+  // No other thread of the daemon sleeps to an absolute time.
   if (clock == CLOCK_MONOTONIC && (flags & TIMER_ABSTIME) != 0) {
     const char* file = std::getenv("THERMOCOMP_STALL");
     const timespec pause{0, 5'000'000};

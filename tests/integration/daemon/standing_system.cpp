@@ -1,6 +1,6 @@
-// Preloaded into thermocompd by tests: a system whose calls stand. While the file that
-// THERMOCOMP_STANDS names exists, the calls listed in THERMOCOMP_STANDING do not return, but for at
-// most 6 s each: "fsync:TEXT" and "open:TEXT" (files whose path contains TEXT), "groups".
+// Preloaded into thermocompd by tests: blocks system calls. While the file named by
+// THERMOCOMP_STANDS exists, the calls listed in THERMOCOMP_STANDING do not return for up to 6 s:
+// "fsync:TEXT" and "open:TEXT" (files whose path contains TEXT), "groups".
 #undef _FORTIFY_SOURCE
 #include <algorithm>
 #include <array>
@@ -24,7 +24,7 @@ Function* real(Function*, const char* name) {
   return found;
 }
 
-/// Whether `call` is listed, with a text that `path` contains.
+/// True if `call` is listed, with a text contained in `path`.
 bool is_standing(const char* call, const char* path) {
   const char* listed = std::getenv("THERMOCOMP_STANDING");
   std::string rest = listed != nullptr ? listed : "";

@@ -1,4 +1,4 @@
-"""A dry run beside real sockets: everything is read, computed and recorded, nothing is written."""
+"""A dry run with real sockets: everything is read, computed and recorded, nothing is written."""
 
 import json
 import math
@@ -9,8 +9,8 @@ from lab import Refused, assert_replays_exactly, eventually, free_port, read_col
 from plain_devices import CONFIG, PlainAmplifier, PlainController, PlainModule
 from test_piezo import APPLIED, CURVE, OFFSET, READ_BACK, VOLTS
 
-READS = {1, 2, 3, 4}  # the function codes of Modbus that change nothing
-# With an axis' position and the spindle's speed: what a model must not lack in a dry run.
+READS = {1, 2, 3, 4}  # Modbus function codes that change nothing
+# With axis position and spindle speed, which the model also needs in a dry run.
 MODEL = """format = 1
 inputs = ["column_degC", "spindle_degC"]
 outputs = ["z_um"]
@@ -42,7 +42,7 @@ encoding = "uint16"
 
 
 def noting(kind):
-    """The same device, which notes the function code of every request."""
+    """A device of this kind that records the function code of every request."""
 
     class Noting(kind):
         def start(self):
@@ -88,7 +88,7 @@ class Machine:
 
 def assert_only_read(controller):
     asked = set(controller.asked())
-    assert {2, 4} <= asked <= READS, sorted(asked)  # its inputs, of both kinds
+    assert {2, 4} <= asked <= READS, sorted(asked)  # inputs of both kinds
 
 
 def test_everything_is_read_and_nothing_is_written(lab):
@@ -96,7 +96,7 @@ def test_everything_is_read_and_nothing_is_written(lab):
     status, out, said = run_tool("check", machine.daemon.config)
     assert status == 0, said
     assert "controller cnc (modbus_tcp), DRY RUN: nothing is written to it" in out
-    machine.controller.force_applied_um(3.0)  # what somebody else left there
+    machine.controller.force_applied_um(3.0)  # an offset of another writer
     daemon = machine.dry_run_to(6.0)
     told = eventually(lambda: (now := daemon.status())["controller"]["shown"]["z"] and now,
                       "what the controller applies is read")
@@ -114,7 +114,7 @@ def test_everything_is_read_and_nothing_is_written(lab):
         daemon.call("prove", axis="z", value_um=3.0)
     for command in ("disable", "enable"):
         daemon.call(command)
-    # What a dry run computes is no offset, what somebody else has left there is one.
+    # The computed offset of a dry run does not count, the other writer's does.
     with pytest.raises(Refused, match="axis z has an offset of \\+3.00"):
         daemon.call("reference")
     daemon.call("reference", force=True)
@@ -150,7 +150,7 @@ def test_what_was_sent_before_is_kept_and_a_real_run_writes(lab):
     machine.warm_by(6.0)
     daemon.wait_for_offset(6.0)
     daemon.end()
-    assert 16 in machine.controller.asked()  # so this test can see a write
+    assert 16 in machine.controller.asked()  # this test detects a write
     sent_um = json.loads(daemon.state.read_text())["offset_um"]
     assert abs(sent_um["z"] - 6.0) < 0.02
     daemon.write_config(machine.dry)

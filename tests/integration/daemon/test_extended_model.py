@@ -1,5 +1,5 @@
-"""A model that `thermocomp diagnose` has extended, in the running daemon: the offsets are the tool's
-prediction from the same readings."""
+"""A model extended by `thermocomp diagnose` in the running daemon: its offsets equal the prediction
+of the tool from the same readings."""
 
 import re
 import tomllib
@@ -19,7 +19,7 @@ pytestmark = [
 ROWS = 400
 ROW_PERIOD_S = 0.025
 PERIOD_S = 0.01  # of the daemon's cycle
-# Rows of 15 s go by in 25 ms, and so must the terms' lags.
+# Rows of 15 s are replayed in 25 ms, so the lags of terms are scaled.
 TIME_FACTOR = 15.0 / ROW_PERIOD_S
 HEAT_TAU_S = 1200.0
 HEAT_UM_PER_RPM = 0.004
@@ -36,8 +36,7 @@ def low_pass(values, tau_s, step_s):
 
 
 def write_machine_with_heat(path):
-    """The measured temperatures, and displacements of a machine that the model is right of but for
-    heat that no sensor sees."""
+    """The measured temperatures, with displacements of the model plus heat that no sensor measures."""
     columns = read_columns(spindle.RUN)
     temps = spindle.temps_degC(columns)
     matrix = np.array(tomllib.loads(spindle.MODEL.read_text())["matrix_um_per_K"])
@@ -51,7 +50,7 @@ def write_machine_with_heat(path):
 
 
 def extended_model(folder):
-    """What diagnose makes of the model, its lags as fast as the rows go by."""
+    """The model extended by diagnose, with lags scaled to the replay."""
     run = folder / "heat.csv"
     write_machine_with_heat(run)
     status, said, errors = run_tool("diagnose", "--model", spindle.MODEL, "--train", f"{run}@:60000",
@@ -68,8 +67,8 @@ def extended_model(folder):
 
 
 def as_bank(path):
-    """The same model with its terms as one bank of lags, a temperature in it that adds nothing at
-    first and later takes part of its own displacement back, and a hinge of the speed."""
+    """The same model with its terms as one bank of lags, a temperature in it that at first adds
+    nothing and later reduces its own displacement, and a hinge of the speed."""
     text = path.read_text()
     model = tomllib.loads(text)
     term, = model["term"]
@@ -86,16 +85,16 @@ def as_bank(path):
 
 
 def late_um(times_s, rpm_max):
-    """What cycles may make of it that a busy machine left out: the daemon's lag begins to follow a
-    new speed in the cycle after it, the prediction's at the row before."""
+    """Bound on the effect of cycles left out by a busy machine: the daemon's lag follows a new
+    speed in the cycle after it, the prediction's at the row before."""
     steps_s = np.diff(times_s)
     left_out_s = np.sum(np.maximum(0.0, steps_s - 1.01 * PERIOD_S))
     return 1e-9 + HEAT_UM_PER_RPM * rpm_max * left_out_s * TIME_FACTOR / HEAT_TAU_S
 
 
 def last_row_came(temps, times_s):
-    """The cycle that read the run's last row. The machine stands still for a second then, and what
-    changes afterwards is its end: readings go, one by one, and the offsets are held."""
+    """The cycle that read the run's last row. The values then rest for a second; later changes
+    belong to the end: readings are lost one by one, and the offsets are held."""
     changes = np.flatnonzero(np.any(np.diff(temps, axis=0) != 0.0, axis=1)) + 1
     still = np.flatnonzero(np.diff(times_s[changes]) > 20 * ROW_PERIOD_S)
     after_rows = [int(i) for i in still if i > ROWS / 2]
@@ -117,7 +116,7 @@ def test_the_offsets_of_an_extended_model_are_its_prediction(lab, bank):
     simulator = lab.simulator(spindle.machine_text(bus), "--replay", run, "--row-period-ms",
                               1000 * ROW_PERIOD_S, "--start-on-heartbeat", "--settle-s", 1,
                               "--tick-ms", 2)
-    # Every cycle is noted, so that the exported rows are all that the terms have seen.
+    # Every cycle is recorded, so that the exported rows contain all inputs of the terms.
     daemon = lab.daemon(spindle.daemon_text(bus, rate_hz=round(1 / PERIOD_S), model=model))
     daemon.config.write_text(spindle.with_ports(daemon.config.read_text(), simulator.ready))
     daemon.start()

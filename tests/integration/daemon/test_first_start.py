@@ -1,5 +1,5 @@
-"""A machine's first day: nothing moves before an operator says so, and what would take a wrong
-reference is refused. The real daemon beside the simulated machine."""
+"""A machine's first day: nothing moves before an operator's command, and a wrong reference is
+refused. The real daemon with the simulated machine."""
 
 import json
 import subprocess
@@ -10,14 +10,13 @@ import pytest
 from lab import BIN, Refused, eventually, run_tool
 from plain_devices import CONFIG, MODEL, SIMULATED
 
-# The column cools by 4 K, for which 12 um are to be added.
+# The column cools by 4 K, which requires 12 um.
 WANTED_um = 12.0
 REJECTS = '[[event]]\nkind = "reject"\ntarget = "cnc"\nat_s = 0.0\nduration_s = 1e9\n'
 
 
 class FirstDay:
-    """thermocomp-sim with module and controller; the daemon's configuration says nothing of its
-    first start."""
+    """thermocomp-sim with module and controller; the daemon's configuration without first-start keys."""
 
     def __init__(self, lab):
         self.lab = lab
@@ -28,7 +27,7 @@ class FirstDay:
         self.simulator = None
 
     def show(self, rows, events=""):
-        """These rows of the run, from now on; the machine stays where it was switched off."""
+        """Shows these rows of the run from now on; the machine keeps its position."""
         if self.simulator is not None:
             self.simulator.end()
         ports = [word for name, port in self.ports.items() for word in ("--port", f"{name}={port}")]
@@ -75,7 +74,7 @@ def test_nothing_moves_before_an_operator_enables_it_and_what_was_said_survives(
     assert status == 1 and "never switched on yet -> switch it on: thermocomp enable" in out
     assert "NEVER COMPARED with measured displacement" in out
     daemon.end()
-    daemon.start().wait_for_mode("disabled")  # a restart is no answer
+    daemon.start().wait_for_mode("disabled")  # a restart does not change this
 
     assert daemon.cli("enable")[0] == 0
     eventually(lambda: daemon.axis()["applied"] == pytest.approx(WANTED_um, abs=0.05), "applied")
@@ -100,7 +99,7 @@ def test_a_reference_is_refused_where_it_would_be_wrong_unless_forced(day):
     began_s = time.time()
     status, out, said = daemon.cli("reference")
     assert status == 0, said
-    assert "the temperatures have been watched for" in out  # too short to tell slow warming
+    assert "the temperatures have been watched for" in out  # too short to detect slow warming
     told = daemon.status()["reference"]
     assert told["by"] == "operator" and not told["lost"]
     assert began_s - 1.0 <= told["wall_s"] <= time.time() + 1.0
@@ -126,7 +125,7 @@ def test_a_reference_is_refused_where_it_would_be_wrong_unless_forced(day):
         daemon.call("reference", force="yes")
     assert daemon.status()["reference"] == told
 
-    # While an axis is proved.
+    # While an axis is being proved.
     moving = subprocess.Popen([BIN / "thermocomp", "--socket", daemon.socket, "prove", "z", "4"],
                               stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     eventually(lambda: daemon.axis()["proving"], "it moves")
@@ -140,7 +139,7 @@ def test_a_reference_is_refused_where_it_would_be_wrong_unless_forced(day):
     forced = daemon.status()["reference"]
     assert forced["temps_degC"]["column_degC"] == 16.0 and forced["wall_s"] > told["wall_s"]
     daemon.wait_for_offset(0.0, 0.0)
-    # It is the state file's, also for the next start.
+    # Stored in the state file, also for the next start.
     daemon.kill()
     kept = json.loads(daemon.state.read_text())["reference_taken"]
     assert kept == {"by": "operator", "wall_s": forced["wall_s"]}
@@ -161,7 +160,7 @@ def test_proving_waits_shows_progress_and_tells_what_was_read(day):
     assert "axis z: sent +4.00 um, read back +4.00 um\n" in said
     eventually(lambda: not daemon.axis()["proving"] and daemon.axis()["applied"] == 0.0, "back")
 
-    # A controller that takes nothing: what is read back does not move.
+    # A controller that refuses writes: its read-back does not change.
     day.show("0:1", REJECTS)
     eventually(lambda: daemon.status()["controller"]["online"] and daemon.axis()["driven"],
                "the controller is back")
@@ -181,7 +180,7 @@ def test_a_sensor_that_jumps_counts_only_once_an_operator_accepts_it(day):
     daemon.config.write_text(daemon.config.read_text().replace(
         "settle_s = 0.0\n", "settle_s = 0.5\n").replace("rate_allowance_K = 100.0\n", ""))
     daemon.start().wait_for_mode("compensating")
-    assert daemon.cli("accept", "column")[0] != 0  # nothing is asked
+    assert daemon.cli("accept", "column")[0] != 0  # no question
     show_column(68)  # degF
     eventually(lambda: "sensor_unconfirmed" in daemon.status()["reasons"] and
                daemon.status()["mode"] == "holding", "the jump is told")
@@ -196,7 +195,7 @@ def test_a_sensor_that_jumps_counts_only_once_an_operator_accepts_it(day):
     daemon.start()
     eventually(lambda: "sensor_unconfirmed" in daemon.status()["reasons"], "the jump outlives a restart")
     ages_s = {each["name"]: each["age_s"] for each in daemon.call("sensors")["sensors"]}
-    assert ages_s["column"] is None, ages_s  # it gave nothing that counts since the start
+    assert ages_s["column"] is None, ages_s  # no valid reading since the start
     assert daemon.cli("accept", "column")[0] == 0
     daemon.wait_for_mode("compensating")
     assert column(daemon)["temp_degC"] == pytest.approx(68.0, abs=0.02)

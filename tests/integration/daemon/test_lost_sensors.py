@@ -1,11 +1,11 @@
-"""A block without a good sensor: estimated from the other, said, kept over a restart, replayed."""
+"""A block without a good sensor: estimated from the other, reported, kept over a restart, replayed."""
 
 import pytest
 
 from lab import assert_replays_exactly, eventually, run_tool
 from plain_devices import MODEL, Machine, assert_slewed
 
-# The spindle follows the column; a year is long enough to see no drift in this test.
+# The spindle follows the column; a year's drift is invisible in this test.
 COVARIANCE = "[covariance]\nmatrix_K2 = [[4.0, 3.9], [3.9, 4.0]]\ndrift_time_s = 3e7\n"
 SHARE = 3.9 / 4.0004  # of the column's change, noise_K included
 BROKEN_degC = 320.0
@@ -66,7 +66,7 @@ def test_after_a_restart_the_estimate_goes_on_until_it_is_too_uncertain(machine)
     status = wait_for_reasons(daemon, "block_estimated")
     daemon.wait_for_offset(offset_um(2.0, 2.0 * SHARE), 0.02)
     sd_um = status["axes"][0]["offset_sd"]
-    assert sd_um > 0.5  # how long it was away is not known: the whole drift
+    assert sd_um > 0.5  # unknown time of absence: the whole drift
 
     daemon.write_config(machine.config.replace(
         "[compensation]\n", f"[compensation]\noffset_sd_um_max = {0.5 * sd_um}\n"))

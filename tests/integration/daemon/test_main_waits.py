@@ -1,4 +1,4 @@
-"""Main waits for nothing: whatever stands (disk, log, journal, name service, systemd itself), the
+"""The main thread never blocks: with a blocked disk, log, journal, name service or systemd, the
 watchdog is fed within a second, clients are answered, `disable` and SIGTERM are obeyed."""
 
 import contextlib
@@ -27,7 +27,7 @@ def manager(lab):
 
 
 class Watched:
-    """A machine whose daemon's waits are measured, beside those of this computer."""
+    """A machine whose daemon's delays are measured together with those of this computer."""
 
     def __init__(self, lab, manager, *standing):
         self.manager = manager
@@ -80,7 +80,7 @@ class Watched:
 
 
 def warm(watched):
-    """Another offset each time: there is something to save."""
+    """Another offset each time, so that there is something to save."""
     watched.machine.warm_by(3.0 + time.monotonic() % 5.0)
 
 
@@ -101,7 +101,7 @@ def test_a_disk_that_takes_seconds_to_save_the_state(lab, manager):
                "it is saved as soon as the disk answers")
     eventually(lambda: not watched.ask()["warnings"], "the warning ends")
     assert watched.ask("enable") == {"done": True}
-    # At the end the disk is waited for, but not for ever.
+    # At the end the daemon waits for the disk, with a limit.
     watched.stands.touch()
     warm(watched)
     time.sleep(0.5)
@@ -167,7 +167,7 @@ def warns_of_log(watched):
 
 
 def fill_log(watched):
-    """Each hang-up finds a configuration with mistakes that take 100 kB to name."""
+    """Each SIGHUP finds a configuration whose errors take 100 kB to report."""
     watched.daemon.write_config(watched.machine.config + "".join(
         f"no_such_key_{i}_{'x' * 4000} = 1\n" for i in range(120)))
 
@@ -190,7 +190,7 @@ def obeys(watched):
 
 
 def start_with_log_in(watched, log, program=()):
-    """Like Daemon.start(), whose log is a file that takes everything."""
+    """Like Daemon.start(), whose log is a file that never blocks."""
     daemon = watched.daemon
     daemon.process = subprocess.Popen(
         [*program, str(BIN / "thermocompd"), str(daemon.config)], stdin=subprocess.DEVNULL,
@@ -223,7 +223,7 @@ def test_a_log_pipe_that_nobody_reads(lab, manager):
     obeys(watched)
     watched.ask_for(1.0)
     watched.judge()
-    # Somebody reads: what is left comes, and how much is lost.
+    # Once somebody reads, the rest arrives with the number of lost messages.
     os.set_blocking(reading, False)
     text = b""
 
@@ -278,7 +278,7 @@ def test_a_service_manager_that_does_not_read(lab):
                                   "WATCHDOG_USEC": "1000000"}
     daemon = machine.start()
     slowest_s = 0.0
-    end = time.monotonic() + 8.0  # ten messages are kept for it, one each third of a second
+    end = time.monotonic() + 8.0  # it keeps ten messages, one per third of a second
     while time.monotonic() < end:
         begun = time.monotonic()
         daemon.status()
@@ -286,7 +286,7 @@ def test_a_service_manager_that_does_not_read(lab):
         time.sleep(0.05)
     assert slowest_s < CLIENT_S
     assert daemon.call("disable") == {"done": True}
-    # What it did not take is told as soon as it reads.
+    # Missed messages are reported as soon as it reads.
     deaf.settimeout(PATIENCE_S)
     while b"stopping" not in (told := deaf.recv(4096)).lower():
         if b"WATCHDOG" in told and daemon.process.poll() is None:

@@ -1,4 +1,4 @@
-"""A piezo in place of a controller, over Modbus TCP: its voltage, the way to it, its read-back."""
+"""A piezo amplifier instead of a controller, over Modbus TCP: voltage, approach and read-back."""
 
 import pytest
 
@@ -18,7 +18,7 @@ steady_s = 0.3
 
 
 class PiezoMachine:
-    """A module of thermocouples, an amplifier with its piezo, and a daemon between them."""
+    """A module of thermocouples, an amplifier with its piezo, and a daemon."""
 
     def __init__(self, lab, read_back):
         self.module = lab.also_end(PlainModule(free_port()))
@@ -36,7 +36,7 @@ class PiezoMachine:
         self.module.show(20.0 - offset_um / 3.0, 20.0)
 
     def reaches(self, displacement_um):
-        """The daemon's offset and the piezo itself; a register and a step that is too small."""
+        """The daemon's offset and the piezo's displacement, within one register and one omitted step."""
         self.daemon.wait_for_offset(displacement_um, 0.05)
         eventually(lambda: abs(self.amplifier.displacement_um() - displacement_um) < 0.25,
                    f"the piezo stands at {displacement_um} um")
@@ -47,7 +47,7 @@ def test_every_voltage_comes_from_0_V_and_is_that_of_the_curve(lab, read_back):
     machine = PiezoMachine(lab, read_back)
     daemon = machine.daemon.start()
     daemon.wait_for_mode("compensating")
-    for offset_um in (6.0, 12.0, 3.0, -9.0):  # down as well, where the piezo would stay behind
+    for offset_um in (6.0, 12.0, 3.0, -9.0):  # also downwards, where the piezo would lag
         machine.warm_by(offset_um)
         machine.reaches(offset_um)
         assert not daemon.axis()["mismatch"]
@@ -55,7 +55,7 @@ def test_every_voltage_comes_from_0_V_and_is_that_of_the_curve(lab, read_back):
     raised = [volt for volt in volts if volt > 0.0]
     assert len(raised) >= 4
     assert all(before == 0.0 for before, volt in zip([0.0] + volts, volts) if volt > 0.0), volts
-    # Beyond the bound the voltage stays that of the bound, within the curve.
+    # Beyond the bound the voltage is that of the bound, within the curve.
     machine.warm_by(40.0)
     machine.reaches(20.0)
     assert daemon.axis()["at_bound"]
@@ -81,7 +81,7 @@ def test_with_read_back_a_restart_leaves_the_tool_where_it_stands(lab):
     daemon.wait_for_offset(10.0, 0.2)
     machine.warm_by(4.0)
     machine.reaches(4.0)
-    # By way of 0 V to the new voltage; not once more to the one it stood at.
+    # Through 0 V to the new voltage, not again to the previous one.
     after = machine.amplifier.all_volts()[len(before):]
     assert len(after) == 2 and after[0] == 0.0 and 0.0 < after[1] < before[-1], (before, after)
 
@@ -97,7 +97,7 @@ def test_an_amplifier_that_does_not_obey_is_seen_and_told_again(lab):
                "and what the amplifier shows")
     disobeyed = len(machine.amplifier.all_volts())
     machine.amplifier.obey()
-    # Who releases looks first: a read-back that changes between two looks keeps the axis latched.
+    # Releasing needs two equal read-backs: a changing one keeps the axis latched.
     eventually(lambda: abs(daemon.axis()["applied"] - 6.0) < 0.1, "it shows what it was told")
     assert daemon.cli("release", "z")[0] == 0
     machine.reaches(6.0)

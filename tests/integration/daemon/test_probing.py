@@ -1,5 +1,5 @@
-"""Displacements measured at the tool correct the running daemon's model; machining cycles set when
-the offset may change."""
+"""Displacements measured at the tool correct the running daemon's model; machining cycles determine
+when the offset may change."""
 
 import json
 import time
@@ -44,15 +44,15 @@ def gain(daemon):
 def test_a_probing_moves_the_estimate_by_a_bounded_step_and_is_replayed(machine, lab):
     with_config(machine, lambda text: text.replace("[history]", CORRECTION + "[history]"))
     daemon = machine.start()
-    machine.warm_by(12.0)  # the model says -12 um
+    machine.warm_by(12.0)  # -12 um by the model
     daemon.wait_for_offset(12.0, 0.05)
     before = daemon.axis()["displacement"]
     assert gain(daemon) == 1.0 and daemon.axis()["correction"]["probing_wanted"]
     due = daemon.status()["probe_due"]
     assert due["z"] is True and due["because_um"] > 3.0, due
     assert "a probing is due: the model may be off by" in daemon.cli("status")[1]
-    assert daemon.status()["warm"]["z"] == {"remaining_um": None, "minutes": None}  # some seconds tell nothing
-    # 12.3 um are left: far more than one probing may say.
+    assert daemon.status()["warm"]["z"] == {"remaining_um": None, "minutes": None}  # too short
+    # A remainder of 12.3 um: far more than one probing may change.
     status, out, said = daemon.cli("measured", "z", "12.3")
     assert status == 0, said
     after = eventually(lambda: daemon.axis()["displacement"] != before and
@@ -88,7 +88,7 @@ def test_without_a_correction_a_probing_is_only_noted(machine):
     time.sleep(0.5)
     assert abs(daemon.axis()["offset"] - 6.0) < 0.05
     assert "correction" not in daemon.axis()
-    assert "probe_due" not in daemon.status()  # the model does not say how good it is
+    assert "probe_due" not in daemon.status()  # the model claims no error
 
 
 def test_a_candidate_is_scored_promoted_and_taken_back(machine, lab):
@@ -152,7 +152,7 @@ def test_a_candidate_is_named_while_the_daemon_runs(machine, lab):
     machine.warm_by(12.0)
     daemon.wait_for_offset(12.0, 0.05)
     assert daemon.cli("reload")[0] == 0
-    assert daemon.status()["candidate"]["file"] == str(new)  # a reload keeps it
+    assert daemon.status()["candidate"]["file"] == str(new)  # kept by a reload
     status, _, said = daemon.cli("candidate", machine.model)
     assert status != 0 and "is the model in use itself" in said, said
     status, _, said = daemon.cli("candidate", lab.folder / "nothing.toml")
@@ -187,7 +187,7 @@ def test_by_cycles_the_offset_changes_at_their_ends_only(machine, lab):
     daemon.wait_for_offset(15.0, 0.05)
     assert daemon.status()["cycle_ends"] == 2
 
-    # The held value outlives a restart: nothing moves before the next cycle end.
+    # The held value survives a restart: nothing moves before the next cycle end.
     machine.warm_by(3.0)
     daemon.end()
     daemon.start().wait_for_mode("compensating")
@@ -198,7 +198,7 @@ def test_by_cycles_the_offset_changes_at_their_ends_only(machine, lab):
 
 
 def polled(machine):
-    """Waits until the daemon has read the controller after what was set before this call."""
+    """Waits for the daemon's next read of the controller."""
     def beats():
         with machine.controller.lock:
             return machine.controller.tables[3].get(3)

@@ -1,4 +1,4 @@
-"""What must not start: one message that says why, and the right exit status."""
+"""Configurations that must not start: one message with the reason, and the right exit status."""
 
 import os
 import subprocess
@@ -9,7 +9,7 @@ from lab import BIN, run_tool
 from plain_devices import CONFIG, MODEL
 
 GOOD = CONFIG.format(module=1502, controller=1503)
-BROKEN = {  # name: (in which file, text, instead of it, what must be named)
+BROKEN = {  # name: (file, text, replacement, words of the message)
     "unknown key": ("config", "rate_hz = 100", "rate_hertz = 100", "rate_hertz"),
     "out of range": ("config", "rate_hz = 100", "rate_hz = 5000", "rate_hz"),
     "not a number": ("config", "offset_um_max = 60.0", "offset_um_max = nan", "offset_um_max"),
@@ -33,7 +33,7 @@ def write(folder, config, model=MODEL):
 
 
 def run_daemon(path, **more):
-    """(exit status, stderr) of a daemon that is expected to end by itself."""
+    """(exit status, stderr) of a daemon that must end by itself."""
     done = subprocess.run([str(BIN / "thermocompd"), str(path)], capture_output=True, text=True,
                           timeout=60, **more)
     return done.returncode, done.stderr
@@ -84,7 +84,7 @@ def test_folders_that_cannot_be_written_are_named(tmp_path):
         key = keys.split(" = ")[0]
         path = write(tmp_path, GOOD)
         lines = path.read_text().splitlines()
-        # The last match of `file` is the history's; of `path` there is the socket's only.
+        # The last match of `file` is the history's; the only `path` there is the socket's.
         index = max(i for i, line in enumerate(lines) if line.startswith(key + " = "))
         lines[index] = keys
         path.write_text("\n".join(lines) + "\n")

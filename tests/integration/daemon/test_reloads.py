@@ -1,4 +1,4 @@
-"""Many reloads beside clients; THERMOCOMP_RELOAD_SHARE=6 in the environment makes it a long run."""
+"""Many reloads with active clients; THERMOCOMP_RELOAD_SHARE=6 in the environment makes it a long run."""
 
 import os
 

@@ -1,5 +1,5 @@
-"""A cycle that stands still for longer than anyone waits for it: whatever an operator was told then
-is what holds, now and after a restart."""
+"""A cycle that stalls longer than anyone waits for it: the answers given to an operator then are
+true, also after a restart."""
 
 import json
 import threading
@@ -28,7 +28,7 @@ def saved(daemon):
 
 
 def asked(daemon, method):
-    """What the daemon answers: a result, or the words of its refusal."""
+    """The daemon's result, or the text of its refusal."""
     try:
         return daemon.call(method)
     except Refused as refusal:
@@ -44,12 +44,12 @@ def test_a_reload_that_is_not_taken_in_time_never_happens(machine, stall, lab):
     with stall:
         said = asked(daemon, "reload")
         assert "does not answer" in said and "withdrawn" in said, said
-    # The old model still compensates, and is the one that is shown.
+    # The old model still compensates, and is shown.
     assert daemon.status()["model"]["checksum"] == before
     machine.warm_by(9.0)
     daemon.wait_for_offset(9.0, 0.05)
     assert saved(daemon)["enabled"] is True
-    # What follows works as ever.
+    # Later commands work as usual.
     assert asked(daemon, "disable") == {"done": True}
     assert daemon.status()["mode"] == "disabled" and saved(daemon)["enabled"] is False
     assert asked(daemon, "enable") == {"done": True}

@@ -1,4 +1,4 @@
-"""Tests of thermal behaviour from the daemon's own history: what an operator measured at the tool."""
+"""Evaluation of thermal tests from the daemon's history, with an operator's measurements at the tool."""
 
 import contextlib
 import json
@@ -43,7 +43,7 @@ def measure(machine, value_um):
 
 
 def slow_down(history, times=300):
-    """As if each cycle had lasted so much longer: what was measured seconds apart was so by minutes."""
+    """Stretches the cycles, so that measurements seconds apart become minutes apart."""
     with contextlib.closing(sqlite3.connect(history)) as base:
         base.execute("UPDATE segment SET period_ns = period_ns * ?, checksum = NULL", (times,))
         base.commit()
@@ -74,7 +74,7 @@ def test_the_probed_values_of_a_history_are_the_figures(machine, lab):
     assert z["values"] == 4
     assert "Z moved by 11.8" in out or "Z moved by 11.7" in out
     assert "z_measured_um" in page and "nan" not in page
-    # The very same from its export.
+    # The same from its export.
     exported = lab.folder / "run.csv"
     assert run_tool("export", machine.daemon.history, "-o", exported)[0] == 0
     _, again, _ = report(lab, exported, "--test", "environment")

@@ -102,7 +102,7 @@ def test_a_daemon_that_was_killed_goes_on_along_the_travel(lab):
     far = next(axis for axis in status["axes"] if axis["name"] == "x_2")
     assert far["axis"] == "x" and far["at_mm"] == 800.0
     assert abs(far["applied"] + 4.0 * WARM_K + LINE_DEVIATION_UM) < 0.1
-    # One axis to an operator, whatever it is called.
+    # One axis for an operator, whatever its name.
     assert daemon.cli("prove", "x", "3")[0] == 0
     assert daemon.cli("prove", "y", "3")[0] != 0
     daemon.end()
@@ -141,7 +141,7 @@ def test_a_set_that_is_broken_off_is_never_applied(lab):
     client.write(100, *first)
     eventually(lambda: client.applied() == (1000, 2000), "the whole set")
     second = (8, *words_of(-500), *words_of(9000), 8)
-    for end in range(1, len(second)):  # registers 100 to 105, broken off after each of them
+    for end in range(1, len(second)):  # registers 100 to 105, interrupted after each
         client.write(100, *second[:end])
         client.write(11, end)
         assert client.applied() == (1000, 2000), end

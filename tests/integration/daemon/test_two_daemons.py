@@ -1,4 +1,4 @@
-"""Two real daemons that were given the same thing: the second is refused and says who has it."""
+"""Two real daemons with a common resource: the second is refused and names the holder."""
 
 import os
 import shutil
@@ -18,7 +18,7 @@ def machine(lab):
 
 @pytest.fixture
 def other(lab, tmp_path_factory):
-    """A second machine, with nothing in common with the first but its name."""
+    """A second machine that shares only its name with the first."""
     from lab import Lab
     second = Lab(tmp_path_factory.mktemp("other"))
     yield Machine(second)
@@ -84,7 +84,7 @@ def test_after_an_end_or_a_kill_the_next_may_have_it(machine, other):
     assert not list(daemon.folder.glob("*.lock"))
 
 
-# Takes names as any user may: those that a holder has now or had, and the beginning of them.
+# Takes names as any user may: those that a holder has now or had, and prefixes of them.
 SQUATTER = """
 import os, socket, sys, time
 os.setgid(65534)
@@ -124,7 +124,7 @@ def test_another_user_cannot_keep_the_daemon_from_starting(machine, other):
     try:
         assert int(squatter.stdout.readline()) > 0
         daemon.start().wait_for_mode("compensating")
-        # And the two of one user still exclude each other.
+        # Two daemons of one user still exclude each other.
         change(other, (f"port = {other.controller.port}", f"port = {machine.controller.port}"))
         assert_refused(other.daemon, daemon, "controller")
     finally:

@@ -1,4 +1,4 @@
-"""A controller that reads well and does not take what is written, or is slowly read."""
+"""A controller that can be read but refuses writes, or is slow to read."""
 
 import time
 
@@ -9,7 +9,7 @@ from plain_devices import Machine, PlainController
 
 
 class StubbornController(PlainController):
-    """Does nothing with writes while it is told what to do instead."""
+    """Answers writes as told, without carrying them out."""
 
     def start(self):
         self.writes_become = None  # "exception 1", "silence"
@@ -65,7 +65,7 @@ def test_what_is_not_written_is_not_called_compensated(machine, how):
     time.sleep(2.0)
     failed = daemon.status()["controller"]["write_errors"] - failed
     print("failed writes a second:", failed / (time.monotonic() - begun))
-    assert failed <= (time.monotonic() - begun) / 0.02 + 2  # one a period
+    assert failed <= (time.monotonic() - begun) / 0.02 + 2  # one per period
     assert daemon.log_text().count("writes to controller cnc: ") <= 1
     events = daemon.call("events")["events"]
     assert any(said in event["what"] for event in events), events

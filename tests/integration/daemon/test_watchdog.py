@@ -1,4 +1,4 @@
-"""systemd's side of the daemon: what it is told while much is asked of the daemon at once."""
+"""Notifications to systemd while the daemon is heavily used."""
 
 import threading
 import time

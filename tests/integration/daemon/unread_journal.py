@@ -1,5 +1,5 @@
-"""Starts a program beside a journal that stands: in a mount namespace of its own the journal's
-socket is there, and nobody reads it.
+"""Starts a program with a blocked journal: in its own mount namespace the journal's socket exists,
+and nobody reads it.
 
     unshare --mount --map-root-user unread_journal.py PROGRAM ARGUMENT...
 """
@@ -13,6 +13,6 @@ subprocess.run(["mount", "-t", "tmpfs", "tmpfs", "/run"], check=True)
 os.makedirs("/run/systemd/journal")
 journal = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
 journal.bind("/run/systemd/journal/socket")
-os.set_inheritable(journal.fileno(), True)  # it stays there as long as the program
+os.set_inheritable(journal.fileno(), True)  # kept open by the program
 os.environ["JOURNAL_STREAM"] = "8:1"
 os.execv(sys.argv[1], sys.argv[1:])

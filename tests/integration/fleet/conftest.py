@@ -6,7 +6,7 @@ from postgres import Postgres
 
 @pytest.fixture(scope="module")
 def server():
-    """With TLS for who comes over the network."""
+    """With TLS for network connections."""
     running = Postgres()
     running.require_tls()
     running.start()
@@ -18,7 +18,7 @@ def server():
 
 @pytest.fixture
 def store(server, tmp_path, request):
-    """An empty store. What a failed test has left running ends."""
+    """An empty store. Processes left by a failed test are ended."""
     opened = Store(server, tmp_path, request.node.name)
     yield opened
     for process in opened.running:

@@ -1,8 +1,8 @@
-"""Two hundred machines of four types in five halls, with a year of nights, for the page's test and benchmark."""
+"""Two hundred machines of four types in five halls, with a year of nights."""
 
 MACHINES = 200
 COLUMNS = ["head_degC", "column_degC", "bed_degC", "spindle_rpm", "z_offset_um"]
-# Of machine 7: its head runs hotter since ten days, and it departs.
+# Machine 7: its head has been hotter for ten days, and it departs.
 ODD = "mill_007"
 
 FILL = """

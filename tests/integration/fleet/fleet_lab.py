@@ -1,4 +1,4 @@
-"""A store, and what works with it: thermocomp-fleet, thermocomp-uplink."""
+"""A store with thermocomp-fleet and thermocomp-uplink."""
 
 import datetime
 import json
@@ -15,7 +15,7 @@ BIN = pathlib.Path(os.environ["THERMOCOMP_BIN"])
 
 
 class Store:
-    """A database of its own in a running server."""
+    """A separate database in a running server."""
 
     def __init__(self, server, folder, name):
         self.server = server
@@ -31,7 +31,7 @@ class Store:
         self.fleet("init")
 
     def fleet(self, *arguments, status=0):
-        """What thermocomp-fleet said."""
+        """Output of thermocomp-fleet."""
         done = subprocess.run([str(BIN / "thermocomp-fleet"), "--store", self.local, *map(str, arguments)],
                               stdin=subprocess.DEVNULL, capture_output=True, text=True, cwd=self.folder)
         assert done.returncode == status, done.stdout + done.stderr
@@ -51,12 +51,12 @@ class Store:
         return (self.folder / f"{machine}.password").read_text().strip()
 
     def remote(self, user, *, tls="sslmode=verify-full", port=None):
-        """A connection over the network."""
+        """A network connection."""
         return (f"host=localhost port={port or self.server.port} user={user} dbname={self.name} "
                 f"{tls} sslrootcert={self.server.authority}")
 
     def as_machine(self, machine, sql):
-        """(exit status, rows, what went wrong)"""
+        """(exit status, rows, error)"""
         return self.server.run_sql(sql, conninfo=self.remote(f"machine_{machine}"), password=self.password(machine))
 
     def add_person(self, name, *groups):
@@ -146,8 +146,8 @@ class Machine:
             f'history = ["{self.history}"]\ncpu_percent_max = 100\nperiod_s = 1\n{more}')
 
     def record(self, hours_ago, hours, *, probings_per_h=2.0, clock=()):
-        """What the history then has more: {"probings": ..., "events": ...}. Written in memory: hours of a
-        daemon's commits to a disk take minutes."""
+        """Extends the history; returns the additions: {"probings": ..., "events": ...}. Written in
+        memory, since hours of commits to a disk take minutes."""
         with tempfile.TemporaryDirectory(dir="/dev/shm") as memory:
             file = pathlib.Path(memory) / "history.db"
             if self.history.exists():
@@ -160,7 +160,7 @@ class Machine:
         return json.loads(done.stdout)
 
     def send(self, status=0):
-        """Until all is sent; what the uplink said."""
+        """Runs until all is sent; returns the uplink's output."""
         done = subprocess.run([str(BIN / "thermocomp-uplink"), "--once", str(self.folder / "uplink.toml")],
                               stdin=subprocess.DEVNULL, capture_output=True, text=True)
         assert done.returncode == status, done.stderr
@@ -180,7 +180,7 @@ class Machine:
             self.process = None
 
     def recorded(self):
-        """{beginning of 10 s [s since 1970]: {column: mean}}, from the exported run file; without probings."""
+        """{beginning of 10 s [s since 1970]: {column: mean}} from the exported run file; without probings."""
         run = self.folder / "run.csv"
         done = subprocess.run([str(BIN / "thermocomp"), "export", str(self.history), "-o", str(run)],
                               stdin=subprocess.DEVNULL, capture_output=True, text=True)
@@ -221,7 +221,7 @@ class Machine:
                                     f"WHERE name = '{self.name}'"))
 
     def progress(self):
-        """(rows sent, refused, repeated) by the uplink's own count."""
+        """(rows sent, refused, repeated) as counted by the uplink."""
         [row] = self.store.ask(f"SELECT sent, refused, repeated FROM fleet.uplink JOIN fleet.machine "
                                f"ON id = machine WHERE name = '{self.name}'")
         return tuple(map(int, row))

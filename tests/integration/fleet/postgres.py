@@ -1,4 +1,4 @@
-"""A PostgreSQL of its own for a test: unprivileged, in a folder that goes with it."""
+"""An unprivileged PostgreSQL for a test, in a folder removed with it."""
 
 import contextlib
 import os
@@ -14,7 +14,7 @@ PATIENCE_S = 60
 
 
 def programs():
-    """The folder of Debian's server programs, the newest version."""
+    """Folder of Debian's server programs, newest version."""
     found = sorted(pathlib.Path("/usr/lib/postgresql").glob("*/bin/initdb"),
                    key=lambda path: float(path.parts[-3]))
     assert found, "no PostgreSQL server: install the package postgresql"
@@ -28,12 +28,12 @@ def free_port():
 
 
 class Postgres:
-    """A server on a port and a Unix socket of its own. Its administrator is whoever starts it; as root,
-    whom PostgreSQL refuses, the user postgres of the package."""
+    """A server with its own port and Unix socket. Its administrator is the caller or, for root,
+    which PostgreSQL refuses, the package's user postgres."""
 
     def __init__(self, place=None):
         self.bin = programs()
-        # Short: a Unix socket's path has 107 characters at most.
+        # Short: a Unix socket's path is limited to 107 characters.
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="fleet", dir=place))
         self.data = self.folder / "data"
         self.port = free_port()
@@ -44,7 +44,7 @@ class Postgres:
         self._as_server(self.bin / "initdb", "-D", self.data, "-U", "postgres", "--auth=trust", "--no-sync",
                         "--no-instructions", "-E", "UTF8", "--locale=C.UTF-8")
         self.allow("local all all trust", "host all all 127.0.0.1/32 scram-sha-256")
-        # A server that is killed loses nothing without fsync either; only the computer's end would.
+        # A killed server loses nothing without fsync; only a crash of the computer would.
         self.configure(fsync="off", listen_addresses="'127.0.0.1'", port=self.port, max_connections=200,
                        unix_socket_directories=f"'{self.folder}'")
 
@@ -62,11 +62,11 @@ class Postgres:
             file.writelines(f"{name} = {value}\n" for name, value in settings.items())
 
     def allow(self, *lines):
-        """What pg_hba.conf is."""
+        """Content of pg_hba.conf."""
         (self.data / "pg_hba.conf").write_text("\n".join(lines) + "\n")
 
     def require_tls(self):
-        """A certificate for localhost, signed by an authority of its own; in the clear nobody gets in."""
+        """A certificate for localhost from its own authority; unencrypted connections are refused."""
         def openssl(*arguments):
             subprocess.run(["openssl", *map(str, arguments)], check=True, cwd=self.folder,
                            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -90,7 +90,7 @@ class Postgres:
         return self
 
     def stop(self, mode="fast"):
-        """mode "immediate": as if the power had failed."""
+        """mode "immediate": like a power failure."""
         self._as_server(self.bin / "pg_ctl", "-D", self.data, "-m", mode, "-w", "stop", check=False)
 
     def end(self):
@@ -98,11 +98,11 @@ class Postgres:
         shutil.rmtree(self.folder, ignore_errors=True)
 
     def local(self, database="fleet"):
-        """Of its administrator, over the Unix socket."""
+        """Connection of its administrator over the Unix socket."""
         return f"host={self.folder} port={self.port} user=postgres dbname={database}"
 
     def run_sql(self, sql, conninfo=None, password=None):
-        """(exit status, rows as lists of texts, what went wrong). NULL is an empty text."""
+        """(exit status, rows as lists of texts, error). NULL is an empty text."""
         environment = dict(os.environ, PGPASSWORD=password) if password else None
         done = subprocess.run(["psql", "-X", "-q", "-A", "-t", "-F", "\t", "-v", "ON_ERROR_STOP=1",
                                conninfo or self.local()], input=sql, capture_output=True, text=True, env=environment)

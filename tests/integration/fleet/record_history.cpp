@@ -1,5 +1,5 @@
-// A history of hours in seconds: the daemon's estimator and writer in virtual time, with a machine
-// that warms and cools by seed and whose tool is probed.
+// Records hours of history in seconds: the daemon's estimator and writer in virtual time, with a
+// machine that warms and cools by seed and a probed tool.
 //   record_history CONFIG HISTORY BEGIN_UNIX_S HOURS SEED PROBINGS_PER_H [CLOCK_AT_S CLOCK_BY_S]
 // The wall clock is set by CLOCK_BY_S at CLOCK_AT_S and back again 10 min later. On an existing
 // history this is another start of the daemon. Prints {"probings": N}.
@@ -48,8 +48,8 @@ class Machine {
     note("started");
     const auto cycles = static_cast<std::uint64_t>(course_.hours * 3600.0 / period_s_);
     const auto minute = static_cast<std::uint64_t>(60.0 / period_s_);
-    // Between commits as many cycles as of a daemon at 100 Hz; a set clock is noted by the next
-    // one.
+    // As many cycles between commits as a daemon at 100 Hz; a change of the clock is recorded by
+    // the next commit.
     const std::uint64_t commits = course_.clock_at_s < 0 ? 600 : 4;
     for (std::uint64_t cycle = 0; cycle < cycles; ++cycle) {
       now_ = grid_.time_of(cycle);
@@ -133,7 +133,7 @@ int main(int argc, char** argv) {
   try {
     DaemonConfig config = load_daemon_config(argv[1]);
     config.history.file = argv[2];
-    config.history.commit_s = 60.0;  // not a sync to disk for each second
+    config.history.commit_s = 60.0;  // fewer syncs to disk
     return Machine(config, course).run();
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());

@@ -1,4 +1,4 @@
-"""What a night finds: a machine that departs from its sisters, one whose sensor ages, a failure that stops nobody."""
+"""Results of a night: a machine departs from its series, another's sensor ages, and failures stop nothing."""
 
 import datetime
 import random
@@ -19,8 +19,8 @@ matrix_um_per_K = [[5.0, -2.0]]
 
 
 def write_day(path, seed, gain, *, scale=1.0, leaps=False):
-    """One heated place and one that follows; z = gain * first - 2 * second, probed each 10 min. Of an ageing sensor
-    the rise is shown at `scale`; a loose plug leaps between probings."""
+    """A heated place and one that follows; z = gain * first - 2 * second, probed every 10 min. An
+    ageing sensor shows its rise times `scale`; a loose plug leaps between probings."""
     chance = random.Random(seed)
     quick = slow = heat = 0.0
     lines = ["time_s,head_degC,column_degC,z_um"]
@@ -32,7 +32,7 @@ def write_day(path, seed, gain, *, scale=1.0, leaps=False):
         z = f"{gain * quick - 2 * slow + chance.gauss(0, 0.3):.3f}" if minute % 10 == 0 else ""
         leap = 0.8 if leaps and minute in (305, 615, 925) else 0.0
         lines.append(f"{60 * minute},{20 + scale * quick + leap:.4f},{20 + slow:.4f},{z}")
-    # Said that nothing more of this day is to come.
+    # Marks the end of this day's data.
     lines.append(f"{86390},{20 + scale * quick:.4f},{20 + slow:.4f},")
     path.write_text("\n".join(lines) + "\n")
     return path
@@ -40,8 +40,8 @@ def write_day(path, seed, gain, *, scale=1.0, leaps=False):
 
 @pytest.fixture
 def workshop(store, tmp_path):
-    """Five machines, nine nights; in the last two mill_3's sensor shows half and mill_1's leaps, which is a fault of
-    the recording and no departure; mill_4 was another machine from the start."""
+    """Five machines, nine nights; in the last two mill_3's sensor shows half and mill_1's leaps,
+    which is a recording fault and not a departure; mill_4 differed from the start."""
     (tmp_path / "model.toml").write_text(MODEL)
     for number, gain in enumerate((4.8, 5.2, 5.1, 4.9, 12.0)):
         store.add(f"mill_{number}")
@@ -64,11 +64,11 @@ def test_a_night_names_who_departs_and_why(workshop):
     departing = {name for name, row in last.items() if row[3] == "true"}
     assert departing == {"mill_3", "mill_4"}, last
     assert "head_degC" in last["mill_3"][4] and last["mill_3"][5] == "t"
-    # One unusual night is none that departs; without a series there is no judgement.
+    # One unusual night is not a departure; without a series there is no judgement.
     assert {row[3] for row in rows if row[1] == str(TODAY - datetime.timedelta(days=2))} == {"false"}
     assert {row[3] for row in rows if row[1] < str(TODAY - datetime.timedelta(days=2))} == {""}
     assert workshop.value("SELECT count(*) FROM fleet.minute") == str(45 * 1440)
-    # All is done: nothing is done again.
+    # Nothing is left to do.
     assert "0 machine-nights" in workshop.fleet("night", "--nights", 20)
     assert "DEPARTS" in workshop.fleet("status", status=1)
 
@@ -78,7 +78,7 @@ def test_a_night_that_fails_is_told_tried_again_and_stops_nobody(store, tmp_path
         store.add(name)
         store.fleet("load", name, write_day(tmp_path / "day.csv", 1, 5.0), "--begin",
                     f"{TODAY - datetime.timedelta(days=2)}T00:00:00Z")
-    # A machine whose temperatures cannot be used.
+    # A machine with unusable temperatures.
     store.ask("UPDATE fleet.sample SET value = '{NULL,NULL}' WHERE machine = "
               "(SELECT id FROM fleet.machine WHERE name = 'mill_0')")
     assert "1 failed" in store.fleet("night", status=1)

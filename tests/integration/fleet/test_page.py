@@ -25,7 +25,7 @@ os.environ.setdefault("no_proxy", "127.0.0.1,localhost")
 
 
 class Page:
-    """A running thermocomp-fleet-page, as a role that may only read."""
+    """A running thermocomp-fleet-page with a read-only role."""
 
     def __init__(self, store, folder):
         store.add_person("page", "fleet_page")
@@ -91,7 +91,7 @@ def texts(browser, selector):
 
 
 def click(browser, selector, text):
-    """Found and clicked at once: the page may draw itself anew in between."""
+    """Found and clicked at once, since the page may redraw in between."""
     eventually(lambda: browser.execute_script(
         "const e = [...document.querySelectorAll(arguments[0])].find(e => e.innerText.startsWith(arguments[1]));"
         "if (e) e.click(); return Boolean(e)", selector, text), text)
@@ -106,7 +106,7 @@ def fits(browser, size):
 
 
 def picture(browser, name):
-    """For people: where FLEET_PICTURES names a folder."""
+    """Screenshot for people, if FLEET_PICTURES names a folder."""
     if folder := os.environ.get("FLEET_PICTURES"):
         browser.save_screenshot(os.path.join(folder, name + ".png"))
 
@@ -117,7 +117,7 @@ def test_three_clicks_from_a_hall_to_the_curve_of_a_sensor(page, browser, size):
     open_page(browser, page, size)
     eventually(lambda: len(all_of(browser, "#machines tbody tr")) == MACHINES, "all machines")
     assert "200 machines, 1 depart" in browser.find_element("id", "summary").text
-    assert ODD in texts(browser, "#machines tbody tr")[0]  # what is wrong stands first
+    assert ODD in texts(browser, "#machines tbody tr")[0]  # problems first
     assert fits(browser, size)
     assert accessibility_problems(browser) == []
     picture(browser, name + "_machines")

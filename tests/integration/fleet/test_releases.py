@@ -1,4 +1,4 @@
-"""A model from the office to a machine: a real store, a real daemon, and what must not get through."""
+"""Transfer of a model from the office to a machine, with a real store and daemon, and attacks."""
 
 import json
 import pathlib
@@ -15,7 +15,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "daemon"))
 from lab import Lab, assert_replays_exactly, run_tool  # noqa: E402
 from plain_devices import MODEL, Machine, assert_slewed  # noqa: E402
 
-BETTER = MODEL.replace("[[3.0, -1.5]]", "[[2.0, -1.5]]")  # as the machine is, by its probings
+BETTER = MODEL.replace("[[3.0, -1.5]]", "[[2.0, -1.5]]")  # the machine's true matrix
 WORSE = MODEL.replace("[[3.0, -1.5]]", "[[4.0, -1.5]]")
 OTHER_TYPE = MODEL.replace('"spindle_degC"', '"ram_degC"')
 OTHER_OUTPUTS = MODEL.replace('"z_um"]', '"z_um", "y_um"]').replace("[[3.0, -1.5]]", "[[2.0, -1.5], [0.0, 0.0]]")
@@ -39,7 +39,7 @@ def make_key(folder, name):
 
 
 class Mill:
-    """A machine with probings behind it, its uplink and its admission."""
+    """A machine with earlier probings, its uplink and its admission."""
 
     def __init__(self, lab, store, *options, approvers=True):
         self.lab, self.store = lab, store
@@ -70,7 +70,7 @@ cpu_percent_max = 100
 """)
 
     def probe(self):
-        """Of every offset a third is too much."""
+        """Each offset is a third too large."""
         for offset_um in (3.0, 6.0, 9.0, 12.0):
             self.machine.warm_by(offset_um)
             self.daemon.wait_for_offset(offset_um, 0.05)
@@ -84,7 +84,7 @@ cpu_percent_max = 100
         assert done.returncode == 0, done.stderr
 
     def admit(self):
-        """(exit status, what it said); what was offered has come before, what was done goes back."""
+        """Receives offers, runs `admit` and sends its reports: (exit status, output)."""
         self.uplink()
         status, said, problem = run_tool("admit", self.settings)
         self.uplink()
@@ -109,7 +109,7 @@ cpu_percent_max = 100
         assert self.model() == MODEL and "candidate" not in self.daemon.status()
 
     def force(self, sql):
-        """As who has taken the server over."""
+        """As an intruder on the server."""
         self.store.ask(sql)
 
 
@@ -122,11 +122,12 @@ def test_an_approved_release_is_promoted_and_taken_back(lab, store):
     assert left < 0.3 and 1.0 < of < 1.6, said
     assert mill.daemon.status()["candidate"]["file"] == str(mill.folder / "candidate.toml")
     assert mill.model() == MODEL
-    mill.admit()  # without an approval nothing more happens
+    mill.admit()  # without an approval nothing happens
     assert [step for step, _, _ in mill.steps(release)] == ["offered", "checked", "candidate"]
     assert mill.steps(release)[-1][2].endswith("not probed yet")
 
-    # Who approves it sees how it does: of 15 um the model takes out a third too much, the candidate none.
+    # The approver sees its performance: of 15 um the model removes a third too much; the candidate
+    # leaves no error.
     mill.machine.warm_by(15.0)
     mill.daemon.wait_for_offset(15.0, 0.05)
     assert mill.daemon.cli("measured", "z", 5.0)[0] == 0
@@ -142,7 +143,7 @@ def test_an_approved_release_is_promoted_and_taken_back(lab, store):
     assert mill.admit()[0] == 0
     assert mill.model() == BETTER
     mill.daemon.wait_for_offset(8.0, 0.05)
-    assert "is worse" not in mill.admit()[1]  # repeated: nothing
+    assert "is worse" not in mill.admit()[1]  # no repetition
     store.fleet("rollback", release, "--key", mill.key)  # one command
     mill.admit()
     assert mill.model() == MODEL
@@ -167,7 +168,7 @@ def test_what_does_not_fit_is_refused_with_the_reason(lab, store):
     half = BETTER[:len(BETTER) // 2]
     (store.folder / "half.toml").write_text(half)
     assert "half.toml" in store.fleet("offer", "mill_1", store.folder / "half.toml", status=2)
-    # From a server that was taken over.
+    # From a compromised server.
     mill.force("ALTER TABLE fleet.document DROP CONSTRAINT document_check")
     release = mill.offer(BETTER)
     mill.force(f"UPDATE fleet.document SET content = left(content, {len(half)}) WHERE content LIKE '%2.0, -1.5%'")
@@ -213,7 +214,7 @@ def test_a_forged_approval_is_refused(lab, store):
     mill.uplink()
     seen_before = mill.offer(BETTER)
     mill.admit()
-    forge(seen_before, approval(right))  # maria's, of another release
+    forge(seen_before, approval(right))  # maria's, for another release
     mill.ends_with(seen_before, "refused", "the approval is signed by none of the keys")
     worse = mill.offer(WORSE)
     store.fleet("approve", worse, "--key", mill.key)  # even with hers

@@ -1,4 +1,4 @@
-"""Who may do what in the store."""
+"""Permissions in the store."""
 
 import shutil
 import subprocess
@@ -44,7 +44,7 @@ def test_a_machine_reads_its_own_releases_and_their_model(two_machines):
 
 
 REFUSED = {
-    # name: (statement, what is said); OTHER and OWN stand for machines, THEIRS and MINE for releases
+    # name: (statement, message); OTHER and OWN stand for machines, THEIRS and MINE for releases
     "rows of another": ("INSERT INTO fleet.sample VALUES (OTHER, 1, now(), '{1}')", "row-level security"),
     "events of another": ("INSERT INTO fleet.event VALUES (OTHER, now(), 1, 2, 'mode', '', '{}')", "row-level security"),
     "probings of another": ("INSERT INTO fleet.probing VALUES (OTHER, now(), 'z_um', 0, 1, 1)", "row-level security"),
@@ -127,7 +127,7 @@ def test_who_approves_is_decided_by_the_machine(two_machines):
 
     assert step("maria", "mill_2", "approved")
     assert not step("maria", "mill_1", "approved")  # approved at the machine
-    assert not step("otto", "mill_2", "approved")   # who offers does not approve
+    assert not step("otto", "mill_2", "approved")   # the offering person does not approve
     assert not step("mill_2", "mill_2", "approved_at_machine")
     assert step("mill_1", "mill_1", "approved_at_machine")
     assert store.ask("SELECT who FROM fleet.release_step WHERE step LIKE 'approved%' ORDER BY who") == [
@@ -141,7 +141,7 @@ def test_in_the_clear_nobody_gets_in(two_machines):
                                     password=store.password("mill_1"))
     assert connect("sslmode=verify-full")[0] == 0
     assert "no encryption" in connect("sslmode=disable")[2]
-    # Of another server, or by another name.
+    # Another server, or another name.
     assert "certificate" in connect("sslmode=verify-full hostaddr=127.0.0.1 host=other.example")[2]
 
 

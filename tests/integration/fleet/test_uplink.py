@@ -1,4 +1,4 @@
-"""What a daemon recorded is in the store, all of it and once, whatever happens on the way."""
+"""Recorded data arrive in the store completely and once, whatever happens on the way."""
 
 import os
 import pathlib
@@ -17,7 +17,7 @@ from postgres import Postgres
 
 @pytest.fixture(scope="module")
 def day(server, tmp_path_factory):
-    """A history of twelve hours, which machines copy."""
+    """A history of twelve hours, copied by the machines."""
     from fleet_lab import Store
     machine = Machine(Store(server, tmp_path_factory.mktemp("day"), "day"), "first")
     machine.told = machine.record(hours_ago=20, hours=12)
@@ -47,11 +47,11 @@ def test_everything_recorded_arrives_once(machine):
     machine.send()
     assert len(machine.means) > 4000
     assert_all_there_once(machine)
-    # The same again: nothing is sent.
+    # Again: nothing is sent.
     before = machine.progress()
     machine.send()
     assert machine.progress() == before == (len(machine.means), 0, 0)
-    # ... and where the store has forgotten how far it was, nothing is there twice.
+    # If the store has lost its progress, nothing is stored twice.
     machine.store.ask("UPDATE fleet.uplink SET segment = 0, event_run = 0, event_number = 0")
     machine.send()
     assert_all_there_once(machine)
@@ -102,7 +102,7 @@ def test_a_server_that_is_killed_loses_nothing(machine):
 
 
 class Cable:
-    """Passes bytes on until it is pulled."""
+    """Forwards bytes until it is pulled."""
 
     def __init__(self, port):
         self.to = port
@@ -177,7 +177,7 @@ def test_a_clock_that_is_wrong_costs_its_own_rows_and_is_told(store):
     taken = machine.taken()
     assert taken.keys() == machine.means.keys() - ahead
     assert machine.progress() == (len(machine.means), len(ahead), 0)
-    # The machine's rows are complete but for those 10 minutes, which nobody can place.
+    # Only those 10 minutes, whose time is unknown, are missing from the machine's rows.
     assert 3 * 360 - 63 <= len(taken) <= 3 * 360 - 50
     assert "mill_1" in store.fleet("status") and f"{len(ahead)} refused" in store.fleet("status")
 

@@ -1,4 +1,4 @@
-"""A simulated machine on a Modbus TCP port and on a pseudo terminal, and the scan of both."""
+"""A simulated machine on a Modbus TCP port and on a pseudo terminal, and scans of both."""
 
 import json
 import os
@@ -51,7 +51,7 @@ class Simulator(lab.Simulator):
         super().__init__(folder, machine.replace("LINE", str(self.line)))
 
     def read(self, unit, function, address, count):
-        """Words, or bits, as they stand in the answer: a client that is not ours to trust."""
+        """Words or bits of the answer, from an independent client."""
         with self.connect("net") as link:
             link.sendall(struct.pack(">HHHBBHH", 1, 0, 6, unit, function, address, count))
             head = receive(link, 9)
@@ -93,7 +93,7 @@ def bus(simulator, kind, **keys):
 
 
 def table(head, **keys):
-    """A TOML table; a value that is a str in a tuple stands as it is."""
+    """A TOML table; a str in a tuple is inserted verbatim."""
     def shown(value):
         if isinstance(value, tuple):
             return value[0]
@@ -108,8 +108,8 @@ NO_CONTROLLER = ('[controller]\nname = "none"\nkind = "dry_run"\n'
 
 
 def configuration(folder, buses, devices, sensors, controller=NO_CONTROLLER):
-    """A daemon's file with these buses and devices; sensors: (name, keys). `controller` ends with the
-    axis."""
+    """A daemon configuration with these buses and devices; sensors: (name, keys). `controller` ends
+    with the axis."""
     (folder / "model.toml").write_text(MODEL)
     text = "format = 1\n[model]\nfile = \"model.toml\"\n" + buses
     text += devices

@@ -1,11 +1,10 @@
-"""A thermocouple module made of pymodbus (software that is not ours), on TCP or a serial port.
+"""A thermocouple module made with pymodbus, on TCP or a serial port.
 
     foreign_module.py tcp PORT | rtu DEVICE BAUD
 
-Input registers: four floats 23.4375 in the word orders ABCD, DCBA, BADC, CDAB at 0, 2, 4, 6;
-int16 tenths of a degree at 20: 215, -57, 32767 (open circuit), 1. Holding registers: a float64
-at 0. Discrete inputs: second channel broken.
-The floats are packed by pymodbus' own payload builder where it knows the order.
+Input registers: four floats 23.4375 in the word orders ABCD, DCBA, BADC, CDAB at 0, 2, 4, 6; int16
+tenths of a degree at 20: 215, -57, 32767 (open circuit), 1. Holding registers: a float64 at 0.
+Discrete inputs: second channel broken. Floats are packed by pymodbus if possible.
 """
 import sys
 

@@ -1,5 +1,4 @@
-"""A server that is not ours (pymodbus of Debian) is read as a thermocouple module, over TCP and over a
-serial line."""
+"""Reads Debian's pymodbus server as a thermocouple module, over TCP and over a serial line."""
 
 import pathlib
 import shutil
@@ -14,7 +13,7 @@ DEVICE = table("[[device]]", name="module", bus="bus", unit=5, table="input", en
                scale=0.1, open_circuit_codes=[32767])
 FLOATS = {order: {"address": 2 * i, "encoding": "float32", "word_order": order, "scale": 1.0}
           for i, order in enumerate(["ABCD", "DCBA", "BADC", "CDAB"])}
-# What is read: (keys, fault, degC)
+# Sensors: (keys, fault, degC)
 OTHERS = {
     "tenths": ({"address": 20}, "none", 21.5),
     "negative": ({"address": 21}, "none", -5.7),

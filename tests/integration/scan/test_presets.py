@@ -1,8 +1,8 @@
-"""Every preset from its simulated device over real bytes: the right temperature, and each code of
+"""Every preset with its simulated device over real bytes: the right temperature, and each code of
 the device as the right fault and never as a temperature.
 
-What the registers must hold is written down here once more, from the manuals and not from the
-presets: function, address and words of a channel at 25.0 degC, and of each code.
+The registers are defined independently of the presets, from the manuals: function, address and
+words of a channel at 25.0 degC, and of each code.
 """
 
 import json
@@ -22,8 +22,8 @@ def float_words(value):
 
 TENTHS = [250]
 OPEN, SHORT, RANGE, ERROR = "open_circuit", "short_circuit", "out_of_range", "device_error"
-# name: (second channel's number, function, address, words at 25 degC, keys that must be given,
-#        [(event, fault, where, function and address of the code, word)])
+# name: (second channel's number, function, address, words at 25 degC, required keys,
+#        [(event, fault, kind of place, function and address of the code, word)])
 KL331X_STATUS = (INPUT, 2)
 DEVICES = {
     "wago_750_469": (2, INPUT, 1, TENTHS, {}, [("open_circuit", OPEN, (INPUT, 1), 0x7FFF)]),
@@ -52,7 +52,7 @@ DEVICES = {
     "emerson_rsti_st3808": (1, INPUT, 1, TENTHS, {}, [("open_circuit", OPEN, (INPUT, 1), 0x8000)]),
     "exemys_rme1_tc": (2, HOLDING, 1, TENTHS, {}, []),
     "omega_iserver2": (2, HOLDING, 2, float_words(25.0), {}, []),
-    # 0 to 65535 for 0 to 1370 degC, as the file says that a configuration has to.
+    # 0 to 65535 for 0 to 1370 degC, as a configuration must specify according to the file.
     "advantech_adam_4018p": (1, HOLDING, 1, [round(25.0 / 1370 * 65535)],
                              {"scale": 1370 / 65535}, [
         ("over_range", RANGE, (HOLDING, 1), 0xFFFF), ("under_range", RANGE, (HOLDING, 1), 0)]),
@@ -128,7 +128,7 @@ def test_every_preset_is_tested_here_and_names_its_source():
 
 
 def lists_of(preset, channel):
-    """All codes a channel has: {(event, code)}, from the preset's own lists."""
+    """All codes of a channel: {(event, code)}, from the preset's own lists."""
     events = {"open_circuit_codes": "open_circuit", "short_circuit_codes": "short_circuit",
               "over_range_codes": "over_range", "under_range_codes": "under_range",
               "error_codes": "channel_error"}

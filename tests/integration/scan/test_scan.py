@@ -1,4 +1,4 @@
-"""`thermocomp scan` on lines with the usual mistakes: each is told for what it is."""
+"""`thermocomp scan` on lines with the usual mistakes: each is identified."""
 
 import re
 import struct
@@ -39,7 +39,7 @@ SENSORS = [
 @pytest.mark.parametrize("kind", ["modbus_tcp", "modbus_rtu"])
 def test_each_mistake_is_told_for_what_it_is(simulate, tmp_path, kind):
     simulator = simulate(MACHINE)
-    # Only the unit that is not there may ever run into the time-out.
+    # Only the missing unit may ever time out.
     path = configuration(tmp_path, bus(simulator, kind, timeout_ms=3000.0), DEVICES, SENSORS)
     report, seen = scan(path)
     assert report["good"] == 2 and report["channels"] == 6
@@ -76,7 +76,7 @@ def test_the_text_says_the_same(simulate, tmp_path):
 
 
 def without_figures(text):
-    """What may differ from run to run: times, and where and whose the line is."""
+    """The text without run-dependent parts: times, place and user of the line."""
     text = re.sub(r" +$", "", re.sub(r" +also open in .*\n", "", text), flags=re.M)
     text = re.sub(r"\d+\.\d ms", "N ms", re.sub(r"\d+\.\d s old", "N s old", text))
     text = re.sub(r"timeout_ms = \d+", "timeout_ms = N", text)

@@ -1,5 +1,5 @@
-"""`thermocomp scan` of the controller: every register and signal is read, what stands there is written
-once more where that moves nothing, and what is missing is named with what answered."""
+"""`thermocomp scan` of the controller: reads every register and signal, writes registers back where
+that moves nothing, and names missing ones with the answer received."""
 
 import socket
 import struct
@@ -12,7 +12,7 @@ SHOWN = {"x_mm": 250.0, "spindle_rpm": 3000, "cutting_on": 1}
 
 
 def signals(is_simulated):
-    """At these places; the simulated ones stand at these values."""
+    """Signals at these places, with the simulated values."""
     places = (("x_mm", {"table": "input", "address": 20, "encoding": "int32", "scale": 0.001}),
               ("spindle_rpm", {"table": "input", "address": 24, "encoding": "uint16"}),
               ("cutting_on", {"table": "discrete_input", "address": 0}))
@@ -42,8 +42,8 @@ SENSORS = [("t", {"device": "module", "address": 0})]
 
 
 class Relay:
-    """Between the scan and the simulated controller: notes the function of every request, and may
-    swallow them all."""
+    """Between the scan and the simulated controller: records the function of every request, and can
+    discard them."""
 
     def __init__(self, port, is_silent=False):
         self.target, self.is_silent, self.functions = port, is_silent, []
@@ -94,7 +94,7 @@ def controller(port, signals=SIGNALS, **keys):
 
 
 def written(simulator):
-    """The registers that the daemon writes, as they stand."""
+    """Current content of the registers written by the daemon."""
     with simulator.connect("cnc") as link:
         link.sendall(struct.pack(">HHHBBHH", 1, 0, 6, 1, 3, 0, 8))
         answer = link.makefile("rb").read(9 + 16)
@@ -118,7 +118,7 @@ def test_every_register_is_read_and_none_is_changed(simulate, relay, tmp_path):
     assert values["x_mm"]["raw"] == "00 03 D0 90" and values["x_mm"]["unit"] == "mm"
     assert values["applied of axis z"]["value"] == 0.0
     assert [values[name]["written"] for name in ("x_mm", "heartbeat")] == [False, True]
-    # All of the controller's tables were read, and nothing else was asked for.
+    # All of the controller's tables were read, and nothing else requested.
     assert {2, 3, 4} <= set(between.functions) <= {1, 2, 3, 4}, between.functions
     assert written(simulator) == before
 
@@ -142,7 +142,7 @@ def write(simulator, address, words):
 
 
 @pytest.mark.parametrize("keys, why", [
-    ({}, "offset of axis z is not what is applied"),  # no axis is valid, so nothing of it is
+    ({}, "offset of axis z is not what is applied"),  # no valid axis, so nothing of it is
     ({"dry_run": True}, "")])
 def test_nothing_is_written_that_might_move_an_axis(simulate, relay, tmp_path, keys, why):
     simulator = simulate(MACHINE)
@@ -169,7 +169,7 @@ def test_a_register_that_is_not_there_is_named_with_the_exception(simulate, rela
     done = thermocomp("scan", path, "--bus", "cnc")
     assert done.returncode == 1
     assert "7 of 8 places of the controller are there; missing: y_mm\n" in done.stdout
-    assert "channels give a temperature" not in done.stdout  # only the controller was asked for
+    assert "channels give a temperature" not in done.stdout  # only the controller was tested
 
 
 def test_a_controller_that_is_silent_or_gone_is_told_so(simulate, relay, tmp_path):
@@ -179,7 +179,7 @@ def test_a_controller_that_is_silent_or_gone_is_told_so(simulate, relay, tmp_pat
     path = configuration(tmp_path, sensors, DEVICES, SENSORS,
                          silent.replace("timeout_ms = 3000.0", "timeout_ms = 200.0"))
     report, _ = scan(path)
-    assert report["good"] == 1  # the sensors are not its fault
+    assert report["good"] == 1  # the sensors are good
     assert "unit 1: no answer within timeout_ms = 200" in report["controller"]["error"]
     assert all(each["why"] == "no answer" for each in report["controller"]["values"])
 

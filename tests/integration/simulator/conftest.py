@@ -1,4 +1,4 @@
-"""A running thermocomp-sim, and the few bytes of Modbus the tests speak themselves."""
+"""A running thermocomp-sim, and a minimal Modbus client."""
 
 import pathlib
 import re
@@ -57,7 +57,7 @@ def ask(link, unit, pdu, transaction=1):
 
 
 def mbpoll(*arguments):
-    """What mbpoll, which is not ours, reads: {address: text}."""
+    """Values read by mbpoll: {address: text}."""
     done = subprocess.run(["mbpoll", "-1", "-q", *map(str, arguments)], capture_output=True,
                           text=True, timeout=PATIENCE_S)
     values = dict(re.findall(r"\[(\d+)\]:\s+(\S+)", done.stdout))

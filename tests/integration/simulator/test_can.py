@@ -1,4 +1,4 @@
-"""The CAN node and the CAN controller, seen by python3-can, which is not ours. Needs vcan0."""
+"""The CAN node and the CAN controller, tested with python3-can. Needs vcan0."""
 
 import pathlib
 import struct
@@ -58,7 +58,7 @@ applied = { id = 0x300, start_bit = 0, length_bits = 32, scale = 0.01 }
 
 
 def newest(bus, identifier):
-    """The next frame with this identifier that is sent from now on."""
+    """The next frame with this identifier sent from now on."""
     while bus.recv(0) is not None:
         pass
     end = time.monotonic() + PATIENCE_S

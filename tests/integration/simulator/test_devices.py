@@ -1,4 +1,4 @@
-"""Sensors and controller read by mbpoll and by raw bytes, and all that the script does to them."""
+"""Sensors and controller read by mbpoll and by raw bytes, with all events of the script."""
 
 import random
 import socket
@@ -126,14 +126,14 @@ applied = { table = "input", address = 0, encoding = "int32", scale = 0.01 }
 """
 
 MACHINE = BODY + BUSES + CONTROLLER
-LATER_S = 1e8  # of plant time: an event that never ends in a test
+LATER_S = 1e8  # plant time: an event that never ends in a test
 
 
-STANDING = "--start-on-heartbeat"  # the script's time stands still until begin()
+STANDING = "--start-on-heartbeat"  # the script's time starts with begin()
 
 
 def begin(simulator):
-    """The script's time begins, which a STANDING simulator holds until then."""
+    """Starts the script's time of a STANDING simulator."""
     link = simulator.connect("cnc")
     for beat in (1, 2):
         ask(link, 1, struct.pack(">BHH", 6, 11, beat))
@@ -146,7 +146,7 @@ def event(kind, target, more="", at_s=0.0, duration_s=LATER_S):
 
 
 def room_of(link):
-    """Raw value that the module shows for the room."""
+    """Raw value of the room sensor."""
     body = ask(link, 3, read_request(4, 0, 1))
     return struct.unpack(">h", body[2:])[0]
 
@@ -242,7 +242,7 @@ def test_a_dropped_device_is_silent_while_its_neighbour_answers(simulate):
     simulator = simulate(MACHINE + event("drop", "module") + event("drop", "on_line"))
     link = simulator.connect("cabinet")
     link.sendall(request(3, read_request(4, 0, 1), 11))
-    assert ask(link, 4, read_request(3, 0, 2), 12)[0] == 3  # nothing of 11 came before it
+    assert ask(link, 4, read_request(3, 0, 2), 12)[0] == 3  # answer 11 was not sent before it
     values, errors = mbpoll("-t", 3, *rtu_options(simulator, 8))
     assert values == {0: "213"}, errors
     values, errors = mbpoll("-t", "4:float", "-o", 0.2, *rtu_options(simulator, 7))
@@ -282,7 +282,7 @@ def test_a_rebooting_device_closes_connections_is_silent_and_comes_back(simulate
     assert room_of(link) == 2125
     begin(simulator)
     assert closed(link)
-    link = simulator.connect("cabinet")  # the coupler listens, the module does not answer
+    link = simulator.connect("cabinet")  # the coupler answers, the module does not
     link.sendall(request(3, read_request(4, 0, 1), 41))
     assert ask(link, 4, read_request(3, 0, 2), 42)[0] == 3
 
@@ -344,7 +344,7 @@ def test_junk_and_vanishing_clients_disturb_nobody(simulate):
     for _ in range(300):
         junk = simulator.connect("cabinet")
         data = chance.randbytes(chance.randrange(1, 400))
-        if chance.random() < 0.7:  # past the header
+        if chance.random() < 0.7:  # beyond the header
             data = request(chance.randrange(256), data[:250])
         junk.sendall(data)
         junk.close()
@@ -386,5 +386,5 @@ def test_a_slow_line_takes_the_time_of_its_bytes(simulate):
     begin = time.monotonic()
     values, errors = mbpoll("-t", 3, "-o", 5, *rtu_options(simulator, 8))
     assert values == {0: "213"}, errors
-    # 8 characters there, 3.5 of silence, 7 back, 11 bits each at 300 baud
+    # 8 characters out, 3.5 of silence, 7 back, 11 bits each at 300 baud
     assert time.monotonic() - begin >= 0.67

@@ -1,4 +1,4 @@
-"""Time factor, replay, row log, ready line, and everything that must be refused."""
+"""Time factor, replay, row log, ready line, and refused arguments."""
 
 import csv
 import json
@@ -51,7 +51,7 @@ def test_all_registers_of_a_row_change_together_and_are_logged(simulate, tmp_pat
     simulator = simulate(REPLAY, "--replay", run_file(tmp_path, 60), "--row-period-ms", 20,
                          "--rows", "5:45", "--row-log", log, "--settle-s", 0.3)
     link = simulator.connect("cabinet")
-    seen = []  # (row, before asking, after the answer)
+    seen = []  # (row, before request, after answer)
     try:
         while True:
             asked = time.monotonic_ns()

@@ -1,5 +1,5 @@
-"""`thermocomp replay` gives the daemon's offsets bit for bit, in each form of the smoothing. Whatever
-else may happen to a daemon is replayed by the fault simulation (tests/faults)."""
+"""`thermocomp replay` gives the daemon's offsets bit for bit, in each form of smoothing. The fault
+simulation (tests/faults) covers all other replays."""
 
 import time
 
@@ -27,7 +27,7 @@ def smoothing(form, history, half_width_K):
 
 
 def start(lab, rows, text):
-    """Simulator and daemon over the run's first rows."""
+    """Simulator and daemon with the run's first rows."""
     run = lab.folder / "spindle.csv"
     spindle.write_replay_file(run, rows, ROW_PERIOD_S)
     simulator = lab.simulator(spindle.machine_text(over_tcp()), "--replay", run,

@@ -1,5 +1,5 @@
-"""The disk with history and state fills up: the compensation goes on, somebody is told, what is
-committed stays, and everything resumes by itself once there is room."""
+"""The disk with history and state fills up: compensation continues, the operator is informed,
+committed rows stay, and everything resumes once there is space."""
 
 import contextlib
 import os
@@ -67,7 +67,7 @@ def chunks(history):
 
 
 def fill_until_noticed(disk, daemon):
-    """The log of the database may still have room in blocks of its own."""
+    """The database's log may still have space in its own blocks."""
     def noticed():
         disk.fill()
         return not daemon.status()["history"]["working"]
@@ -75,7 +75,7 @@ def fill_until_noticed(disk, daemon):
 
 
 def wait_for_history(daemon):
-    # Tried again after growing pauses, a minute at most.
+    # Retried after growing pauses of at most a minute.
     eventually(lambda: daemon.status()["history"]["working"], "history goes on", 90.0)
     daemon.committed()
 
@@ -92,7 +92,7 @@ def test_a_full_disk_stops_the_history_and_nothing_else(machine, disk, lab):
     daemon.wait_for_offset(14.0, 0.05)
     eventually(lambda: abs(machine.controller.applied_um() - 14.0) < 0.05, "applied")
     status, told, _ = daemon.cli("status")
-    assert status == 0  # the machine is being compensated
+    assert status == 0  # the machine is compensated
     assert "disk is full" in told
     assert any("disk is full" in warning for warning in daemon.status()["warnings"])
     assert "disk is full" in daemon.log_text()
@@ -101,7 +101,7 @@ def test_a_full_disk_stops_the_history_and_nothing_else(machine, disk, lab):
     disk.make_room()
     wait_for_history(daemon)
     history = daemon.status()["history"]
-    assert history["lost_records"] == 0  # all of it had waited in memory
+    assert history["lost_records"] == 0  # all records were kept in memory
     assert history["last_error"] == ""
     eventually(lambda: "history: written again after" in daemon.log_text(), "it is told")
     assert before <= chunks(daemon.history)
@@ -117,7 +117,7 @@ def test_a_switch_that_cannot_be_saved_is_not_called_done(machine, disk):
     fill_until_noticed(disk, daemon)
     status, _, said = daemon.cli("disable")
     assert status == 2 and "not saved" in said, said
-    daemon.wait_for_mode("disabled")  # it was done all the same
+    daemon.wait_for_mode("disabled")  # it was carried out nevertheless
     disk.make_room()
     assert daemon.cli("disable")[0] == 0
     daemon.kill()
@@ -133,7 +133,7 @@ def test_a_daemon_killed_and_started_on_a_full_disk_compensates_and_the_gap_is_t
     daemon.committed()
     fill_until_noticed(disk, daemon)
     before = chunks(daemon.history)
-    time.sleep(1.0)  # what waits in memory now is lost with the process
+    time.sleep(1.0)  # records now in memory are lost with the process
     daemon.kill()
     machine.warm_by(9.0)
     machine.start()

@@ -1,4 +1,4 @@
-"""kill -9 at random moments; the long run of the same is `bench/run.sh kill9`."""
+"""kill -9 at random times; `bench/run.sh kill9` is the long version."""
 
 import os
 import time

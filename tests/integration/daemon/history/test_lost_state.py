@@ -1,5 +1,5 @@
-"""A state file that is gone or cannot be read is no first start where there was an earlier one: the
-warm machine is not taken for the reference, and an operator's "off" stays."""
+"""A lost or unreadable state file is not a first start if an earlier start is known: the warm
+machine does not become the reference, and an operator's "off" stays."""
 
 import contextlib
 import sqlite3
@@ -68,7 +68,7 @@ def test_reference_and_switch_come_from_the_history(machine, damage):
 
 
 def test_a_newer_history_is_refused_once_and_everything_stays_as_it_is(machine):
-    """The way back to an older program: the state file is of a newer format too."""
+    """Return to an older program: the state file has a newer format too."""
     daemon = machine.start()
     machine.warm_by(9.0)
     daemon.wait_for_offset(9.0, 0.05)

@@ -1,5 +1,5 @@
-"""What leaves one command enters the next: daemon -> export -> inspect -> fit -> predict -> diagnose ->
-the daemon again, without an edited byte."""
+"""The output of each command is input of the next: daemon -> export -> inspect -> fit -> predict ->
+diagnose -> the daemon again, without an edit."""
 
 import json
 import math
@@ -15,7 +15,7 @@ from plain_devices import Machine
 pytestmark = pytest.mark.skipif(not (BIN / "thermocomp-modelling").exists(),
                                 reason="built without thermocomp-modelling")
 
-TRUE_UM_PER_K = (5.0, -2.0)  # the daemon's own model says 3.0 and -1.5
+TRUE_UM_PER_K = (5.0, -2.0)  # the daemon's own model has 3.0 and -1.5
 STATES = 36
 SMOOTHED = ('[smoothing]\nform = "off"',
             '[smoothing]\nform = "sliding_line"\nperiod_s = 0.0\nsamples = 4\nhalf_width_K = 5.0')
@@ -26,7 +26,7 @@ def displacement_um(column_degC, spindle_degC):
 
 
 def live_a_day(machine, seed):
-    """The machine in many states, probed in each. @return what the daemon's model said at each [um]"""
+    """Probes the machine in many states. @return the daemon's modelled displacement at each [um]"""
     daemon, chance = machine.daemon, random.Random(seed)
     said = []
     for _ in range(STATES):
@@ -71,7 +71,7 @@ def test_round_trip(lab, smoothed):
     assert [name for name in columns if name.endswith("_degC")] == ["column_degC", "spindle_degC"]
     probed = [i for i, value in enumerate(columns["z_um"]) if not math.isnan(value)]
     assert len(probed) == STATES
-    for i in probed:  # the offset in effect is taken out of what was probed
+    for i in probed:  # the offset in effect is subtracted
         wanted = displacement_um(columns["column_degC"][i], columns["spindle_degC"][i])
         assert abs(columns["z_um"][i] - wanted) < 0.5
     comments = [line for line in run.read_text().splitlines() if line.startswith("#")]
@@ -79,7 +79,7 @@ def test_round_trip(lab, smoothed):
                for line in comments), comments[:5]
     assert sum("command measured z" in line for line in comments) == STATES
 
-    # The daemon's own model over the export is what the daemon said at each probing.
+    # Predicted by the daemon's own model: equal to its displacement at each probing.
     must(0, "predict", "--model", machine.model, run, "-o", predicted)
     model_um = read_columns(predicted)["z_predicted_um"]
     assert len(model_um) == STATES
@@ -88,7 +88,7 @@ def test_round_trip(lab, smoothed):
     print(f"smoothed {smoothed}: {STATES} probings, predict beside the daemon: {largest_um:.2g} um")
     assert largest_um < 1e-9
 
-    # Through the tools, as the file is.
+    # The unchanged file through the tools.
     status, out, _ = run_tool("inspect", run, "--json", "-")
     assert status in (0, 1)
     assert json.loads(out)["runs"][0]["rows"] == len(columns["time_s"])
@@ -104,13 +104,13 @@ def test_round_trip(lab, smoothed):
     assert json.loads((lab.folder / "diagnosis.json").read_text())["baseline"]["z_um"][
         "test_rms_um"] > 1.0, "the daemon's own model is not the machine's"
 
-    # The fitted model back into the daemon, and into the daemon's displacement.
+    # The fitted model in the daemon gives the predicted displacement.
     shutil.copy(fitted, machine.model)
     assert daemon.cli("reload")[0] == 0
     said = live_a_day(machine, seed=6)
     daemon.committed()
     again = lab.folder / "again.csv"
-    # From the row after the last one of the first export: no pause between the two is taken for granted.
+    # From the row after the first export's last one, without assuming a pause.
     must(0, "export", daemon.history, "--from", str(columns["time_s"][-1] + 0.005), "-o", again)
     must(0, "predict", "--model", machine.model, again, "-o", predicted)
     model_um = read_columns(predicted)["z_predicted_um"]

@@ -1,4 +1,4 @@
-"""What happened in a scripted shift: every event, in order, with how long it lasted."""
+"""Events of a scripted shift: all of them, in order, with their durations."""
 
 import json
 import os
@@ -13,7 +13,7 @@ def events_of(daemon):
 
 
 def index_of(events, kind, subject="", what=""):
-    """The first such event; an error shows what there was."""
+    """Index of the first such event; a failure shows all events."""
     found = [i for i, event in enumerate(events) if event["kind"] == kind
              and event["subject"].startswith(subject) and event["what"].startswith(what)]
     assert found, (kind, subject, what, events)
@@ -32,7 +32,7 @@ def test_a_shift_is_told_in_order_with_durations(lab):
     begun = time.monotonic()
     daemon.wait_for_mode("holding")
     seen = time.monotonic()
-    # Longer than the reconnection's pauses are apart, so that a wrong duration would be seen.
+    # Longer than the reconnection's pauses, so that a wrong duration would be noticed.
     eventually(lambda: time.monotonic() - seen > 3.0, "the outage lasts")
     at_least_s = time.monotonic() - seen
     machine.module.start()
@@ -59,11 +59,11 @@ def test_a_shift_is_told_in_order_with_durations(lab):
              index_of(shift, "command", what="disable"), index_of(shift, "mode", what="disabled"),
              index_of(shift, "command", what="measured z 1.5 um"),
              index_of(shift, "command", what="enable"), index_of(shift, "command", what="reload")]
-    assert order == sorted(order), shift  # causes before what comes of them
+    assert order == sorted(order), shift  # causes before effects
     outage = shift[order[2]]
     held = shift[order[3]]
     assert held["what"] == "compensating", held
-    # What was seen from outside lies within a second of it.
+    # Within a second of the observation from outside.
     for event in (outage, held):
         assert at_least_s - 1.0 < event["duration_s"] < at_most_s + 1.0, event
     for name in ("disable", "enable", "measured", "reload"):
@@ -75,7 +75,7 @@ def test_a_shift_is_told_in_order_with_durations(lab):
     assert "  recovery  sensor column: " in out and ": over, lasted " in out
     assert "  command   measured z 1.5 um, by " in out
     assert json.loads(daemon.cli("events", "--json")[1])["events"][0] == events[0]
-    # It is over, and still to be seen at one glance.
+    # It is over, but still visible in the status.
     status, out, _ = daemon.cli("status")
     assert status == 0 and "Lately" in out and "Problems        : none" in out
 
@@ -94,7 +94,7 @@ def test_a_first_start_that_is_switched_off_tells_no_faults_of_its_first_moments
 
 
 def same_event(kept, said):
-    """What a history keeps of an event, in whole nanoseconds, is what the daemon said of it."""
+    """An event in the history, in whole nanoseconds, equals the one reported by the daemon."""
     words = ("number", "kind", "subject", "what", "user")
     times = [(kept[key], said[key]) for key in ("wall_s", "duration_s")]
     return ([kept[key] for key in words] == [said[key] for key in words] and
@@ -113,7 +113,7 @@ def test_earlier_runs_are_in_the_history(lab):
     first = events_of(daemon)
     daemon.end()
     daemon.start().wait_for_mode("compensating")
-    daemon.kill()  # what is committed stays
+    daemon.kill()  # committed events stay
     status, out, said = run_tool("events", daemon.history, "--json")
     assert status == 0, said
     told = json.loads(out)["events"]

@@ -1,4 +1,4 @@
-"""What an operator does to a running daemon, and what it does in turn."""
+"""Operator's commands to a running daemon, and its reactions."""
 
 import re
 import time
@@ -50,7 +50,7 @@ def assert_slewed_exactly(times_s, offsets_um):
 
 
 def falls_at_the_slew_rate(times_s, offsets_um, high, low):
-    """Whether somewhere the offsets go from high to low, full speed in every recorded cycle."""
+    """True if the offsets somewhere go from high to low at the slew limit in every recorded cycle."""
     length = 0.0
     for i in range(1, len(times_s)):
         step = offsets_um[i - 1] - offsets_um[i]
@@ -163,16 +163,16 @@ def test_only_a_latched_axis_is_released(machine, lab):
     eventually(lambda: "mismatch_latched" in daemon.status()["reasons"], "latched")
     told = daemon.axis()["mismatch"]
     assert abs(told["read_um"] - told["sent_um"] - 20.0) < 0.1
-    assert "another writer" in told["likely"]  # it came while nothing was sent
-    machine.controller.show_more_um(500.0)  # beyond what an offset may be
+    assert "another writer" in told["likely"]  # began while the offset was constant
+    machine.controller.show_more_um(500.0)  # beyond any possible offset
     eventually(lambda: daemon.axis()["applied"] > 400.0, "shown")
     status, out, _ = daemon.cli("release", "z")
-    # The controller may have kept the offset of a cycle before the one that was sent last.
+    # The controller may hold the offset of the cycle before the last one sent.
     values = re.match(r"axis z: NOT released: it reads back \+([\d.]+) um where \+([\d.]+) um was", out)
     assert status == 1 and values, out
     assert abs(float(values[1]) - float(values[2]) - 500.0) < 1.0, out
     machine.controller.show_more_um(0.0)
-    # A release said while the other value is still read back is dropped.
+    # A release while the other value is still read back is dropped.
     eventually(lambda: abs(daemon.axis()["applied"] - told["sent_um"]) < 0.1, "shown as sent")
     assert daemon.cli("release", "z")[0] == 0
     eventually(lambda: daemon.axis()["driven"] and daemon.axis()["mismatch"] is None, "driven again")
@@ -183,7 +183,7 @@ def test_only_a_latched_axis_is_released(machine, lab):
 
 @pytest.mark.parametrize("value_um", (900.0, -900.0, 60.5, 1e9))
 def test_a_measured_displacement_that_cannot_be_is_refused(machine, lab, value_um):
-    """The bound is 60 um, the model claims no error, and expects nothing to be left."""
+    """The bound is 60 um; the model claims no error and expects no remainder."""
     daemon = machine.start()
     with pytest.raises(Refused, match="nothing is taken over: .*Check the axis, the sign"):
         daemon.call("measured", axis="z", value_um=value_um)
@@ -196,7 +196,7 @@ def test_a_measured_displacement_that_cannot_be_is_refused(machine, lab, value_u
 
 
 def test_a_value_beyond_the_claimed_error_is_asked_back(machine, lab):
-    """The model claims 1.5 um: 12 um left at the tool are a slip of ten, 2 um are its error."""
+    """The model claims 1.5 um: a remainder of 12 um is a factor-of-ten mistake, 2 um are its error."""
     machine.model.write_text(MODEL + CLAIMS)
     daemon = machine.start()
     status, _, said = daemon.cli("measured", "z", "12", "--source", "part")

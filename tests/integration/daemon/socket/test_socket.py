@@ -1,5 +1,5 @@
-"""The status socket under attack: polite operators are answered, the watchdog is fed, the axis
-moves, and afterwards nothing is left of it."""
+"""The status socket under attack: other clients are answered, the watchdog is fed, the axis moves,
+and nothing remains afterwards."""
 
 import contextlib
 import os
@@ -65,7 +65,7 @@ def silent_subscribers(path, until):
 
 
 def operator_gone_mad(path, until):
-    """Commands by the hundred, each of which waits for the cycle and for the disk."""
+    """Hundreds of commands, each of which waits for the cycle and for the disk."""
     links = [connect(path) for _ in range(10)]
     while time.monotonic() < until:
         for link in links:
@@ -85,7 +85,7 @@ def nonsense(path, until):
 
 
 class ServiceManager:
-    """Listens as systemd would; also what is sent to it must be taken, or the daemon waits."""
+    """Receives notifications like systemd; the daemon would block if they were not read."""
 
     def __init__(self, path):
         self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)

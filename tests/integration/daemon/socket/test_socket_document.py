@@ -1,5 +1,5 @@
-"""docs/socket_examples.txt: each request is taken by a daemon, and the answer has the fields that
-the document shows. `test_socket_document.py --write` makes the examples anew."""
+"""docs/socket_examples.txt: a daemon accepts each request, and the answer has the documented
+fields. `test_socket_document.py --write` renews the examples."""
 
 import json
 import pathlib
@@ -16,7 +16,7 @@ READS = ("status", "sensors", "offsets", "timing", "model", "events")
 
 
 def requests():
-    """(title, method, params); in an order in which all of them can be done."""
+    """(title, method, params), in an order in which all can be carried out."""
     asked = [(method, method, None) for method in READS]
     asked += [("subscribe", "subscribe", {"methods": ["offsets"], "period_s": 0.5}),
               ("measured", "measured", {"axis": "z", "value_um": 1.5}),
@@ -56,7 +56,7 @@ class Client:
 
 
 def exchange(daemon, line):
-    """The answer; of a subscription the first notification too."""
+    """The answer; for a subscription also the first notification."""
     client = Client(daemon)
     try:
         answers = [client.send(line)]
@@ -76,13 +76,12 @@ def examples(text):
         elif line.startswith("< "):
             found[-1][1].append(line[2:])
         elif line.startswith("  ") and found:
-            found[-1][1][-1] += line[1:]  # of an answer that takes several lines
+            found[-1][1][-1] += line[1:]  # an answer of several lines
     return found
 
 
 def fields(value):
-    """The names by which a client finds what it looks for, at every depth; of lists the first
-    element."""
+    """Nested field names; of lists the first element."""
     if isinstance(value, dict):
         return {key: fields(each) for key, each in value.items()}
     if isinstance(value, list):
@@ -91,7 +90,7 @@ def fields(value):
 
 
 def differences(told, answer, place="answer"):
-    """Where the fields of an answer are not those that the document shows."""
+    """Paths at which the fields of an answer differ from the document."""
     if isinstance(told, dict) and isinstance(answer, dict):
         if "..." in told:
             return []
@@ -104,7 +103,7 @@ def differences(told, answer, place="answer"):
 
 
 def pruned(value, seen):
-    """Of lists the first element, which shows what there is."""
+    """Lists shortened to their first element."""
     if isinstance(value, dict):
         return {key: pruned(each, seen) for key, each in value.items()}
     if isinstance(value, list):
@@ -113,7 +112,7 @@ def pruned(value, seen):
 
 
 def once(element, seen):
-    """Of an element with the fields of an earlier one its name alone."""
+    """The name only, if an earlier element had the same fields."""
     if not isinstance(element, dict):
         return element
     if tuple(element) in seen:
@@ -123,7 +122,7 @@ def once(element, seen):
 
 
 def shown(answer, folder, seen):
-    """On lines that a page has room for."""
+    """Wrapped to the document's width."""
     text = json.dumps(pruned(answer, seen)).replace(str(folder) + "/", "/etc/thermocomp/")
     return "\n  ".join(textwrap.wrap(text, 100, break_long_words=False, break_on_hyphens=False))
 
