@@ -1,9 +1,8 @@
 #!/bin/sh
-# The benchmarks. Without an argument: their names, one a line. With one: runs it; the last lines
-# of its output are "NAME VALUE UNIT". Measured data: $THERMOCOMP_DATA, else shared/data beside the
-# source. Exit status 0 when it could measure, 2 for an unknown name, 77 where the data that it needs
-# are not there.
-# Everything else (building, progress, what is compared with what) goes to stderr.
+# The benchmarks. Without an argument: their names, one per line. With one: runs it; the last lines of its
+# output are "NAME VALUE UNIT". Measured data: $THERMOCOMP_DATA, else shared/data beside the source. Exit
+# status 0 if it could measure, 2 for an unknown name, 77 without the required data. All other output
+# (building, progress, explanations) goes to stderr.
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 source_dir=$(dirname "$here")
@@ -30,7 +29,7 @@ if grep -q THERMOCOMP_DATA "$script" && [ ! -d "$THERMOCOMP_DATA/spindle_46h" ];
   exit 77
 fi
 
-# A benchmark finds the programs here; THERMOCOMP_BENCH_BUILD names another, already built folder.
+# Folder of the programs; THERMOCOMP_BENCH_BUILD selects another, already built one.
 if [ -z "${THERMOCOMP_BENCH_BUILD:-}" ]; then
   THERMOCOMP_BENCH_BUILD=$source_dir/build/release
   if [ ! -f "$THERMOCOMP_BENCH_BUILD/build.ninja" ]; then

@@ -1,12 +1,12 @@
-// A full CAN bus of 1 Mbit/s received and decoded by our source, beside candump (can-utils) writing
-// the same load to /dev/null. Needs vcan0; bench/can/can_ingest.sh runs it where there is one.
+// A full CAN bus of 1 Mbit/s received and decoded by our source, compared with candump (can-utils)
+// writing the same load to /dev/null. Needs vcan0; run by bench/can/can_ingest.sh.
 //
-// The load: data frames of 8 bytes and 11 bits of identifier back to back, without a stuffed bit,
-// which are as many as 1 Mbit/s can carry (111 bits each), on 16 identifiers; in each frame four
-// signals of 16 bits, two of them Motorola, all decoded. Receivers are processes of their own; what
-// is compared is their processor time, user and system, from fork to end, in interleaved rounds.
+// Load: data frames of 8 bytes with 11-bit identifiers back to back, without stuff bits, the
+// maximum of 1 Mbit/s (111 bits each), on 16 identifiers; four signals of 16 bits per frame, two of
+// them Motorola, all decoded. Each receiver is a process; user and system times from fork to end
+// are compared, in interleaved rounds.
 //
-//   bench_can_ingest [ROUNDS [SECONDS]]      5 rounds of 5 s each, unless told otherwise
+//   bench_can_ingest [ROUNDS [SECONDS]]      default: 5 rounds of 5 s each
 #include <algorithm>
 #include <array>
 #include <cerrno>
@@ -80,7 +80,7 @@ CanBusConfig every_signal() {
   return bus;
 }
 
-/// The child: receives until SIGTERM, tells `to` that it is ready and what it has received.
+/// The child: receives until SIGTERM, reports to `to` when ready, and then the received numbers.
 [[noreturn]] void receive_and_decode(int to) {
   sigset_t ending;
   sigemptyset(&ending);
@@ -124,7 +124,7 @@ class Sender {
   Sender& operator=(const Sender&) = delete;
   ~Sender() { ::close(socket_); }
 
-  /// A full bus for `duration_s`, in step with the clock every millisecond. @return frames sent
+  /// Fills the bus for `duration_s`, in step with the clock every millisecond. @return frames sent
   std::uint64_t fill(double duration_s) {
     const auto all = static_cast<std::uint64_t>(duration_s * bits_per_s / bits_per_frame);
     const auto begin = Clock::now();
@@ -132,7 +132,7 @@ class Sender {
     while (sent < all) {
       const double elapsed_s = std::chrono::duration<double>(Clock::now() - begin).count();
       const auto due = static_cast<std::uint64_t>(elapsed_s * bits_per_s / bits_per_frame);
-      // After a pause of the machine no more at once than a bus could bring in 10 ms.
+      // After a stall at most the frames of 10 ms at once.
       const std::uint64_t until = std::min({due, all, sent + 90});
       for (; sent < until; ++sent) send(sent);
       std::this_thread::sleep_for(1ms);
@@ -152,7 +152,7 @@ class Sender {
   int socket_;
 };
 
-/// One receiver under the load.
+/// Runs one receiver under the load.
 template <class Child>
 Cost measure(Sender& sender, double round_s, bool tells, Child child) {
   std::array<int, 2> pipe{};
@@ -165,7 +165,7 @@ Cost measure(Sender& sender, double round_s, bool tells, Child child) {
   if (tells) {
     expect(::read(pipe[0], &cost.received, sizeof(Received)) == sizeof(Received), "our receiver");
   } else {
-    std::this_thread::sleep_for(500ms);  // it does not tell when it listens
+    std::this_thread::sleep_for(500ms);  // candump does not report when it listens
   }
   cost.sent = sender.fill(round_s);
   std::this_thread::sleep_for(200ms);
@@ -195,7 +195,7 @@ void run(int rounds, double round_s) {
   std::vector<double> candump_s;
   std::vector<double> ratios;
   std::uint64_t lost = 0;
-  std::uint64_t frames = 1;  // of a round
+  std::uint64_t frames = 1;  // per round
   for (int round = 0; round < rounds; ++round) {
     const Cost ours = measure(sender, round_s, true, [](int to) { receive_and_decode(to); });
     const Cost candump = measure(sender, round_s, false, [](int) { run_candump(); });

@@ -1,16 +1,16 @@
-/// An axis to and fro at 10 m/min over a guideway whose rows differ by 40 um over 800 mm: what is
-/// left at the tool when the daemon follows the position with a number each 20 ms, when it sends a
-/// line or a table of nodes and the controller interpolates, each 1 ms, by the position it has
-/// itself.
+/// An axis moves to and fro at 10 m/min over a guideway whose rows differ by 40 um over 800 mm.
+/// Remaining error at the tool if the daemon follows the position with an offset every 20 ms, and
+/// if it sends a line or a table of nodes and the controller interpolates every 1 ms with its own
+/// position.
 ///
-/// The estimator and the registers are the daemon's, the controller is the simulator's; time is
-/// virtual, the link without delay beside its period: what is read in one exchange is computed with
-/// in the cycle after it and written in the next exchange. The peak is that of the way at constant
-/// speed and of the turns, after the offsets have settled.
+/// Estimator and registers are the daemon's, the controller the simulator's. Time is virtual; the
+/// link has no delay except its period: values read in one exchange are used in the next cycle and
+/// the result is written in the next exchange. The peak covers motion at constant speed and turns,
+/// after the offsets have settled.
 ///
-/// The number needs a slew bound above the speed of the displacement, here 40 um/s; its peak is
-/// printed as well for the bound of an axis that only its temperatures move, 0.5 um/s. Line and
-/// table are sent with that one.
+/// The plain offset needs a slew limit above the speed of the displacement, here 40 um/s; its peak
+/// is also printed for the limit of an axis moved by temperatures only, 0.5 um/s. Line and table
+/// use it.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -123,7 +123,7 @@ double curve_um(double at_mm) {
   return warm_K * ((1.0 - share) * rows_um_per_K[above - 1] + share * rows_um_per_K[above]);
 }
 
-/// The registers as the controller finds them.
+/// The registers as read by the controller.
 std::vector<double> through_registers(Sent sent, std::uint64_t number,
                                       std::span<const double> offset_um) {
   if (sent == Sent::number)

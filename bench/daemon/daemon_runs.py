@@ -1,4 +1,4 @@
-"""What the benchmarks of the whole daemon share: a machine on Modbus TCP and a daemon reading it."""
+"""Common parts of the daemon's benchmarks: a machine on Modbus TCP and a daemon reading it."""
 
 import json
 import os
@@ -81,7 +81,7 @@ class Daemon:
         self.process = subprocess.Popen([programs / "thermocompd", "daemon.toml"], cwd=self.folder,
                                         stderr=subprocess.DEVNULL)
         deadline = time.monotonic() + 20
-        while self.call("status").get("mode") != "dry_run":  # what its controller is
+        while self.call("status").get("mode") != "dry_run":  # the mode of its controller
             if time.monotonic() > deadline or self.process.poll() is not None:
                 raise SystemExit("the daemon does not compensate")
             time.sleep(0.1)

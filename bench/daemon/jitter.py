@@ -13,7 +13,7 @@ from daemon_runs import Daemon, Machine
 
 
 def cyclictest(seconds):
-    # --laptop: like the daemon it leaves the processor's sleep states alone.
+    # --laptop: leaves the processor's sleep states unchanged, like the daemon.
     output = subprocess.run(
         ["cyclictest", "--laptop", "-m", "-q", "-t1", "-p60", "-i1000", f"-D{seconds}", "-h50000"],
         capture_output=True, text=True, check=True).stdout
@@ -24,7 +24,7 @@ def cyclictest(seconds):
     for us, count in histogram:
         seen += count
         if seen >= 0.999 * total:
-            p999_us = us + 1  # upper edge, as the daemon's
+            p999_us = us + 1  # upper edge, like the daemon's
             break
     worst_us = int(re.search(r"# Max Latencies:\s*(\d+)", output).group(1))
     return p999_us, worst_us

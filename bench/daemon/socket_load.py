@@ -32,7 +32,7 @@ def connect(path):
 
 
 def crowd(path, seconds):
-    """A thousand clients for so long; prints "ready" once all are connected, then what they got."""
+    """A thousand clients for this time; prints "ready" once all are connected, then their counts."""
     resource.setrlimit(resource.RLIMIT_NOFILE, (4096, 4096))
     readers = selectors.DefaultSelector()
     pollers, silent = [], []
@@ -120,7 +120,7 @@ def main():
         machine = Machine(given.bin, folder)
         try:
             for pair in range(given.pairs):
-                # Which one comes first changes, as what else the machine does may.
+                # Alternating order, because the machine's other load may change.
                 for load in ((False, True) if pair % 2 == 0 else (True, False)):
                     result = run(given.bin, machine, given.seconds, load)
                     (loaded if load else quiet).append(result)

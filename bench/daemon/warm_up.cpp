@@ -1,7 +1,7 @@
-// Minutes that WarmUp says until a machine is warm, beside the truth, every ten minutes of each run
-// file:
-//   bench_warm_up COLUMN BOUND_UM RUN.csv...      a line a moment: FILE MINUTE SAID TRUE
-// True: from then on the column stays nearer than the bound to its last value.
+// Time until a machine is warm according to WarmUp, compared with the truth, every ten minutes of
+// each run file:
+//   bench_warm_up COLUMN BOUND_UM RUN.csv...      a line per time: FILE MINUTE SAID TRUE
+// True: from then on the column stays within the bound of its last value.
 #include "daemon/status/warm_up.hpp"
 
 #include <cmath>

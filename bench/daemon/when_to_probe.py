@@ -1,10 +1,10 @@
 #!/usr/bin/python3
 """When to probe, and when the machine is warm, on simulated days of the demonstration's machine.
 
-Probing: a month of 20 shifts of different speeds and rooms; a model fitted to three other shifts. A probing takes out
-what is left at that moment. Each hour, beside: when the model may be off by more than a limit since the last one
-(daemon/status/warm_up.hpp), with the limit that leaves as much. Warm: 20 days of constant load; minutes that
-the daemon says beside those it took.
+Probing: a month of 20 shifts with different speeds and ambient temperatures; a model fitted to
+three other shifts. A probing removes the present error. Compared: probing each hour, and when the
+model may have drifted by a limit since the last probing (daemon/status/warm_up.hpp), with the limit
+that gives the same error. Warm: 20 days of constant load; the daemon's and the true minutes.
 
     when_to_probe.py BIN
 """
@@ -74,7 +74,7 @@ def columns(path):
 
 
 def probed(days, due):
-    """RMS of what is left, and probings. A day begins with the offset at zero and no probing."""
+    """RMS of the remaining error, and count of probings. A day begins with offset zero and no probing."""
     squares, count, probings = 0.0, 0, 0
     for time_s, measured, predicted in days:
         bias, at_s, at_um = 0.0, time_s[0], predicted[0]
@@ -105,7 +105,7 @@ def when_to_probe(folder):
         share = claim["left_out_rms_um"] / claim["no_model_rms_um"]
         none_um, _ = probed(days[axis], lambda age_s, moved_um: False)
         hourly_um, hourly = probed(days[axis], lambda age_s, moved_um: age_s >= 3600)
-        low, high = 0.01, 50.0  # limits that leave less, and more, than each hour
+        low, high = 0.01, 50.0  # limits with a smaller and a larger error than hourly probing
         for _ in range(30):
             middle = math.sqrt(low * high)
             left_um, _ = probed(days[axis], lambda age_s, moved_um: share * moved_um > middle)

@@ -1,14 +1,14 @@
-"""Test RMS of `thermocomp diagnose` beside what people would fit instead, on machines with a hidden
-effect (tests/diagnosis) and the same splits, and on the measured spindle.
+"""Test RMS of `thermocomp diagnose` compared with usual fits, on machines with a hidden effect
+(tests/diagnosis) and the same splits, and on the measured spindle.
 
-baselines.py PROGRAM [--cases N] [--levels 1,2] [--keep FOLDER]
+    baselines.py PROGRAM [--cases N] [--levels 1,2] [--keep FOLDER]
 
-  refit   static least squares of all temperatures
-  arx     d[t] = a d[t-1] + B [T, u](t) + C [T, u](t-1), run freely over the test rows
-  lasso   L1 regression on all temperatures and signals, each with four lags; price from left-out rows
-  sparse  sequential-threshold least squares on the same library with squares
+    refit   static least squares of all temperatures
+    arx     d[t] = a d[t-1] + B [T, u](t) + C [T, u](t-1), run freely over the test rows
+    lasso   L1 regression on all temperatures and signals, each with four lags; penalty from left-out rows
+    sparse  sequential-threshold least squares on the same library with squares
 
-Each is fitted to the residual of the base model and added to it, which helps all of them.
+Each is fitted to the residual of the base model and added to it, which improves all of them.
 """
 
 import argparse
@@ -129,7 +129,7 @@ def l1(square, right, price):
 
 
 def folds(left, right, fit, choices):
-    """The choice that leaves least of blocks left out."""
+    """The choice with the smallest error on left-out blocks."""
     edges = np.linspace(0, len(right), 6).astype(int)
     sums = []
     for choice in choices:

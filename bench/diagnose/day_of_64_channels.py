@@ -1,5 +1,5 @@
-"""A day of 64 channels, one row a minute: 56 temperatures, of which the model uses 48, six
-operating signals, a position and a displacement that holds heat which no sensor sees."""
+"""A day of 64 channels, one row per minute: 56 temperatures, of which the model uses 48, six
+operating signals, a position, and a displacement with heat that no sensor measures."""
 
 import pathlib
 

@@ -1,5 +1,5 @@
-"""Processor time of `thermocomp diagnose`, of one thread: a day of 64 channels with a heat that no
-sensor sees, and the measured spindle where its data are. What was hidden must be found.
+"""Processor time of `thermocomp diagnose` with one thread: a day of 64 channels with heat that no
+sensor measures, and the measured spindle if its data exist. The hidden effect must be found.
 
     time.py PROGRAM
 """
@@ -20,11 +20,11 @@ ROUNDS = 5
 HIDDEN = ("missing_heat_source", "s0_rpm")
 SOURCE = pathlib.Path(__file__).resolve().parents[2]
 DATA = pathlib.Path(os.environ.get("THERMOCOMP_DATA", SOURCE.parent / "shared" / "data"))
-DAY_S_MAX, SPINDLE_S_MAX = 5.0, 20.0  # what a user may have to wait
+DAY_S_MAX, SPINDLE_S_MAX = 5.0, 20.0  # longest acceptable times
 
 
 def cpu_s(command):
-    """User and system time of one run: others may use this machine too."""
+    """User and system time of one run, since others may use this machine too."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     subprocess.run(command, capture_output=True, check=True)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)

@@ -1,9 +1,9 @@
-/// What is left of the offset when sensors are lost: the estimator itself over measured
-/// temperatures of a spindle, with one sensor lost, each in turn, and with every pair.
+/// Offset error with lost sensors: the estimator with measured temperatures of a spindle, with each
+/// sensor lost in turn, and with every pair.
 ///
-/// Two folds: the covariance is fitted on one half of the record and sensors are lost in the other.
+/// Two folds: the covariance is fitted to one half of the record and sensors are lost in the other.
 /// A sensor is lost (open circuit) every two hours for one hour, and again for eight. Error: the
-/// offset sent less the offset sent with all sensors, at every row of the outage, all axes.
+/// offset less the offset with all sensors, at every row of the outage, all axes.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -29,7 +29,7 @@ using Lost = std::vector<std::size_t>;
 EstimatorConfig make_config(const ThermalModel& model, bool estimate) {
   EstimatorConfig config = measured_config(model, 40.0);  // rows are 15 s apart
   config.compensation.estimate_lost_blocks = estimate;
-  config.compensation.offset_sd_um_max = 500.0;  // to see all of it
+  config.compensation.offset_sd_um_max = 500.0;  // no limit
   return config;
 }
 
@@ -84,7 +84,7 @@ class Fold {
       for (std::size_t row = start.row; row < times_s_.size() && times_s_[row] < end_s; ++row) {
         estimating_.step(times_s_[row], temps_degC_[row], lost);
         holding_.step(times_s_[row], temps_degC_[row], lost);
-        // An open circuit counts once its last good reading is stale.
+        // An open circuit counts once the last good reading is stale.
         const Report& report = estimating_.report();
         if (has_reason(report.reasons, Reason::block_estimated)) count(row, report, tally);
       }

@@ -1,5 +1,5 @@
-/// The estimator itself over measured temperatures: a sensor and a block an input of the model, and
-/// a controller that takes what it is sent.
+/// The estimator with measured temperatures: one sensor and one block per model input, and a
+/// controller that applies every offset.
 #pragma once
 
 #include <chrono>
@@ -11,7 +11,7 @@
 
 namespace thermocomp {
 
-/// Switched on, with axes whose bound and slew nothing measured reaches.
+/// Enabled, with bounds and slew limits beyond all measured displacements.
 inline EstimatorConfig measured_config(const ThermalModel& model, double stale_after_s) {
   EstimatorConfig config;
   for (std::size_t i = 0; i < model.inputs.size(); ++i) {
@@ -40,7 +40,7 @@ class MeasuredMachine {
     controller_.link_epoch = 1;
     controller_.applied_um.fill(0.0);
   }
-  /// @param temps_degC  one an input; NaN: no answer  @param lost  inputs whose circuit is open
+  /// @param temps_degC  one per input; NaN: no answer  @param lost  inputs with an open circuit
   void step(double time_s, const std::vector<double>& temps_degC,
             const std::vector<std::size_t>& lost = {}) {
     const nanoseconds now =

@@ -1,9 +1,8 @@
-/// What smoothing does to spikes: measured temperatures of a spindle, spikes planted by seed, the
-/// offset that the static model predicts from them, beside the offset from the data as measured.
+/// Effect of smoothing on spikes: measured temperatures of a spindle with spikes planted by seed;
+/// the offset predicted by the static model, compared with the offset from the unchanged data.
 ///
 /// Spikes, per sensor and row (15 s): 0.5 % single ones of +-1..10 K; 0.05 % begin a burst of 2 to
-/// 4 rows, each with an amplitude of its own of +-1..10 K. Screening is left out: only the
-/// smoothing is looked at.
+/// 4 rows, each with its own amplitude of +-1..10 K. Without screening.
 #include "estimator/sensing/smoothing.hpp"
 
 #include <algorithm>
@@ -28,8 +27,8 @@ namespace {
 constexpr int seeds = 21;
 constexpr std::size_t window = 6;  ///< n of every method
 
-using Series = std::vector<double>;  ///< one value a row
-using Table = std::vector<Series>;   ///< one series a sensor or output
+using Series = std::vector<double>;  ///< one value per row
+using Table = std::vector<Series>;   ///< one series per sensor or output
 
 struct Data {
   Series time_s;
@@ -37,7 +36,7 @@ struct Data {
   std::vector<std::vector<double>> matrix_um_per_K;
 };
 
-/// What makes values of one sensor from what it measured.
+/// Computes a sensor's values from its measured ones.
 using Filter = std::function<double(const Sample&)>;
 struct Method {
   std::string name;
@@ -78,7 +77,7 @@ Method banded(const std::string& name, SmoothingForm form, SmoothingHistory hist
   SmoothingConfig config;
   config.form = form;
   config.history = history;
-  config.period_s = 0;  // the pitch is chosen by whoever feeds it
+  config.period_s = 0;  // the caller chooses the pitch
   config.samples = window;
   config.half_width_K = half_width_K;
   return {name, pitch_s, [config] {
@@ -192,9 +191,9 @@ double rms_um(const Table& offsets, const Table& truth) {
 }
 
 struct Result {
-  double largest_step_um;  ///< with spikes; median of the seeds
-  double rms_um;           ///< with spikes, against the offset from the data as measured
-  double unspiked_rms_um;  ///< what the method costs where there is nothing to remove
+  double largest_step_um;  ///< with spikes; median over the seeds
+  double rms_um;           ///< with spikes, relative to the offset from the unchanged data
+  double unspiked_rms_um;  ///< the same without spikes
 };
 
 Result measure(const Data& data, const std::vector<Table>& spiked, const Method& method) {
@@ -211,7 +210,8 @@ Result measure(const Data& data, const std::vector<Table>& spiked, const Method&
           rms_um(offsets_um(data, data.temps_degC, method, rows), truth)};
 }
 
-/// Largest lag [K] behind a course that rests for an hour, then goes on as `course_K(seconds)`.
+/// Largest lag [K] behind a temperature that rests for an hour, then continues as
+/// `course_K(seconds)`.
 double largest_lag_K(const Method& method, const std::function<double(double)>& course_K) {
   const Filter filter = method.make();
   double largest_K = 0.0;
@@ -223,7 +223,7 @@ double largest_lag_K(const Method& method, const std::function<double(double)>& 
   return largest_K;
 }
 
-/// Seconds from a step of 5 K until the value stays within 0.5 K of it.
+/// Time [s] from a step of 5 K until the value stays within 0.5 K of it.
 double step_followed_s(const Method& method) {
   const Filter filter = method.make();
   double wrong_until_s = 0.0;

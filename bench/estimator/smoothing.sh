@@ -1,5 +1,4 @@
 #!/bin/sh
-# What smoothing does to spikes planted in measured temperatures; docs/measurements.md explains the
-# table.
+# Effect of smoothing on spikes planted in measured temperatures; docs/measurements.md explains the table.
 set -eu
 exec "$THERMOCOMP_BENCH_BUILD/bin/bench_smoothing" "$THERMOCOMP_DATA/spindle_46h"

@@ -1,12 +1,11 @@
-/// One step of the estimator beside the bare matrix-vector product of the same machine's size:
-/// 64 sensors, 32 blocks of two, 6 axes, each with a guideway of 16 positions (96 rows of 32).
+/// One step of the estimator compared with the bare matrix-vector product of the same size: 64
+/// sensors, 32 blocks of two, 6 axes, each with a guideway of 16 positions (96 rows of 32).
 ///
-/// `step` prints the ratio of the two times, measured alternately in one run.
-/// `step --count N` makes N steps and nothing else, for an instruction counter; `--count-all-due N`
-/// the same with every value due for smoothing, `--count-beside N` with a candidate of the same
-/// size beside the model. All readings are new at every step. step_over_gemv: with the default
-/// smoothing, whose values are due once a minute; step_all_due_over_gemv: every value is due at
-/// every step, 64 line fits.
+/// `step` prints the ratio of the two times, measured alternately in one run. `step --count N` only
+/// makes N steps, for an instruction counter; `--count-all-due N` the same with every value due for
+/// smoothing, `--count-beside N` with a candidate of the same size. All readings are new at every
+/// step. step_over_gemv: with the default smoothing, whose values are due once a minute;
+/// step_all_due_over_gemv: every value is due at every step, 64 line fits.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -57,7 +56,7 @@ EstimatorConfig machine_config(double smoothing_period_s) {
   return config;
 }
 
-/// All blocks at five low passes, as `fit` makes it of a whole record: 160 states, 6 outputs.
+/// All blocks with five low passes, as in `fit` of a whole record: 160 states, 6 outputs.
 TermSpec lag_bank(const ThermalModel& model) {
   TermSpec term;
   term.kind = "lag_bank";
@@ -97,8 +96,8 @@ ThermalModel machine_model(bool with_bank) {
   return model;
 }
 
-/// The estimator in its surroundings: readings that are new at every step, a controller that
-/// applies at once, saddles that move.
+/// The estimator's environment: new readings at every step, a controller that applies at once,
+/// moving saddles.
 class Machine {
  public:
   explicit Machine(double smoothing_period_s, bool with_bank = false)
@@ -123,7 +122,7 @@ class Machine {
     ++steps_;
     const double time_s = 1e-9 * static_cast<double>(now_.count());
     for (std::size_t i = 0; i < sensors_count; ++i) {
-      // Inside the band all the while: a slow course and a small noise of the last digit.
+      // Always inside the band: a slow change with noise of the last digit.
       const double noise_K = 1e-3 * static_cast<double>((steps_ * 7 + i * 13) % 11);
       readings_[i] = {20.0 + 0.01 * time_s + noise_K, now_, Fault::none};
     }
@@ -151,14 +150,14 @@ class Machine {
   std::size_t steps_{0};
 };
 
-/// A step with a covariance: the median of those in which sensors are not judged, and of those in
-/// which they are (once a minute) what that costs.
+/// Median duration of a step without sensor check, and the additional duration of steps with the
+/// check (once a minute). Needs a covariance.
 struct Judging {
   double step_ns{0.0};
   double minute_us{0.0};
 };
 
-/// The product of all rows at all positions with the blocks' temperatures, as Eigen does it.
+/// Product of all rows at all positions with the blocks' temperatures, by Eigen.
 class Product {
  public:
   Product()
@@ -185,7 +184,7 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-/// Nanoseconds of one step(): prepare() is outside the clock, the clock's own cost is taken off.
+/// Duration of one step() [ns], without prepare() and less the cost of reading the clock.
 template <class Subject>
 double one_step_ns(Subject& subject, double clock_ns) {
   subject.prepare();
@@ -209,7 +208,7 @@ struct Comparison {
   double ratio;  ///< median of the rounds' ratios
 };
 
-/// Rounds of many steps of the one and then of the other, each round's medians compared.
+/// Alternating rounds of many steps; compares the medians of each round.
 Comparison compare(double smoothing_period_s, bool with_bank = false) {
   constexpr int rounds = 101;
   constexpr int steps_of_a_round = 200;
@@ -249,7 +248,7 @@ Judging measure_judging() {
     if (!judges) config.compensation.suspected_sensors = SuspectedPolicy::off;
     Machine machine(config, model);
     for (int i = 0; judges && i < 20'000; ++i) steps_ns.push_back(one_step_ns(machine, clock_ns));
-    // Once a minute, after 12 h: all ages have levels.
+    // Once a minute, for more than 12 h, so that all ages have levels.
     for (int i = 0; i < 2000; ++i) {
       machine.prepare(std::chrono::seconds(60));
       const double start = now_ns();

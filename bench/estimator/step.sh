@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# One step of the estimator beside the bare matrix-vector product, and its instructions.
-# What is compared with what: the head of bench/estimator/step.cpp.
+# One step of the estimator compared with the bare matrix-vector product, and its instructions. Described in
+# bench/estimator/step.cpp.
 set -euo pipefail
 program=$THERMOCOMP_BENCH_BUILD/bin/bench_step
 
@@ -12,7 +12,7 @@ if ! command -v valgrind > /dev/null; then
 fi
 out=$(mktemp -d)
 trap 'rm -rf "$out"' EXIT
-# Two runs of different length: what they differ by is free of the start and of the first steps.
+# The difference of two runs with different lengths excludes the start and the first steps.
 count() {
   valgrind --tool=callgrind --callgrind-out-file="$out/$2" --collect-atstart=no \
     --toggle-collect='*Machine::step*' "$program" "$1" "$2" > /dev/null 2> "$out/$2.log"

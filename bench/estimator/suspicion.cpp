@@ -1,21 +1,21 @@
-/// Whether a sensor that lies plausibly is found: the estimator itself over measured temperatures,
-/// with one sensor falsified, each in turn and at several times, and with none.
+/// Detection of plausible sensor errors: the estimator with measured temperatures and one falsified
+/// sensor, each in turn and at several times, and with none.
 ///
-/// The covariance is that of `thermocomp covariance` on one half of a record; the other half is
-/// replayed. Falsified: a jump by 2 K (every 2 h, looked at for 15 min), a creep by 4 K over the
-/// whole half, and a sensor that works loose and from then on shows 0.4 of the motion (every 4 h,
-/// until the half ends). Found: the sensor is suspected; wrong: another one is, or another one too.
+/// The covariance is from `thermocomp covariance` on one half of a record; the other half is
+/// replayed. Errors: a jump by 2 K (every 2 h, observed for 15 min), a creep by 4 K over the whole
+/// half, and a sensor that comes loose and then shows 0.4 of the change (every 4 h, until the half
+/// ends). Found: the sensor is suspected; wrong: another one is, alone or in addition.
 ///
-/// Numbers of the check and what they were set from (estimator/sensing/neighbour_check.cpp and
+/// Parameters of the check and their origin (estimator/sensing/neighbour_check.cpp and
 /// suspicion.cpp). Before any replay: ticks of 60 s, lines of 5 ticks, ages 1, 4 and 12 h, floor
 /// 0.1 K, clean share 0.75, end below 0.35 for 10 ticks. From hours 0-16 of the spindle with the
 /// covariance of hours 16-32, the half printed as "set_from": the limits, 4 (jump) and 6 (creep)
 /// standard deviations, 2.2 and 1.4 times the largest score there. By reasoning, after a first
 /// replay of everything: misfit share 0.25 (sizes were wrong), half an hour for a creep.
 ///
-/// The half printed as "judged" was not blind. Two numbers are owed to it: held share 0.5 (a spike
-/// of t16 there counted as a jump), and the jump limit, which was 4.5 until a jump of t5 was seen
-/// to be missed there. None is owed to the printer.
+/// The half printed as "judged" was not blind. It determined two parameters: held share 0.5 (a
+/// spike of t16 there counted as a jump), and the jump limit, which was 4.5 until a missed jump of
+/// t5 was seen there. The printer determined none.
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -38,24 +38,24 @@ constexpr double jumps_apart_s = 7200.0;
 constexpr double looses_apart_s = 14400.0;
 constexpr double jump_watched_s = 900.0;
 constexpr double jump_aim_s = 600.0;
-/// Before the first jump: lines of five ticks on both sides of it have to be there.
+/// Before the first jump: lines of five ticks are needed on both sides of it.
 constexpr double warms_up_s = 1200.0;
 
 EstimatorConfig make_config(const ThermalModel& model, double row_s) {
   EstimatorConfig config = measured_config(model, 2.7 * row_s);
   for (SensorConfig& sensor : config.sensors)
-    sensor.screening.rate_allowance_K = 50.0;  // what screening refuses need not be suspected
+    sensor.screening.rate_allowance_K = 50.0;  // values refused by screening need not be suspected
   return config;
 }
 
-/// What one kind of lie came to.
+/// Results for one kind of error.
 struct Tally {
   int planted{0};
   int found{0};
   int in_time{0};
   int wrong{0};
-  double delay_s{0.0};  ///< sum over those that were found
-  double size_K{0.0};   ///< of the lie then, the same
+  double delay_s{0.0};  ///< sum over found ones
+  double size_K{0.0};   ///< size of the error then, likewise
   void add(const Tally& other) {
     planted += other.planted;
     found += other.found;
@@ -70,7 +70,7 @@ double percent(int part, int whole) {
   return whole > 0 ? 100.0 * part / whole : not_a_number;
 }
 
-/// Value of a falsified sensor at a row, from the true one and that at the row of the beginning.
+/// Value of a falsified sensor at a row, from the true ones at this row and at the beginning.
 using Lie = std::function<double(double true_degC, double then_degC, double since_s)>;
 
 /// One part of a record with the covariance of another.
@@ -171,7 +171,7 @@ class Fold {
       tally.in_time = since_s <= jump_aim_s ? 1 : 0;
       tally.delay_s = since_s;
       tally.size_K = std::abs(temps_degC[sensor] - temps_degC_[row][sensor]);
-      if (end_s > times_s_.back()) break;  // of a long lie only the finding is asked
+      if (end_s > times_s_.back()) break;  // of a long error only the detection counts
     }
     return tally;
   }
@@ -195,7 +195,7 @@ ThermalModel with_record(ThermalModel model, RunFile run, std::size_t begin, std
   return model;
 }
 
-/// A model that only says which temperatures there are.
+/// A model that only defines the temperatures.
 ThermalModel plain_model(const std::vector<std::string>& inputs) {
   ThermalModel model;
   model.inputs = inputs;

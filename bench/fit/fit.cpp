@@ -1,7 +1,7 @@
-// Every combination of up to 6 of 22 places, judged by leaving each of 9 tests of 480 rows out.
+// Every combination of up to 6 of 22 places, evaluated by leaving out each of 9 tests of 480 rows.
 // `bench_fit FILE` writes the rows as doubles (tests, rows, 22 places and the output) for numpy,
-// then measures: normal equations and search, the best of several rounds. Last line: seconds.
-// The lines before: for each number of terms the lowest score and its places.
+// then measures normal equations and search, the best of several rounds. Prints for each number of
+// terms the lowest score and its places; last line: seconds.
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -19,7 +19,7 @@ constexpr Eigen::Index rows = 480;
 constexpr std::size_t tests_count = 9;
 constexpr int rounds = 5;
 
-/// Places that follow three heat sources with time constants and sizes of their own.
+/// Places that follow three heat sources with different time constants and sizes.
 MeasuredTests make_tests() {
   std::mt19937_64 engine(1);
   std::normal_distribution<double> noise;

@@ -1,8 +1,8 @@
-"""The peer of bench_fit: the same rows, the same normal equations, solved by numpy in batches.
+"""The peer of bench_fit: the same rows and normal equations, solved by numpy in batches.
 
     fit.py ROWS_FILE BENCH_FIT_OUTPUT
 
-Compares the answers, prints both times and their ratio; exit status 1 when the answers differ.
+Compares the answers, prints both times and their ratio; exit status 1 if the answers differ.
 """
 import itertools
 import sys

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Every combination of up to 6 of 22 places, nine tests left out in turn, beside numpy solving the
+# Every combination of up to 6 of 22 places, nine tests left out in turn, compared with numpy solving the
 # same normal equations in batches; one thread each, one after the other.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The spindle data: four sensors a channel, chosen and fitted on hours 0 to 24.1, beside the static
-# model of all 16 sensors, on the hours after.
+# The spindle data: four sensors per channel, chosen and fitted on hours 0 to 24.1, compared with the static
+# model of all 16 sensors, on the later hours.
 set -euo pipefail
 data=$THERMOCOMP_DATA/spindle_46h
 run=$data/hours_00_32.csv
@@ -22,7 +22,7 @@ for channel in ch1_um ch2_um ch3_um ch4_um ch5_um; do
   echo "static_model_$channel $(rms "$data/static_model.toml" $channel) um"
   fitted $channel four_sensors
   fitted $channel four_sensors_lags --lags
-  # What the fitted hours alone would choose.
+  # Choice from the fitted hours alone.
   fitted $channel four_sensors_no_error --sensor-error-K 0
   fitted $channel four_sensors_lags_no_error --lags --sensor-error-K 0
 done

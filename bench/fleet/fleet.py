@@ -22,14 +22,14 @@ KEYS = ("p50", "p99", "p999")
 
 
 def server_cpu_s(server):
-    """Of the server and all of its processes that have ended."""
+    """Processor time of the server with all of its ended processes."""
     pid = (server.data / "postmaster.pid").read_text().split()[0]
     fields = pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
     return sum(map(int, fields[11:15])) / os.sysconf("SC_CLK_TCK")
 
 
 def peak_MB(pid):
-    """Resident at most so far; 0 of a process that has ended."""
+    """Largest resident memory so far; 0 for a process that has ended."""
     try:
         status = pathlib.Path(f"/proc/{pid}/status").read_text()
     except OSError:
@@ -38,7 +38,8 @@ def peak_MB(pid):
 
 
 def many_uplinks(store):
-    """Until each has sent its history; (rows, seconds, CPU of the server, CPU of all uplinks, MB of the largest)"""
+    """Runs uplinks until all histories are sent; (rows, seconds, CPU of the server, CPU of all
+    uplinks, largest MB)."""
     first = fleet_lab.Machine(store, "first")
     first.record(hours_ago=HOURS + 1, hours=HOURS)
     machines = [fleet_lab.Machine(store, f"mill_{i}", history=first.history) for i in range(UPLINKS)]
@@ -63,7 +64,7 @@ def many_uplinks(store):
 
 
 def run(store, port, with_uplink):
-    """(timing of a daemon that ran for so long, share of a core and MB of the uplink)"""
+    """(timing of a daemon, share of a core and MB of the uplink) for one run."""
     with tempfile.TemporaryDirectory() as folder:
         daemon = daemon_runs.Daemon(fleet_lab.BIN, folder, port, RATE_HZ)
         uplink, used = None, (0.0, 0.0)
@@ -75,7 +76,7 @@ def run(store, port, with_uplink):
                                   "period_s = 10\n")
                 uplink = subprocess.Popen([str(fleet_lab.BIN / "thermocomp-uplink"), str(config)],
                                           stderr=subprocess.DEVNULL)
-                os.setpriority(os.PRIO_PROCESS, uplink.pid, 19)  # as the unit does
+                os.setpriority(os.PRIO_PROCESS, uplink.pid, 19)  # like the unit
             time.sleep(SECONDS)
             timing = daemon.call("timing")
         finally:

@@ -18,7 +18,7 @@ DAYS = float(os.environ.get("DAYS", "90"))
 
 
 def catch_up(machine):
-    """(seconds, CPU seconds, MB resident at most)"""
+    """(seconds, CPU seconds, largest resident MB)"""
     began, memory_MB, ended = time.monotonic(), 0.0, 0
     process = subprocess.Popen([str(fleet_lab.BIN / "thermocomp-uplink"), "--once", str(machine.folder / "uplink.toml")],
                                stdin=subprocess.DEVNULL)

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""First paint of the page of 200 machines, in a browser with nothing cached; medians of ten loads."""
+"""First paint of the page of 200 machines, in a browser without cache; medians of ten loads."""
 
 import os
 import pathlib
@@ -24,7 +24,7 @@ LOADS = 10
 
 
 def painted(driver, port):
-    """(first paint with content, the table of all machines is in the page) [ms after the navigation began]"""
+    """(first contentful paint, table of all machines in the page) [ms after the start of navigation]"""
     driver.get("about:blank")
     driver.get(f"http://localhost:{port}/")
     eventually(lambda: driver.execute_script("return document.querySelectorAll('#machines tbody tr').length") == 200,

@@ -23,7 +23,7 @@ from fleet_lab import BIN, Store, eventually
 from postgres import Postgres, free_port
 
 MACHINES, DAYS, BEGINS, HIDDEN = 20, 11, 7, 5
-ALL = MACHINES * (DAYS - 1)  # of the last day more may come
+ALL = MACHINES * (DAYS - 1)  # the last day is still open
 NODES = ("n1", "n2")
 CONF = """ClusterName=bench
 SlurmctldHost={host}(127.0.0.1)
@@ -52,7 +52,7 @@ PartitionName=main Nodes=ALL Default=YES State=UP
 
 
 class Cluster:
-    """Debian's slurmd takes several nodes a host, each with a port and a folder of its own."""
+    """Debian's slurmd runs several nodes per host, each with its own port and folder."""
 
     def __init__(self, folder):
         self.folder, self.processes = folder, {}
@@ -63,7 +63,7 @@ class Cluster:
         conf.write_text(CONF.format(host=socket.gethostname().split(".")[0], folder=folder,
                                     ports=[free_port() for _ in range(3)]))
         os.environ["SLURM_CONF"] = str(conf)
-        # It logs what it had to be forced to: a folder that is not root's alone.
+        # Logs what --force overrode: a folder that others may read.
         self.start("munged", "munged", "--foreground", "--force", f"--socket={folder}/munge.socket",
                    f"--key-file={folder}/munge.key", f"--pid-file={folder}/munge.pid",
                    f"--seed-file={folder}/munge.seed", f"--log-file={folder}/munge.log")
@@ -83,7 +83,7 @@ class Cluster:
                    f"{node} is up")
 
     def kill_node(self, node):
-        """Its first process and so all of it, as if the power had failed."""
+        """Kills its first process and thereby all of it, like a power failure."""
         self.processes[node].kill()
         self.processes[node].wait()
 
@@ -111,7 +111,7 @@ def fill(store, folder):
             measured_data.write(measured_data.Run("", columns), folder / "day.csv")
             store.fleet("load", f"mill_{number}", folder / "day.csv", "--begin",
                         f"{today - datetime.timedelta(days=DAYS - day)}T00:00:00Z")
-    # How often each result was written.
+    # Counts the writes of each result.
     store.ask("CREATE TABLE written (machine integer, night date);"
               "CREATE FUNCTION note() RETURNS trigger LANGUAGE plpgsql AS "
               "'BEGIN INSERT INTO written VALUES (NEW.machine, NEW.night); RETURN NEW; END';"
@@ -119,9 +119,9 @@ def fill(store, folder):
 
 
 def results(store):
-    """What the nights found, and that each was written once; then all of it is forgotten."""
+    """Results of the nights, each written once; then deletes them."""
     assert store.ask("SELECT count(*), count(DISTINCT (machine, night)) FROM written") == [[str(ALL)] * 2]
-    # The statistics name their temporary run file.
+    # The statistics contain the name of a temporary run file.
     rows = store.ask("SELECT name, night, state, departs, probability, departure, diagnosis IS NULL, "
                      "md5(regexp_replace(statistics, 'runs = [^\n]*', '')) FROM fleet.night_result JOIN fleet.machine ON id = machine ORDER BY 1, 2")
     assert len(rows) == ALL and {row[2] for row in rows} == {"done"}
@@ -170,7 +170,7 @@ def disturbed(store, cluster):
 def main():
     server = Postgres()
     folder = pathlib.Path(tempfile.mkdtemp(prefix="slurm"))
-    folder.chmod(0o755)  # munge refuses a socket that not everybody reaches
+    folder.chmod(0o755)  # munge requires a socket that everybody can reach
     cluster = store = None
     try:
         server.start()

@@ -1,7 +1,7 @@
 #!/bin/sh
-# Two hundred machine-nights as a Slurm job array on a slurmctld, two slurmd and a PostgreSQL of their own; by
-# `thermocomp-fleet night -j 2`; and as an array whose tasks are cancelled and whose node dies. Every night must be
-# written once, and with the same result. Needs root: a node is a namespace of processes, so that it can die at once.
+# Two hundred machine-nights as a Slurm job array on private slurmctld, two slurmd and PostgreSQL; by
+# `thermocomp-fleet night -j 2`; and as an array with cancelled tasks and a dying node. Every night must be
+# written once, with the same result. Needs root: a node is a process namespace that can be killed at once.
 set -eu
 for program in slurmctld slurmd sbatch munged; do
   if ! command -v "$program" >/dev/null || [ "$(id -u)" -ne 0 ]; then

@@ -1,13 +1,12 @@
 #!/usr/bin/env python3
 """The experiment of the gate machine (Teratani et al. 1995), from real bytes to the simulated tool.
 
-For each oil condition and each procedure a thermocomp-sim (config/gate_machine), a thermocompd and,
-in this program, who probes: each minute it reads the displacement transducer from the controller's
-register and tells the daemon over its socket. Five hours at 60 times the speed of a clock; all runs
-side by side. What is judged is the simulated machine's own record of its tool: as it is corrected (30
-to 60 s after a cycle end; before, the piezo is on its way through 0 V) and until the next cycle end, when
-it has been left alone for 5 min. The publication's figures are of the moments of correction, from the
-displacement 1 to 2 min before.
+For each oil condition and procedure: a thermocomp-sim (config/gate_machine), a thermocompd, and in
+this program the probing: each minute it reads the displacement transducer from the controller's
+register and reports it over the daemon's socket. Five hours at 60 times real time; all runs in
+parallel. Evaluated is the simulated machine's own record of its tool: as corrected (30 to 60 s
+after a cycle end; before, the piezo moves through 0 V) and until the next cycle end, 5 min later.
+The publication's figures are of the moments of correction, from the displacement 1 to 2 min before.
 
     gate_experiment.py BIN_FOLDER CONFIG_FOLDER OUT_FOLDER [CONDITION...]
 """
@@ -30,7 +29,7 @@ HOURS = 5.0
 CYCLE_S = 300.0
 MOVING_S = 30.0  # after a cycle end: the piezo moves
 CORRECTED_S = 60.0
-WARM_S = 900.0   # the first quarter of an hour, which the publication leaves out too
+WARM_S = 900.0   # the first quarter of an hour, also left out in the publication
 PROCEDURES = {"published": "piezo", "recursive": "piezo", "continuous": "axis"}
 PUBLISHED_RANGE_UM = {1: 52.0, 2: 49.0, 3: 60.0}
 
@@ -61,7 +60,7 @@ class Registers:
 
 
 class Run:
-    """One condition under one procedure."""
+    """One condition with one procedure."""
 
     def __init__(self, programs, config, out, condition, procedure):
         self.programs, self.config = programs, config
@@ -108,7 +107,7 @@ class Run:
     def call(self, method, params=None):
         with socket.socket(socket.AF_UNIX) as client:
             client.settimeout(10)
-            # A socket's path is short: from the folder.
+            # A socket's path must be short: use the folder's descriptor.
             client.connect(f"/proc/self/fd/{self.folder_fd()}/status.sock")
             request = {"jsonrpc": "2.0", "id": 1, "method": method, "params": params or {}}
             client.sendall(json.dumps(request).encode() + b"\n")
@@ -128,13 +127,13 @@ class Run:
             return False
 
     def probe(self):
-        """Each minute of the machine's clock what the transducer shows."""
+        """Reports the transducer each minute of the machine's clock."""
         last = 0
         try:
             while self.sim.poll() is None:
                 minutes, probed = self.registers.int32(20, 2)
-                # Two seconds past the minute, but for the one in which the piezo moves: at a
-                # cycle end the newest is then nearly a minute old, as in the publication.
+                # Two seconds past the minute, except the one in which the piezo moves: at a cycle
+                # end the newest value is then nearly a minute old, as in the publication.
                 minute = math.floor(minutes / 1000 - 2 / 60)
                 if minute > last:
                     last = minute
@@ -147,7 +146,7 @@ class Run:
                 time.sleep(0.02)
         except ConnectionError:
             pass  # the five hours are over
-        except Exception as error:  # told by the one who waits for this run
+        except Exception as error:  # raised by the thread that waits for this run
             self.failure = error
 
     def finish(self):
@@ -212,7 +211,7 @@ def table(runs):
 
 
 def draw(runs, out):
-    """A panel a condition: what the tool does without compensation and with each procedure."""
+    """One panel per condition: the tool without compensation and with each procedure."""
     conditions = sorted({run.condition for run in runs})
     script = ('set terminal pngcairo size 1100,1200 font "DejaVu Sans,11"\n'
               f'set output "{out / "courses.png"}"\n'
@@ -224,7 +223,7 @@ def draw(runs, out):
         mine = [run for run in runs if run.condition == condition]
         curves = [f'"{mine[0].truth}" using (column("time_s")/3600):"x_um" with lines lw 2 '
                   'lc rgb "#999999" title "without"']
-        # Where the piezo moves there is nothing to see but that it does.
+        # The time of the piezo's motion is left out.
         curves += [f'"{run.truth}" using (column("time_s")/3600):((int(column("time_s")) % '
                    f'{CYCLE_S:.0f}) < {MOVING_S:.0f} ? NaN : column("x_error_um")) with lines '
                    f'lw 1.3 title "{run.procedure}"' for run in mine]

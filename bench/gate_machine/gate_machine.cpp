@@ -1,10 +1,10 @@
-// A gate machine as finite elements beside the beam formulas, and three oil conditions with and
-// without running correction. The seeds are fixed: the same figures every time.
+// A gate machine by finite elements and by beam formulas, and three oil conditions with and without
+// running correction. Fixed seeds give the same figures every time.
 //
 //   bench_gate_machine coefficients
 //   bench_gate_machine run RUN.csv         the first condition measured once, for `thermocomp fit`
 //   bench_gate_machine corrections MODEL   formulas' and the fitted model's, corrected or not
-//   bench_gate_machine record              gains recorded on two conditions, judged on the third
+//   bench_gate_machine record              gains recorded on two conditions, evaluated on the third
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -35,7 +35,7 @@ using identification::TiedCoefficients;
 using identification::TiedColumns;
 
 constexpr double step_s = 10.0;
-constexpr double temperature_noise_K = 0.0316;  // 0.1 K a reading, one a second, ten in a step
+constexpr double temperature_noise_K = 0.0316;  // 0.1 K per reading, one per second, ten per step
 constexpr double probing_noise_um = 0.3;
 constexpr std::size_t probing_every_steps = 30;  // 5 min
 constexpr double hours = 5.0;
@@ -69,7 +69,7 @@ void compare_coefficients() {
               worst_kc);
 }
 
-/// Oil on for odd hours and off for even ones, or as the third condition has it.
+/// Oil on in odd hours and off in even ones, or by the third condition.
 Oil oil_at(int condition, double hour) {
   Oil oil;
   oil.in_tank = condition == 3 ? hour < 3 || hour >= 4 : static_cast<int>(hour) % 2 == 0;
@@ -81,7 +81,7 @@ Oil oil_at(int condition, double hour) {
 using Readings = std::array<double, 3>;  ///< A, B, mean of the tie [degC]
 constexpr double room_degC = 20.0;
 
-/// What happens, and what is read of it with noise.
+/// True course, and its noisy measurements.
 struct Course {
   std::vector<double> um;
   std::vector<Readings> temps_degC;
@@ -100,8 +100,8 @@ Course course_of(int condition) {
 }
 
 struct Measured {
-  std::vector<Readings> temps_degC;  ///< through a low pass
-  std::vector<double> probed_um;     ///< one a step; those that count are chosen later
+  std::vector<Readings> temps_degC;  ///< low-pass filtered
+  std::vector<double> probed_um;     ///< one per step; the used ones are selected later
 };
 
 nanoseconds time_of(std::size_t step) {
@@ -134,7 +134,7 @@ struct Left {
   [[nodiscard]] double peak() const { return std::max(-low, high); }
 };
 
-/// What is left of the true displacement at any time.
+/// Residual of the true displacement at any time.
 Left residual(const Course& course, const Measured& readings, const CorrectionConfig& config,
               const ThermalModel& model, bool probed = true) {
   DisplacementModel displacement(model);
@@ -182,7 +182,7 @@ CorrectionConfig two_phase(bool printed_form) {
   return config;
 }
 
-/// Everything about the recursive form that somebody has to choose.
+/// Parameters of the recursive form.
 struct Choice {
   double filter_s{0.0};
   CorrectionConfig correction;
@@ -192,13 +192,13 @@ CorrectionConfig recursive(bool sides_apart, double gain_drift, double bias_drif
   CorrectionConfig config = two_phase(false);
   config.form = CorrectionForm::recursive;
   if (sides_apart) config.groups = {{"a_degC"}, {"b_degC"}, {"c_degC"}};
-  config.noise_um = 2 * probing_noise_um;  // of the probing and of the readings beside it
+  config.noise_um = 2 * probing_noise_um;  // of the probing and of the concurrent readings
   config.gain_drift_per_sqrt_h = gain_drift;
   config.bias_drift_um_per_sqrt_h = bias_drift;
   return config;
 }
 
-/// Chosen on the first condition alone, with other noise than that of the tables.
+/// Chosen on the first condition alone, with other noise than in the tables.
 Choice chosen_on(const Course& first, const std::array<const ThermalModel*, 2>& models) {
   Choice best;
   double least_um = std::numeric_limits<double>::infinity();
@@ -241,7 +241,7 @@ struct Peak {
   double um{0.0};
 };
 
-/// @return the greatest residual of each column over the three conditions
+/// @return the largest residual of each column over the three conditions
 std::vector<Peak> table(const std::string& title, const std::array<Course, 3>& courses,
                         double filter_s, const std::vector<Column>& columns) {
   std::printf("%s: residual, um\n  condition  without       ", title.c_str());
@@ -287,7 +287,7 @@ void compare_corrections(const std::string& fitted_file) {
   for (const Peak& peak : peaks) std::printf("%s %.2f um\n", peak.name.c_str(), peak.um);
 }
 
-/// As an indicator and a logger would leave it, a row a step.
+/// Rows of an indicator and a logger, one per step.
 std::string run_text(const Course& course, std::uint64_t seed) {
   const Measured readings = measured(course, fitted_filter_s, seed);
   std::string text = "time_s,a_degC,b_degC,c_degC,x_um\n";
@@ -309,8 +309,8 @@ void write_run(const char* path) {
   std::fclose(file);
 }
 
-/// Without a correction, by the record of the other two conditions alone, by probings alone, and by
-/// both; greatest residual of the condition left out. Two sides in one group, as published.
+/// Without a correction, with the record of the other two conditions, with probings, and with both;
+/// largest residual of the condition left out. Two sides in one group, as published.
 void compare_record() {
   const std::array<Course, 3> courses{course_of(1), course_of(2), course_of(3)};
   const CorrectionConfig correction = recursive(false, 0.1, 0.0);

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Ki, Kc by beam formulas and by finite elements, and what running correction leaves in three oil
+# Ki, Kc by beam formulas and by finite elements, and the residual of running correction in three oil
 # conditions of that machine; then the published experiment from real bytes to the tool of a machine that
-# moves as the published one does (five minutes): docs/measurements.md has the tables.
+# moves like the published one (five minutes): docs/measurements.md has the tables.
 set -euo pipefail
 bin=$THERMOCOMP_BENCH_BUILD/bin
 out=$(mktemp -d)

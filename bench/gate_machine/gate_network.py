@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 """The gate machine of config/gate_machine as a network of lumps: prints network.toml.
 
-Conduction in a cast-iron frame (columns of 271 x 60 mm, 640 mm high, heated up to 320 mm through the
-wall of a tank; a tie of 657 mm^2 274 mm above the ground, which hardly touches them), and what each
-lump's temperature does to tool and work 519 mm above it: columns as cantilevers that the first moment of their temperature over
-the width bends, the tie as a spring between them. So the temperature is not straight across the column
-as Ki (A - B) - Kc C takes it. The publication (Teratani et al. 1995) gives no dimensions; these were
-sought so that the courses are those that it shows (docs/measurements.md).
+Conduction in a cast-iron frame (columns of 271 x 60 mm, 640 mm high, heated up to 320 mm through
+the wall of a tank; a tie of 657 mm^2 274 mm above the ground, almost without contact to them), and
+the effect of each lump's temperature on tool and work 519 mm above it: columns as cantilevers bent
+by the first moment of their temperature over the width, the tie as a spring between them. The
+temperature is thus not linear across the column, unlike in Ki (A - B) - Kc C. The publication
+(Teratani et al. 1995) gives no dimensions; these reproduce its curves (docs/measurements.md).
 
     gate_network.py > config/gate_machine/network.toml
     gate_network.py --coefficients      Ki and Kc of the formulas
@@ -19,8 +19,8 @@ WIDTH, DEPTH, HEIGHT, WORK, HEATED = 0.2715, 0.06, 0.64, 0.5187, 0.32
 TIE_AT, TIE_LENGTH, TIE_AREA, TIE_DEPTH = 0.2737, 0.4, 656.6e-6, 0.012
 MODULUS, EXPANSION, CONDUCTIVITY, CAPACITY = 125e9, 10.5e-6, 46.0, 7250 * 500.0
 WALL, WALL_CAPACITY = 0.00441, 7850 * 480.0
-# W/m^2 K: oil and wall, wall and column, wall and room, columns and room, columns and ground, tie and
-# room, tie and air that the tank has warmed, tie and columns
+# W/m^2 K: oil and wall, wall and column, wall and room, columns and room, columns and ground, tie
+# and room, tie and air warmed by the tank, tie and columns
 OIL, GASKET, WALL_ROOM, AIR, FOOT = 818.5, 35090.0, 51.17, 1.228, 70.35
 TIE_AIR, TIE_OIL, TIE_JOINT = 0.843, 0.3294, 38.22
 
@@ -30,12 +30,12 @@ UM = 1e6
 
 
 def influence(at, force_at):
-    """How far a column yields at one height to a force at another [m/N]."""
+    """Deflection of a column at one height per force at another [m/N]."""
     low, high = min(at, force_at), max(at, force_at)
     return low * low * (3 * high - low) / (6 * MODULUS * INERTIA)
 
 
-# How far tool and work part for each m that the tie would be too long.
+# Opening between tool and work per m of excess length of the tie.
 PARTED = 2 * influence(WORK, TIE_AT) / (
     2 * influence(TIE_AT, TIE_AT) + TIE_LENGTH / (TIE_AREA * MODULUS))
 

@@ -16,7 +16,7 @@ using namespace thermocomp::structure;
 
 namespace {
 
-constexpr double above_tie_m = 0.04;  ///< a column ends so far above the tie or the working point
+constexpr double above_tie_m = 0.04;  ///< column's end above tie or working point
 constexpr double um = 1e6;
 constexpr double mm = 1e3;
 
@@ -27,7 +27,7 @@ PartSpec& part_of(StructureSpec& spec, std::string_view name) {
   return *found;
 }
 
-/// The file's machine with its tie elsewhere.
+/// The file's machine with its tie at another height.
 StructureSpec with_tie_at(double height_m) {
   StructureSpec spec = load_structure(THERMOCOMP_GATE_STRUCTURE);
   Box& tie = part_of(spec, "tie").boxes.front().box;
@@ -123,7 +123,7 @@ struct GateStructure::Parts {
   double step_s;
   std::vector<double> rise_K;
   std::vector<double> sensitivity_m_per_K;
-  std::vector<std::vector<Weighted>> sensors;  ///< A, B, then the tie's
+  std::vector<std::vector<Weighted>> sensors;  ///< A, B, then those of the tie
   std::unique_ptr<TransientConduction> course;
   bool oil_was_in{false};
 };

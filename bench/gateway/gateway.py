@@ -1,6 +1,8 @@
 #!/usr/bin/python3
-"""What thermocomp-gateway costs beside a running daemon: memory, processor, bytes of the page, its first
-paint in a browser, time for a month of history. Processes and devices are those of the integration tests.
+"""Cost of thermocomp-gateway beside a running daemon.
+
+Memory, processor, bytes of the page, first paint, time for a month of history. Processes and
+devices are those of the integration tests.
 
     bench/gateway/gateway.py [--pages 5] [--seconds 30]
 """
@@ -38,7 +40,7 @@ def processor_s(pid):
 
 
 def open_pages(gateway, count, stack, stops):
-    """Streams that are read as a browser would."""
+    """Streams read like a browser does."""
     def read(answer):
         with contextlib.suppress(Exception):
             while not stops.is_set() and answer.readline():
@@ -51,7 +53,7 @@ def open_pages(gateway, count, stack, stops):
 
 
 def first_paints_ms(gateway, folder, loads):
-    """From the beginning of each load to the first paint with content; nothing is cached."""
+    """From the start of each load to the first contentful paint, without cache."""
     paints = []
     with headless(folder, "window-size=390,844") as driver:
         driver.execute_cdp_cmd("Network.enable", {})

@@ -28,7 +28,7 @@ REQUEST = "GET {} HTTP/1.1\r\nHost: localhost\r\n\r\n"
 
 
 def read_pages(port):
-    """What the browsers of 50 pages ask for, until it is ended; prints "ready" once all have had a state."""
+    """Requests of the browsers of 50 pages, until killed; prints "ready" once all have a state."""
     os.nice(19)
     reading = selectors.DefaultSelector()
     told = set()
@@ -49,7 +49,7 @@ def read_pages(port):
                 link.sendall((REQUEST.format(path)[:-2] + "Connection: close\r\n\r\n").encode())
                 while link.recv(65536):
                     pass
-            take(0)  # a stream that nobody reads is ended
+            take(0)  # an unread stream is ended
         link = socket.create_connection(("127.0.0.1", port))
         link.sendall(REQUEST.format("/api/events").encode())
         link.setblocking(False)
@@ -59,7 +59,7 @@ def read_pages(port):
 
 
 def run(machine, seconds, with_pages):
-    """timing of a daemon that ran for so long; with pages also those that the gateway counted."""
+    """Timing of a daemon in one run; with pages also their count by the gateway."""
     with tempfile.TemporaryDirectory() as folder:
         daemon = Daemon(BIN, folder, machine.port, RATE_HZ)
         gateway = readers = None
@@ -69,7 +69,7 @@ def run(machine, seconds, with_pages):
                 place = pathlib.Path(folder)
                 gateway = Gateway(types.SimpleNamespace(folder=place),
                                   types.SimpleNamespace(socket=place / "status.sock")).start()
-                os.setpriority(os.PRIO_PROCESS, gateway.process.pid, 10)  # as the unit does
+                os.setpriority(os.PRIO_PROCESS, gateway.process.pid, 10)  # like the unit
                 readers = subprocess.Popen([sys.executable, __file__, "--read", str(gateway.port)],
                                            stdout=subprocess.PIPE, text=True)
                 assert readers.stdout.readline() == "ready\n"

@@ -21,14 +21,14 @@ from plain_devices import Machine  # noqa: E402
 
 RULES = ROOT / "gateway/monitoring/thermocomp_alerts.yml"
 SCRAPE_S = 5
-# What a rule's `for` (two minutes at most) and some scrapes take.
+# Time of a rule's `for` (at most two minutes) and some scrapes.
 ALERT_PATIENCE_S = 200
 WITHOUT_MODULE = ("ThermocompBusAway", "ThermocompSensorLost", "ThermocompNotCompensating")
 WITHOUT_DAEMON = ("ThermocompDaemonAway",)
 
 
 def promtool(*arguments, text=None):
-    """What it said; nothing where all is well, but for the rules, which it counts."""
+    """Its output; empty if all is well, except for the count of rules."""
     done = subprocess.run(["promtool", *map(str, arguments)], input=text, text=True,
                           capture_output=True)
     if done.returncode != 0:
@@ -37,7 +37,7 @@ def promtool(*arguments, text=None):
 
 
 class Prometheus:
-    """A real one, scraping one gateway."""
+    """A real Prometheus that scrapes one gateway."""
 
     def __init__(self, folder, target):
         self.port = free_port()
@@ -76,12 +76,12 @@ class Prometheus:
                 if alert["state"] == "firing"}
 
     def complaints(self):
-        """Lines of its log: samples out of order, twice, or a rule that failed."""
+        """Lines of its log about samples out of order or doubled, or failed rules."""
         return re.findall(r".*level=(?:warn|error).*", self.log.read_text())
 
 
 def wait_for_alerts(prometheus, wanted, what):
-    """Seconds until exactly these fire."""
+    """Seconds until exactly these alerts fire."""
     begun_s = time.monotonic()
     eventually(lambda: time.sleep(0.5) or prometheus.firing() == set(wanted), what, ALERT_PATIENCE_S)
     return time.monotonic() - begun_s

@@ -1,7 +1,7 @@
 """Plants a fault of one reading (2 K jump, 4 K creep, 0.4 of the motion left, 3 K spikes, a stuck
-channel, a jump of a displacement) into each measured recording and asks `thermocomp inspect`.
-Right: the likeliest finding of 0.5 or more that the untouched recording does not have names column
-and kind. With `--scores FILE` every score is written, from which probability.cpp was set."""
+channel, a jump of a displacement) into each measured recording and runs `thermocomp inspect`.
+Right: the most likely finding of 0.5 or more that the unchanged recording lacks names column and
+kind. `--scores FILE` writes all scores, from which probability.cpp was set."""
 
 import csv
 import json
@@ -47,7 +47,7 @@ def part(run, from_s, to_s):
 
 
 def recordings():
-    """(machine, name, run): nothing here is of the hours that judge."""
+    """(machine, name, run), without the hours used for evaluation."""
     spindle = thinned(read(DATA / "spindle_46h" / "hours_00_32.csv"), MINUTE_S)
     yield "spindle", "hours 0-16", part(spindle, 0, 57600)
     yield "spindle", "hours 16-32", part(spindle, 57600, 1e9)
@@ -69,7 +69,7 @@ def write(run, path):
 
 
 def planted(run, kind, chance):
-    """(run with the fault, column, at_s); None where the recording has no such column."""
+    """(run with the fault, column, at_s); None if the recording has no such column."""
     displacement = kind == "displacement_step"
     columns = [n for n in run if (n.endswith("_um") if displacement else n.endswith("_degC"))
                and "target" not in n and max(run[n]) > min(run[n])]
@@ -118,7 +118,7 @@ def inspect(run, folder):
 
 
 def simulated(folder):
-    """Runs of the example and of the demonstration, in which nothing is wrong."""
+    """Runs of the example and of the demonstration, without faults."""
     path = folder / "simulated.csv"
     for machine in ("examples", "demo"):
         for seed in range(1, SEEDS + 1):
@@ -129,7 +129,7 @@ def simulated(folder):
 
 
 def count_clean(machine, run, findings, sensor_days, named):
-    """Findings from 0.8 on, but for facts of the file."""
+    """Findings of 0.8 or more, except facts about the file."""
     days = (run["time_s"][-1] - run["time_s"][0]) / 86400
     columns = sum(n.endswith(("_degC", "_K", "_um")) for n in run)
     sensor_days[machine] = sensor_days.get(machine, 0.0) + days * columns

@@ -1,17 +1,17 @@
-"""Test RMS on measured machines: what people fit, `thermocomp fit` without further options, and
-what `thermocomp diagnose` makes of a ridge model.
+"""Test RMS on measured machines: usual fits, `thermocomp fit` without further options, and a ridge
+model extended by `thermocomp diagnose`.
 
     measured.py PROGRAM [--data FOLDER] [--splits TEXT] [--further] [--peers NAME,...]
 
-The last lines: each split's RMS by method (mean over its outputs); what `fit` stated of its model
-beside what it left of the test rows (the median over outputs of their ratio; `told_as_range` where
-it states no figure); how many rows were said to be outside, the error inside and outside, and of
-95 % intervals the share that holds there, their mean width over that of split-conformal ones about
-ridge regression with lags, what share of those holds, and the interval score (width, and 40 times
-what is missed) of ours over theirs. Both kinds are also widened, by one factor each for all splits,
-until 95 % hold in the mean, and compared again. Then ours over the best peer of the split: the median, the
-largest; over no model; rows that are worse than no model without being called outside; and how many
-stated figures are right within 0.7 to 1.5.
+The last lines: each split's RMS by method (mean over its outputs); the error claimed by `fit`
+relative to the one on the test rows (median over outputs of their ratio; `told_as_range` if no
+figure is given); the number of rows called outside, the error inside and outside, and for 95 %
+intervals: coverage, mean width relative to split-conformal intervals around ridge regression with
+lags, the coverage of those, and the ratio of the interval scores (width plus 40 times the excess).
+Both kinds are also widened, by one factor each for all splits, to a mean coverage of 95 %, and
+compared again. Then ours relative to the best peer of the split: median, maximum; relative to no
+model; rows that are worse than no model without being called outside; and the number of claimed
+errors that are right within 0.7 to 1.5.
 """
 
 import argparse
@@ -52,8 +52,8 @@ def arguments(runs, folder, prefix):
 
 
 def left_by(program, model, runs, split):
-    """Left-over rows, measured rows, their stated standard deviation (one a row of each output), and
-    flags of `outside`."""
+    """Residual rows, measured rows, their claimed standard deviation (one per row and output), and
+    `outside` flags."""
     left = {name: [] for name in split.outputs}
     moved = {name: [] for name in split.outputs}
     stated = {name: [] for name in split.outputs}
@@ -85,7 +85,7 @@ def run(what, arguments_of):
 
 
 def write_ridge(split, path):
-    """Ridge regression of all temperatures as a model file: what `diagnose` starts from."""
+    """Ridge regression of all temperatures as a model file: the base model for `diagnose`."""
     def quoted(names):
         return "[" + ", ".join(f'"{name}"' for name in names) + "]"
     names, gains = peers.ridge_gains_um_per_K(split)
@@ -95,7 +95,7 @@ def write_ridge(split, path):
 
 
 def diagnosed(program, split, train, test, folder):
-    """What `diagnose` leaves of the test rows when it extends the ridge model."""
+    """Test residual of the ridge model extended by `diagnose`."""
     base = folder / "ridge.toml"
     write_ridge(split, base)
     out = folder / "diagnosed"
@@ -105,7 +105,7 @@ def diagnosed(program, split, train, test, folder):
 
 
 def fitted(program, split, train, model):
-    """Fits without further options; the answer for a program, and seconds."""
+    """Fits without further options; the JSON answer and the time [s]."""
     start = time.monotonic()
     said = subprocess.run([program, "fit", *train, "--outputs", ",".join(split.outputs), "-o",
                            model, "--json"], capture_output=True, text=True, check=False)
@@ -116,16 +116,16 @@ def fitted(program, split, train, model):
 
 
 def share_covered(left, sd, rows):
-    """Of 95 % intervals on the rows, mean over outputs; NaN without rows."""
+    """Coverage of 95 % intervals on the rows, mean over outputs; NaN without rows."""
     if not rows.any():
         return float("nan")
     return float(np.mean([np.mean(np.abs(e[rows]) <= 1.96 * s[rows]) for e, s in zip(left, sd)]))
 
 
 def widening(errors, share=0.95):
-    """By what all intervals have to be widened for the share to hold, mean of the splits.
+    """Common factor for all intervals that gives the coverage, mean over the splits.
 
-    errors -- errors over half widths, one array a split
+    errors -- errors over half widths, one array per split
     """
     low, high = 1e-3, 1e4
     while high / low > 1.001:
@@ -136,13 +136,13 @@ def widening(errors, share=0.95):
 
 
 def interval_score_um(left, half_um):
-    """Mean over outputs; lower is better, least for intervals that hold on 95 %."""
+    """Mean over outputs; lower is better, lowest for intervals that cover 95 %."""
     return float(np.mean([np.nanmean(2 * h + 40 * np.maximum(0.0, np.abs(e) - h))
                           for e, h in zip(left, half_um)]))
 
 
 def judge(program, split, names, folder):
-    """RMS of each method, mean over outputs; and of ours where it is not called outside."""
+    """RMS of each method, mean over outputs; and of ours for rows not called outside."""
     figures = {}
     left_by_peer = {}
     for name in names:
@@ -233,7 +233,7 @@ def main():
             lines.append(f"{split.name}_width_over_conformal {intervals['width'][-1]:.2f} ratio")
             lines.append(f"{split.name}_interval_score_over_conformal "
                          f"{intervals['score'][-1]:.2f} ratio")
-            if figures["runs"] >= 3:  # fewer: `fit` tells a range in words
+            if figures["runs"] >= 3:  # with fewer, `fit` gives a range in words
                 stated.append(figures["stated"])
             lines.append(f"{split.name}_outside {figures['outside_share']:.3f} share")
             lines.append(f"{split.name}_fit_inside {figures['inside']:.3f} um")

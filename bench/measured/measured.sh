@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Measured machines: test RMS of what people fit (ridge, LASSO, boosting, ARX) and of `thermocomp
-# fit`, on the splits of bench/measured/measured_data.py. The peers need python3-sklearn.
+# Measured machines: test RMS of usual fits (ridge, LASSO, boosting, ARX) and of `thermocomp fit`, on the
+# splits of bench/measured/measured_data.py. The peers need python3-sklearn.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 if ! /usr/bin/python3 -c 'import sklearn' 2> /dev/null; then

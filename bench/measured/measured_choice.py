@@ -1,6 +1,6 @@
-"""Which family `thermocomp fit` takes of several runs, beside the one that would have been best: test
-RMS in um, mean over outputs, on sets of four to eight runs cut from measured data; then for each
-machine what the default leaves over the best family, geometric mean of the sets.
+"""The family chosen by `thermocomp fit` from several runs, compared with the best one: test RMS in
+um, mean over outputs, on sets of four to eight runs cut from measured data; then for each machine
+the ratio of the default's RMS to that of the best family, geometric mean over the sets.
 
     measured_choice.py PROGRAM [--data FOLDER]
 
@@ -41,7 +41,7 @@ SENSORS_OF_SOME = 6
 
 
 def spindle(folder):
-    """Each with all sensors and twice with six of them, a row each half minute."""
+    """Each set with all sensors and twice with six of them, one row per half minute."""
     run = data.Run("spindle", data.read(folder / "spindle_46h" / "hours_00_32.csv"))
     run.columns = {name: values[::2] for name, values in run.columns.items()}
     outputs = [f"ch{i}_um" for i in range(1, 6)]
@@ -76,7 +76,7 @@ def telescope(folder):
 
 
 def cell(folder):
-    """Four rates, and the fifth."""
+    """Four rates to predict the fifth."""
     sets = []
     for which in ("S001", "S002"):
         of = {rate: data.Run(f"{which}_{rate}", data.read(folder / "cell_under_load" /
@@ -88,7 +88,7 @@ def cell(folder):
 
 
 def test_um(program, split, folder, family):
-    """@return the family taken, and what it leaves; None where it has no answer"""
+    """@return the chosen family and its RMS; None if there is no answer"""
     folder.mkdir()
     model = folder / "model.toml"
     said = subprocess.run([program, "fit", *arguments(split.train, folder, "train"), "--outputs",

@@ -1,7 +1,7 @@
-"""Splits of measured data: which rows a model may be fitted to, and on which it is judged.
+"""Splits of measured data: rows for fitting and rows for evaluation.
 
-The data are other people's: read from the folder that THERMOCOMP_DATA names, never copied into the
-project. Displacement, rises and prediction count from each file's first row.
+The data belong to others: they are read from the folder THERMOCOMP_DATA and never copied into the
+project. Displacement, rises and prediction are relative to each file's first row.
 """
 
 import dataclasses
@@ -9,7 +9,7 @@ import dataclasses
 import numpy as np
 
 HOUR_S = 3600.0
-ROWS_OF_A_RUN_MAX = 1200  # the course of a day keeps its shape, and boosting ends
+ROWS_OF_A_RUN_MAX = 1200  # keeps the shape of a day, and lets boosting end
 
 
 def read(path):
@@ -23,7 +23,7 @@ def read(path):
 
 @dataclasses.dataclass
 class Run:
-    """A file as somebody would have it, and the rows of it that a split uses."""
+    """A file as recorded, with the rows used by a split."""
 
     name: str
     columns: dict
@@ -31,7 +31,7 @@ class Run:
     to_s: float = np.inf
 
     def cut(self, from_s, to_s):
-        """The rows as a file of their own: references and lags start at its first row."""
+        """The rows as a separate file: references and lags start at its first row."""
         time_s = self.columns["time_s"]
         keep = (time_s >= from_s) & (time_s < to_s)
         return Run(self.name, {name: values[keep] for name, values in self.columns.items()})
@@ -140,7 +140,7 @@ def shares(run, outputs, *at):
 
 
 def further_splits(folder):
-    """Others of the same data: they chose nothing but the width of the intervals."""
+    """Other splits of the same data, used only to choose the width of the intervals."""
     def runs(pattern):
         return {path.stem: Run(path.stem, read(path)) for path in sorted(folder.glob(pattern))}
     spindle_run, *_ = runs("spindle_46h/*.csv").values()
@@ -174,7 +174,7 @@ def all_splits(folder):
 
 
 def low_pass(time_s, values, tau_s):
-    """Each column of `values` after a first-order low pass that starts at its first value."""
+    """First-order low pass of each column of `values`, starting at its first value."""
     if not tau_s > 0:
         return values
     out = np.empty_like(values)
@@ -204,7 +204,7 @@ def selection(run, path):
 
 
 class Table:
-    """Rows of runs as a peer wants them; shape (rows, columns), thinned alike in all."""
+    """Rows of runs for a peer; shape (rows, columns), all thinned alike."""
 
     def __init__(self, runs, outputs, low_passes_s=(0.0,), with_signals=False):
         self.x, self.y, self.runs = [], [], []

@@ -1,5 +1,5 @@
-"""What people fit to temperatures and displacement, each with its penalty chosen on blocks left out
-of the training rows, and nothing else of the split known to it."""
+"""Usual fits of displacement to temperatures, each with its penalty chosen on left-out blocks of
+the training rows only."""
 
 import warnings
 
@@ -13,7 +13,7 @@ warnings.filterwarnings("ignore")
 
 
 def blocks_of(parts):
-    """Rows to leave out: contiguous stretches of each run, eight over all."""
+    """Blocks to leave out: contiguous parts of each run, eight in total."""
     of_a_run = max(1, round(BLOCKS / len(parts)))
     blocks, start = [], 0
     for part in parts:
@@ -105,8 +105,8 @@ def ridge_gains_um_per_K(split):
 
 
 def conformal_lags_um(split):
-    """Half width of split-conformal 95 % intervals about `ridge_lags`, one an output: the quantile
-    of what is left of the blocks of the training rows, each left out."""
+    """Half width per output of split-conformal 95 % intervals around `ridge_lags`: the quantile of
+    the residuals on the left-out blocks of the training rows."""
     train = Table(split.train, split.outputs, LOW_PASSES_S, True)
     x, ys = train.stacked()
     widths = []
@@ -157,7 +157,7 @@ def arx_gain(parts, outs, penalty):
 
 
 def arx(split):
-    """Runs through every row before the judged ones too, so that its state is right there."""
+    """Also runs through all rows before the evaluated ones, so that its state is right."""
     train = Table(split.train, split.outputs, (0.0,), True)
     whole = [run.selected(-np.inf, run.to_s) for run in split.test]
     test = Table(whole, split.outputs, (0.0,), True)

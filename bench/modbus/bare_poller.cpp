@@ -1,5 +1,5 @@
-// The peer of bench/daemon/footprint.sh: what one would write in an afternoon. A 100 Hz timer and,
-// once a second, one read of the registers with libmodbus; nothing is decoded, kept or sent.
+// The peer of bench/daemon/footprint.sh, a minimal poller: a 100 Hz timer and, once a second, one
+// read of the registers with libmodbus; nothing is decoded, stored or sent.
 #include <cerrno>
 #include <cstdint>
 #include <cstdio>

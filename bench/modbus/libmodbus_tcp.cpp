@@ -1,12 +1,12 @@
-// What libmodbus does on Modbus TCP where a module is late, and what our connection does there: the
-// same scripted server for both. Why the frames of TCP are ours: docs/dependencies.md.
+// Reactions of libmodbus and of our connection to late answers on Modbus TCP, with the same
+// scripted server. docs/dependencies.md gives the reasons for our own TCP frames.
 //
-//   numbers      requests of three sent by modbus_send_raw_request() that have a number of their
-//   own late         the answer to the first request comes while the second one waits for its own
-//   half         ... comes in two pieces, one before and one after the second request is sent
+//   numbers   distinct transaction numbers in three requests sent by modbus_send_raw_request()
+//   late      the answer to the first request comes while the second one waits for its own
+//   half      ... comes in two pieces, one before and one after the second request is sent
 //
-// libmodbus is used in two ways: as it is meant to be, and with asking and answering split, its
-// time-out one microsecond, the waiting and the comparing of numbers ours.
+// libmodbus is used in two ways: as intended, and with separate request and answer, its timeout one
+// microsecond, and waiting and comparison of numbers done by us.
 #include <array>
 #include <chrono>
 #include <cstdint>
@@ -113,7 +113,7 @@ Context connect_libmodbus(int port) {
   return context;
 }
 
-/// Failed ones of five, after one that has no answer in time.
+/// Count of failures in five requests after an unanswered one.
 int five_requests(const std::function<bool()>& read) {
   static_cast<void>(read());
   std::this_thread::sleep_for(100ms);
@@ -131,7 +131,7 @@ int with_libmodbus(const bench::TcpListener& listener) {
   });
 }
 
-/// libmodbus counts its requests from 1 and does not tell the number: it has to be counted along.
+/// libmodbus counts its requests from 1 without reporting the number, so it is counted here.
 int with_libmodbus_split(const bench::TcpListener& listener) {
   const Context context = connect_libmodbus(listener.port());
   int number = 0;
@@ -161,7 +161,7 @@ int with_ours(const bench::TcpListener& listener) {
   static_cast<void>(connection.connect());
   return five_requests([&] {
     std::array<std::uint16_t, registers> words{};
-    static_cast<void>(connection.connect());  // where it had to be closed
+    static_cast<void>(connection.connect());  // if it had to be closed
     return connection.read(1, ModbusTable::input, 0, words).ok();
   });
 }

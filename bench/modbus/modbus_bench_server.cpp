@@ -36,7 +36,7 @@ std::uint16_t checksum(const std::vector<std::uint8_t>& bytes) {
   return static_cast<std::uint16_t>(sum);
 }
 
-/// The answer to a request for `count` registers: 20.0f, high word first, again and again.
+/// The answer to a request for `count` registers: 20.0f, high word first, repeated.
 std::vector<std::uint8_t> answer_of(std::uint8_t unit, std::uint8_t function, unsigned count) {
   std::vector<std::uint8_t> frame{unit, function, static_cast<std::uint8_t>(2 * count)};
   for (unsigned i = 0; i < count; ++i) {
@@ -132,7 +132,7 @@ void stay_on_processor(unsigned number) {
   cpu_set_t set;
   CPU_ZERO(&set);
   CPU_SET(number % processors, &set);
-  ::sched_setaffinity(0, sizeof set, &set);  // refused: measured all the same, only noisier
+  ::sched_setaffinity(0, sizeof set, &set);  // if refused, measurements are only noisier
 }
 
 }  // namespace bench

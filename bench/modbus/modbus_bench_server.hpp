@@ -1,5 +1,4 @@
-/// The servers of the Modbus benchmarks: libmodbus' own server over TCP, and a paced
-/// serial line.
+/// The servers of the Modbus benchmarks: libmodbus's own server over TCP, and a paced serial line.
 #pragma once
 
 #include <csignal>
@@ -37,22 +36,22 @@ class PseudoTerminal {
 
  private:
   int master_{-1};
-  int keep_open_{-1};  ///< so that the line stays when a client closes it
+  int keep_open_{-1};  ///< keeps the line when a client closes it
   std::string device_;
 };
 
-/// Serves one client after the other, for ever: 64 input registers, 32 floats.
+/// Serves clients one after the other, for ever: 64 input registers, 32 floats.
 [[noreturn]] void serve_tcp(const TcpListener& listener);
 
-/// Serves the units 1..living; others are silent. Answers after the time the request and the
-/// answer take at 19200 baud, plus 3 ms for the device.
+/// Serves the units 1..living; others are silent. Answers after the transmission time of request
+/// and answer at 19200 baud, plus 3 ms for the device.
 [[noreturn]] void serve_rtu(const PseudoTerminal& line, std::size_t living);
 
-/// Server and client each on a processor of their own: left to the scheduler, a round runs two to
-/// three times as fast when both happen to share one, and the rounds' ratios say nothing.
+/// Binds server and client to different processors: with the scheduler's choice a round is two to
+/// three times as fast when both share one, and the rounds' ratios are meaningless.
 void stay_on_processor(unsigned number);
 
-/// A server in a process of its own, ended with this object.
+/// A server in its own process, ended with this object.
 class ServerProcess {
  public:
   /// @param body  called in the new process, on the second processor

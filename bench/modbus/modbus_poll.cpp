@@ -1,17 +1,16 @@
 // Two comparisons, each within one run.
 //
-// rate_over_libmodbus: readings a second of a Modbus source polling as fast as it can (32 float32
-//   channels, 64 registers of one unit, one request) over those of a bare loop
-//   `modbus_read_input_registers(64)` of libmodbus, decoding the floats, from the same server
-//   process over TCP on this machine. Alternating rounds, median of the rounds' ratios. A reading
-//   of ours counts when a good answer has been decoded and published.
+// rate_over_libmodbus: readings per second of a Modbus source at its fastest (32 float32 channels,
+// 64 registers of one unit, one request) relative to a loop of `modbus_read_input_registers(64)` of
+// libmodbus that decodes the floats, from the same server process over TCP on this machine.
+// Alternating rounds, median of the rounds' ratios. Our readings count once decoded and published.
 //
 // living_rate_half_dead: 8 units on one serial line (a pseudo terminal; the server takes the
-//   frames' time at 19200 baud plus 3 ms before each answer), of which 4 never answer: readings
-//   a second of the 4 living, polled as fast as the line allows, over the rate of 4 living units
-//   alone on a second such line, polled at the same time (so that whatever else the machine does
-//   touches both). Time-out 200 ms and back-off up to 30 s, the defaults. Measured over 60 s from
-//   40 s after the start (two full back-off cycles); what the time before costs is printed too.
+// frames' time at 19200 baud plus 3 ms before each answer), of which 4 never answer: readings per
+// second of the 4 living, polled as fast as the line allows, relative to 4 living units alone on a
+// second such line, polled at the same time (so that other load affects both). Timeout 200 ms and
+// back-off up to 30 s, the defaults. Measured over 60 s from 40 s after the start (two full
+// back-off cycles); the cost of the time before is printed too.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -45,7 +44,7 @@ double median(std::vector<double> values) {
   return values.size() % 2 == 1 ? values[middle] : 0.5 * (values[middle - 1] + values[middle]);
 }
 
-/// High word first. (libmodbus 3.1's own float functions mean another byte order on this machine.)
+/// High word first. (libmodbus 3.1's float functions use another byte order on this machine.)
 float float_at(const std::vector<std::uint16_t>& words, std::size_t at) {
   const std::uint32_t bits = (std::uint32_t{words[at]} << 16) | words[at + 1];
   float value = 0.0F;
@@ -53,7 +52,7 @@ float float_at(const std::vector<std::uint16_t>& words, std::size_t at) {
   return value;
 }
 
-/// Readings a second of the bare loop.
+/// Readings per second of the bare loop.
 double bare_rate(int port, nanoseconds duration) {
   modbus_t* context = modbus_new_tcp("127.0.0.1", port);
   modbus_set_slave(context, 1);
@@ -103,7 +102,7 @@ std::uint64_t answers_of(const SensorSource& source, std::size_t living) {
       [](std::uint64_t sum, const UnitHealth& unit) { return sum + unit.answers; });
 }
 
-/// Answers a second over `duration`.
+/// Answers per second over `duration`.
 double answer_rate(const SensorSource& source, std::size_t living, nanoseconds duration) {
   const std::uint64_t before = answers_of(source, living);
   const nanoseconds began = monotonic_now();
@@ -140,7 +139,7 @@ double rate_over_libmodbus() {
   constexpr int rounds = 31;
   std::vector<double> ratios;
   std::vector<double> bare_rates;
-  bare_rate(listener.port(), 500ms);  // warm
+  bare_rate(listener.port(), 500ms);  // warm-up
   for (int round = 0; round < rounds; ++round) {
     double ours = 0.0;
     double bare = 0.0;

@@ -1,7 +1,7 @@
 #!/bin/sh
-# Where the sensors go, method against method, on three machines: the demonstration's, a portal
-# milling machine and a lathe. RMS error of the estimated displacement over the load cases that the
-# placement was made for, and over one that was left out; docs/measurements.md has the table.
+# Placement of sensors, method by method, on three machines: the demonstration's, a portal milling machine
+# and a lathe. RMS error of the estimated displacement over the load cases used for the placement, and over
+# one left out; docs/measurements.md has the table.
 set -eu
 source_dir=$(cd "$(dirname "$0")/../.." && pwd)
 exec /usr/bin/python3 "$source_dir/bench/placement/placement.py" "$THERMOCOMP_BENCH_BUILD/bin/thermocomp" \

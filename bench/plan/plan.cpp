@@ -1,7 +1,7 @@
-// Sizes of all-pairs plans: well-known sets of factors, and 20 random ones. Every pair is looked
-// for in the finished rows, by code that shares nothing with the generator. A line a set: its name,
-// its levels, the tests of the plan, and the bound below which none can go (the product of the two
-// largest numbers of levels). bench/plan/plan.py puts another generator beside it.
+// Sizes of all-pairs plans: well-known sets of factors, and 20 random ones. Every pair is looked up
+// in the finished rows, by code independent of the generator. Prints one line per set: its name,
+// its levels, the number of tests, and their lower bound (the product of the two largest numbers of
+// levels). bench/plan/plan.py adds another generator's sizes.
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>

@@ -1,5 +1,5 @@
-"""Sizes of all-pairs plans beside those of allpairspy (Debian's python3-allpairspy) for the same sets of
-factors, and beside the bound below which no plan can go. Reads what bench_plan prints."""
+"""Sizes of all-pairs plans compared with those of allpairspy (Debian's python3-allpairspy) for the
+same sets of factors, and with the lower bound. Reads the output of bench_plan."""
 
 import statistics
 import sys

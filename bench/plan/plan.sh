@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Sizes of all-pairs plans beside another generator's; docs/measurements.md has the table.
+# Sizes of all-pairs plans compared with another generator's; docs/measurements.md has the table.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 if ! /usr/bin/python3 -c 'import allpairspy' 2> /dev/null; then

@@ -1,12 +1,12 @@
-"""Workshops of machines of one type night by night: what departs, how soon, and what falsely does.
+"""Workshops of machines of one type night by night: departures, their delay, and false alarms.
 
     departures.py PROGRAM [--workshops N] [--first SEED]
 
-As `thermocomp-fleet night` compares them: twelve machines a workshop, nights of 24 h with a probing
-each 10 min; after seven nights a series of the sisters (the other half of the workshop) and one of
-the machine's own past. A false alarm: a healthy machine newly departs, that is, did not the night
+Compared like in `thermocomp-fleet night`: twelve machines per workshop, nights of 24 h with a
+probing every 10 min; after seven nights a series of the sisters (the other half of the workshop)
+and one of the machine's own past. A false alarm: a healthy machine departs that did not the night
 before. Planted effects: nights from the effect to the alarm, on every machine of every third
-workshop. `2_nights`: an alarm only with the second night in a row.
+workshop. `2_nights`: an alarm only in the second consecutive night.
 """
 
 import argparse
@@ -17,7 +17,7 @@ import tempfile
 
 import numpy as np
 
-import series  # first: it knows where the next two are
+import series  # first: sets the path of the next two
 import measured_data
 import series_type
 
@@ -42,12 +42,12 @@ def loose_sensor(columns, _fields, _night):
 
 
 def ageing(columns, _fields, night):
-    """A sensor that shows 5 % less of its rise each night."""
+    """A sensor that loses 5 % of its rise each night."""
     scaled_rise(columns, "spindle_degC", 1.0 - 0.05 * (night + 1))
 
 
 def grown_expansion(columns, fields, _night=0, share=0.5):
-    """A joint that has come loose: the column's growth counts once more by half."""
+    """A joint that has come loose: the column's growth counts half as much again."""
     cells = series_type.plant.Machine.cells("column")
     rise = (fields[:, cells] - fields[0, cells]).mean(axis=1)
     columns["z_um"] = columns["z_um"] + share * 11.5 * rise
@@ -58,7 +58,7 @@ def grown_little(columns, fields, _night):
 
 
 def play(columns, _fields, _night):
-    """A guide that follows only once PLAY_UM have built up."""
+    """A guide with a backlash of PLAY_UM."""
     at, followed = columns["z_um"][0], []
     for value in columns["z_um"]:
         at = min(max(at, value - PLAY_UM / 2), value + PLAY_UM / 2)
@@ -100,7 +100,7 @@ class Workshop:
         return path
 
     def departs(self, seed, nights, effect=None):
-        """Whether it departs from sisters, and from its own past, shape (nights, 2)."""
+        """Departures from sisters and from its own past, shape (nights, 2)."""
         said = []
         for night in nights:
             run, answer = self.night(seed, night, effect, nights[0]), self.tool.path(".json")
@@ -115,7 +115,7 @@ class Workshop:
 
 
 def rules(said):
-    """One row a rule: whether each night is an alarm."""
+    """One row per rule: alarms by night."""
     either = said.any(axis=1)
     return {"sisters": said[:, 0], "own_past": said[:, 1], "either": either,
             "2_nights": either & np.concatenate([[False], either[:-1]])}

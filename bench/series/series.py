@@ -1,10 +1,10 @@
-"""A new machine with few hours beside what its sisters teach: `series`, `fit --prior`.
+"""A new machine with few hours, helped by its sisters: `series`, `fit --prior`.
 
     series.py PROGRAM [--data FOLDER] [--only TEXT]
 
 Test RMS (mean over outputs and machines) of the machine's own `fit`, of the series' mean, of `fit
---prior`, and of an oracle: the own fit on days that a new machine has not. Machines of a simulated
-type, whose coefficients scatter by 16 %, and measured strangers, each left out in turn.
+--prior`, and of an oracle: the own fit on days that a new machine lacks. Machines of a simulated
+type, whose coefficients scatter by 16 %, and measured unrelated machines, each left out in turn.
 """
 
 import argparse
@@ -55,7 +55,7 @@ class Tool:
         return model
 
     def residuals(self, model, runs, outputs):
-        """RMS over the runs, one an output; and the share of rows within 1.96 stated deviations."""
+        """RMS over the runs, one per output; and the share of rows within 1.96 claimed deviations."""
         squares, held, rows = np.zeros(len(outputs)), 0, 0
         for run in runs:
             result = self.path(".csv")
@@ -98,7 +98,7 @@ def mean_rms(series_file, runs, outputs):
 
 
 def compare(tool, name, sisters, train, test, oracle, outputs, series_options=()):
-    """RMS of own, mean, prior and oracle, and the share of stated intervals that hold."""
+    """RMS of own, mean, prior and oracle, and the coverage of the claimed intervals."""
     series = tool.path(".toml")
     tool.run("series", *sisters, "--outputs", ",".join(outputs), "-o", series, *series_options)
     own, _ = tool.residuals(tool.fit(train, outputs), test, outputs)
@@ -112,7 +112,7 @@ def compare(tool, name, sisters, train, test, oracle, outputs, series_options=()
 
 
 def simulated_sisters(tool):
-    """A folder of two days a machine."""
+    """A folder with two days per machine."""
     sisters = []
     for seed in range(SISTERS):
         folder = tool.folder / f"machine_{seed}"

@@ -11,7 +11,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "tests" / "
 import plant
 
 HOUR_S = 3600.0
-EVERY = 6  # a row a minute
+EVERY = 6  # one row per minute
 SENSOR_NOISE_K = 0.03
 PROBE_NOISE_UM = 0.5
 
@@ -26,7 +26,7 @@ class TypeMachine:
                          for i, name in enumerate(plant.PLACES)}
 
     def day(self, day, hours, change=None):
-        """Columns of a run of its own; `change(columns, fields)` plants an effect."""
+        """Columns of a new run; `change(columns, fields)` plants an effect."""
         random = np.random.default_rng([9, self.seed, day])
         steps = int(hours * HOUR_S / plant.STEP_S)
         signals = plant.duty(random, steps)

@@ -1,4 +1,4 @@
 #!/bin/sh
-# Frames a second of the page of a body, in software rendering.
+# Frames per second of the page of a body, in software rendering.
 set -eu
 exec /usr/bin/python3 "$(dirname "$0")/body_frames.py" "$THERMOCOMP_BENCH_BUILD/bin"

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""How fast the page of `structure --page` turns a body without a graphics card: frames a second in headless
-Chromium with software rendering, for the demonstration's machine and for a ball of 200,000 triangles.
+"""Frames per second of the rotating page of `structure --page` in headless Chromium with software
+rendering: the demonstration's machine and a ball of 200,000 triangles.
 
     body_frames.py BIN
 """
@@ -22,7 +22,7 @@ BEGIN, END = '<script id="body" type="application/json">', "</script>"
 
 
 def ball(count):
-    """Nodes and triangles of a bumpy ball, seen from outside counterclockwise."""
+    """Nodes and triangles of a bumpy ball, counterclockwise seen from outside."""
     rings = math.isqrt(count // 2)
     nodes, triangles = [], []
     for ring in range(rings + 1):

@@ -1,12 +1,11 @@
-// The block matrix of a hollow column (eight blocks, nine rows): the way `thermocomp structure`
-// computes it, checked against solving block by block and against CalculiX on the same mesh.
+// The block matrix of a hollow column (eight blocks, nine rows) as computed by `thermocomp
+// structure`, compared with solving block by block and with CalculiX on the same mesh.
 //
 //   bench_structure ELEMENT X_MM Y_MM Z_MM [calculix] [direct] [petsc1] [petsc2] [petsc_alone]
 //
-// ELEMENT tet4 or tet10, the lengths an element's greatest edges. petsc1, petsc2: by PETSc too, on
-// one and two ranks; petsc_alone: without the factorisation to compare with. On stdout lines NAME
-// VALUE UNIT. Exit status 0: agreed (or nothing was compared), 1: did not, 77: a program to compare
-// with is not there.
+// ELEMENT tet4 or tet10, the lengths an element's largest edges. petsc1, petsc2: also by PETSc, on
+// one and two ranks; petsc_alone: without the factorisation. Prints lines NAME VALUE UNIT. Exit
+// status 0: agreed (or nothing was compared), 1: did not, 77: a program for comparison is missing.
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -30,7 +29,7 @@ namespace {
 using namespace thermocomp;
 using namespace thermocomp::structure;
 
-constexpr double agreement_max = 5e-7;  ///< of the largest entry; CalculiX prints 7 digits
+constexpr double agreement_max = 5e-7;  ///< relative to the largest entry; CalculiX prints 7 digits
 constexpr double adjoint_max = 1e-9;
 constexpr int exit_disagrees = 1;
 constexpr int exit_nothing_to_compare = 77;
@@ -49,7 +48,7 @@ double peak_MB() {
   return static_cast<double>(usage.ru_maxrss) / 1024.0;
 }
 
-/// Of this process, or of those it waited for.
+/// Processor time of this process, or of its children waited for.
 double processor_s(int who) {
   rusage usage{};
   getrusage(who, &usage);
@@ -108,8 +107,8 @@ cut = true
   return text;
 }
 
-/// One block 1 K warm. In quadratic elements the temperatures of the corners, and their mean in
-/// the middles of edges: then the load is integrated exactly by CalculiX' four points too.
+/// One block 1 K warm. Quadratic elements: temperatures of the corners, and their mean at the
+/// middle of edges, so that CalculiX's four points integrate the load exactly too.
 Rows block_fields(const Structure& structure) {
   const Mesh& mesh = structure.mesh;
   Rows fields(structure.block_names.size(), std::vector<double>(mesh.nodes_m.size(), 0.0));
@@ -154,14 +153,14 @@ Rows by_direct(const Structure& structure, const Statics& statics, const Rows& f
   return matrix;
 }
 
-/// Greatest difference over the greatest entry.
+/// Largest difference relative to the largest entry.
 double disagreement(const Rows& a, const Rows& b) {
   double most = 0.0;
   double apart = 0.0;
   for (std::size_t i = 0; i < a.size(); ++i) {
     for (std::size_t j = 0; j < a[i].size(); ++j) {
       most = std::max(most, std::fabs(a[i][j]));
-      // Written so that a value that is not a number counts as far away.
+      // Written so that NaN counts as a difference.
       if (!(std::fabs(a[i][j] - b[i][j]) <= apart)) apart = std::fabs(a[i][j] - b[i][j]);
     }
   }
@@ -170,7 +169,7 @@ double disagreement(const Rows& a, const Rows& b) {
 
 // -------------------------------------------------------------------- CalculiX
 
-/// CalculiX reads 20 characters a field.
+/// CalculiX reads 20 characters per field.
 std::string short_number(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.12e", value);
@@ -239,7 +238,7 @@ Rows read_results(const std::filesystem::path& path, const Structure& structure)
   return matrix;
 }
 
-/// Runs CalculiX in a folder of its own. @return its entries, and its time in `took_s`
+/// Runs CalculiX in its own folder. @return its entries, and its time in `took_s`
 Rows by_calculix(const Structure& structure, const Rows& fields, double& took_s) {
   std::string pattern =
       (std::filesystem::temp_directory_path() / "thermocomp_calculix_XXXXXX").string();
@@ -273,7 +272,7 @@ struct Solved {
 std::unique_ptr<Solved> solve(const StructureSpec& spec, const SolverChoice& choice) {
   const double began_s = seconds();
   const double processor_began_s = processor_s(RUSAGE_SELF);
-  // The solver keeps references to the structure, so it must not move any more.
+  // The solver refers to the structure, which must not move any more.
   auto solved = std::unique_ptr<Solved>(
       new Solved{build_structure(spec, [](std::string_view) {}), nullptr, {}});
   const Structure& structure = solved->structure;

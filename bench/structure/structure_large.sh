@@ -1,7 +1,7 @@
 #!/bin/sh
-# A million nodes by PETSc on one and on two MPI ranks: time and memory. Needs 24 GB of memory, 3 GB
-# in TMPDIR, the packages of `scripts/setup.sh petsc`, and two processors with nothing else to do
-# (MPI's ranks wait actively). Beside it 50,000 nodes against the factorisation.
+# A million nodes by PETSc on one and on two MPI ranks: time and memory. Needs 24 GB of memory, 3 GB in
+# TMPDIR, the packages of `scripts/setup.sh petsc`, and two idle processors (MPI's ranks wait actively).
+# Also 50,000 nodes compared with the factorisation.
 set -eu
 program=$THERMOCOMP_BENCH_BUILD/bin/bench_structure
 if [ ! -x "$THERMOCOMP_BENCH_BUILD/bin/thermocomp-petsc" ]; then
