@@ -1,9 +1,9 @@
 #!/bin/bash
-# A simulated machining centre works through an eight-hour shift in 48 s; thermocompd reads its
-# thermocouples and the height of its head over Modbus, and keeps its tool where it should be. At the
-# end: a picture, and what was left of the error. Everything it writes is in demo_output/.
-#   ./demo.sh body      after it: the shift in three dimensions, for a browser; builds the modelling tools
-#   ./demo.sh fleet     instead: twelve machines of one type, two weeks, a PostgreSQL of its own; some two minutes
+# Simulates an eight-hour shift of a machining centre in 48 s. thermocompd reads its thermocouples and the
+# height of its head over Modbus and compensates the tool's displacement. At the end: a plot, and the
+# remaining error. All files are written to demo_output/.
+#   ./demo.sh body      afterwards: the shift in three dimensions, for a browser; builds the modelling tools
+#   ./demo.sh fleet     instead: twelve machines of one type, two weeks, a private PostgreSQL; two minutes
 set -euo pipefail
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")"
 source scripts/common.sh
@@ -38,7 +38,7 @@ end_processes() {
   wait 2>/dev/null || true
   rm -rf "$run"
 }
-# Sockets and links to pseudo terminals: short paths, on a file system that has such files.
+# Sockets and links to pseudo terminals: short paths on a file system that supports them.
 run=$(mktemp -d)
 trap end_processes EXIT
 trap 'exit 130' INT
@@ -75,7 +75,7 @@ daemon_answers() {
 
 has_ended() { ! is_running "$1"; }
 
-# The port that the simulated machine took for a bus; any free one, so that nothing is in the way.
+# Free port chosen by the simulated machine for a bus.
 port_of() { sed -n "s/.*\"$1\":\([0-9]\+\).*/\1/p" "$out/ports.json"; }
 
 start_simulated_machine() {
@@ -101,7 +101,7 @@ start_daemon() {
   eventually 20 "thermocompd does not get ready" daemon_answers
 }
 
-# Until a second before the machine ends: without it the daemon has only faults to tell.
+# Stops a second before the machine's end, after which the daemon could only report faults.
 watch_the_shift() {
   local ended=0
   "$bin/thermocomp" --socket "$run/status.sock" watch --truth "$out/truth.csv" --for "$((shift_s - 1))" &
@@ -134,7 +134,7 @@ draw() {
   rm -f "$out/gnuplot.log"
 }
 
-# A line an event: begin [h], end [h], name.
+# One line per event: begin [h], end [h], name.
 list_events() {
   awk '
     function emit() { if (inside) printf "%g %g \"%s %s\"\n", at / 3600, (at + lasts) / 3600, kind, target }
@@ -149,7 +149,7 @@ list_events() {
     END { emit() }' config/demo/machine.toml >"$out/events.dat"
 }
 
-# The temperatures that the daemon had, on the machine's finite elements, with the clock of the shift.
+# The daemon's temperatures on the machine's finite elements, with the clock of the shift.
 draw_body() {
   "$bin/thermocomp" export "$out/history.db" -o - 2>"$out/structure.log" |
     awk -F, -v OFS=, -v factor="$time_factor" '/^[0-9]/ { $1 *= factor } { print }' >"$out/shift.csv" ||
@@ -184,7 +184,7 @@ list_events
 draw
 echo
 echo "picture: $out/demo.png and $out/demo.svg"
-# With the modelling tools of this source, which the demo does not build.
+# With this source's modelling tools, which the demo does not build.
 if [[ ! -x $bin/thermocomp-modelling ]] || ! (draw_body) 2>/dev/null; then
   echo "in three dimensions: ./demo.sh body (builds the modelling tools first)"
 fi

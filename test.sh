@@ -1,9 +1,9 @@
 #!/bin/bash
-# Builds everything and runs the tests of one build. What .ci/run does besides: the sanitizers' builds,
-# format and static checks.
+# Builds everything and runs the tests of one build. .ci/run adds the sanitizers' builds, format and
+# static checks.
 #   ./test.sh [--quick | --all | --build-only] [--preset PRESET] [-- CTEST_OPTION...]
-#   --quick: for daily work, the test programs alone: no packages, processes, guests or campaigns
-#   --all: those too that plant bugs in copies of the sources and try whether the tests find them
+#   --quick: for daily work: only test programs, without packages, processes, guests or campaigns
+#   --all: also tests that plant bugs in copies of the sources and check that they are found
 #   --build-only: no tests
 #   --preset: debug, release (default), asan-ubsan, asan-ubsan-all (with the modelling), tsan, coverage
 set -euo pipefail
@@ -53,20 +53,20 @@ case $preset in
     ;;
 esac
 
-# The results of the tests, and of those that were repeated (.ci/run counts them).
+# Results of the tests and of the repeated ones (counted by .ci/run).
 results=$PWD/build/$preset/results.xml
 repeated=$PWD/build/$preset/results_repeated.xml
-failed_names=build/$preset/Testing/Temporary/LastTestsFailed.log  # ctest's own
+failed_names=build/$preset/Testing/Temporary/LastTestsFailed.log  # written by ctest
 
-# What was left out, and why: a skipped test must not look like one that passed.
+# Skipped tests with their reasons, so that they do not look passed.
 say_what_was_skipped() {
   local log=build/$preset/Testing/Temporary/LastTest.log
   [[ -f $log ]] || return 0
   grep -E '^SKIPPED |: skipped: ' "$log" | sort -u | sed 's/^/left out: /' || true
 }
 
-# What a sanitizer says of a program that a test starts and then kills would be lost: the reports go
-# to files, and one of them is a failure.
+# Sanitizer reports of programs that a test starts and kills would be lost: they go to files; any report is
+# a failure.
 collect_sanitizer_reports() {
   reports=$PWD/build/$preset/sanitizer_reports
   rm -rf "$reports"
@@ -87,8 +87,8 @@ show_sanitizer_reports() {
   return "$status"
 }
 
-# What failed beside others runs once more, alone: a machine that is busy with something else must not
-# decide. What then passes is named, for a test that fails by chance is a defect too.
+# Failed tests run once more, alone: other load must not decide. Those that then pass are named, since a
+# test that fails by chance is a defect too.
 repeat_failed() {
   local status=0
   [[ -s $failed_names ]] || return 1
@@ -108,7 +108,7 @@ run_tests() {
     collect_sanitizer_reports
   fi
   if [[ $preset == coverage ]]; then find "build/$preset" -name '*.gcda' -delete; fi
-  # Two places a CPU: a test that computes takes both (cmake/ThermocompTargets.cmake).
+  # Two places per CPU: a test that computes takes both (cmake/ThermocompTargets.cmake).
   "${runner[@]}" ctest --preset "$preset" --no-tests=error -j "$((2 * $(nproc)))" \
     "${ctest_options[@]}" --output-junit "$results" || status=$?
   if ((status != 0)); then
@@ -140,8 +140,7 @@ stage "packages" scripts/setup.sh test
 stage "configure $preset" cmake --preset "$preset"
 stage "build $preset" cmake --build --preset "$preset" -j "$(build_jobs)" "${build_options[@]}"
 if [[ $extent == build-only ]]; then exit 0; fi
-# The guest in which programs with sanitizers can run. Without it the tests on CAN fail and say so;
-# all others need not suffer.
+# The guest for sanitizer builds. Without it the tests on CAN fail with a message; all others run.
 if [[ $extent != quick && ($preset == asan-ubsan* || $preset == tsan) ]]; then
   stage "kernel of the guest" scripts/guest-kernel.sh || true
 fi

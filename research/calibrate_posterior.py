@@ -1,13 +1,14 @@
 #!/usr/bin/python3
-"""Fits the weights of modelling/diagnosis/rank/posterior.cpp to answers of the campaigns, and says
-how they do on machines that were left out.
+"""Fits the weights of modelling/diagnosis/rank/posterior.cpp to the campaigns' answers.
 
-calibrate_posterior.py ANSWERS.json...    as physical_campaign.py, measured_campaign.py (--weighed
-                                          --json) and simulated_campaign.py (--answers) keep them
+Also evaluates them on machines that were left out.
 
-Within a case exp(utility) of all hypotheses compete; whether there is anything at all is a
-logistic of what the likeliest one takes. One answer in a hundred may be beyond the weights: without
-that a few hopeless cases make all others modest.
+    calibrate_posterior.py ANSWERS.json...    as kept by physical_campaign.py, measured_campaign.py
+        (--weighed --json) and simulated_campaign.py (--answers)
+
+Within a case exp(utility) of all hypotheses compete; the presence of any effect is a logistic
+function of the most likely one's figures. One answer in a hundred may be beyond the weights:
+otherwise a few hopeless cases lower all probabilities.
 """
 
 import json
@@ -34,7 +35,7 @@ class Case:
     def __init__(self, kept):
         weighed, truth = kept["answer"]["weighed"], kept["truth"]
         if truth and truth["cause"] not in FAMILIES:
-            truth = None  # of no cause in the catalogue
+            truth = None  # no cause of the catalogue
         value = lambda name: np.array([each[name] or 0.0 for each in weighed], float)
         root = np.sqrt(len(kept["answer"]["baseline"]))
         score, witness = np.maximum(-50.0, value("score")), value("witness")
@@ -55,7 +56,7 @@ class Case:
 
 
 def likelihood(weights, cases):
-    """Minus ln of what is right within each planted case, and its gradient."""
+    """Minus ln of the right share within each planted case, and its gradient."""
     total, slope = PENALTY * weights @ weights, 2 * PENALTY * weights
     for case in cases:
         if not case.right.any():
@@ -87,7 +88,7 @@ def fitted(cases):
 
 
 def judged(case, within, presence):
-    """@return probability of what would be named, whether right; the same of the family"""
+    """@return probability of the finding, whether it is right; the same for its family"""
     utility = case.figures @ within
     share = np.exp(utility - utility.max())
     share /= share.sum() * (1 + np.exp(-case.presence[np.argmax(utility)] @ presence))

@@ -1,8 +1,8 @@
 #!/usr/bin/python3
-"""Counts what is said of machines whose model was fitted to the very rows that are diagnosed.
+"""Counts the findings on machines whose model was fitted to the diagnosed rows.
 
-fitted_campaign.py PROGRAM [--count N] [--seed S]    N machines with an effect and N untouched ones at
-                                                     each of the levels 1 and 2
+    fitted_campaign.py PROGRAM [--count N] [--seed S]    N machines with an effect and N untouched ones
+        at each of the levels 1 and 2
 """
 
 import argparse
@@ -24,7 +24,7 @@ WAYS_TO_FIT = ((0.0, False), (1e-3, False), (0.0, True))  # ridge, offset of eac
 
 
 def counted(task):
-    """@return what was hidden or None, what is named first or None"""
+    """@return hidden effect or None, first finding or None"""
     program, level, seed, causes, way = task
     with tempfile.TemporaryDirectory() as temporary:
         truth, answer = fitted_model_test.examined(program, pathlib.Path(temporary), level, seed, causes, *way)

@@ -1,16 +1,15 @@
 #!/usr/bin/python3
-"""Plants one effect in what real machines measured, lets the tool look at files and model alone,
-and counts what it says.
+"""Plants one effect in data of real machines and counts the findings of the tool.
 
-measured_campaign.py PROGRAM [--cases N] [--untouched N] [--machines spindle,printer,cell,mirror]
-                     [--bases ridge,few,lags,bank] [--causes A,B] [--sizes 1.5,3] [--seed S]
-                     [--kind single|pair|outside|sparse|outputs]
-                     [--jobs 2] [--show] [--json FILE] [--weighed]
+    measured_campaign.py PROGRAM [--cases N] [--untouched N] [--machines spindle,printer,cell,mirror]
+                         [--bases ridge,few,lags,bank] [--causes A,B] [--sizes 1.5,3] [--seed S]
+                         [--kind single|pair|outside|sparse|outputs]
+                         [--jobs 2] [--show] [--json FILE] [--weighed]
 
-PROGRAM is thermocomp-modelling. Data: $THERMOCOMP_DATA, else shared/data beside the source. The
-base model is fitted to the untouched rows of the whole set, so that what it leaves is the machine's
-own. --show prints every answer that was not right; --json keeps all of them, with --weighed
-for calibrate_posterior.py.
+PROGRAM is thermocomp-modelling; it gets only files and model. Data: $THERMOCOMP_DATA, else
+shared/data beside the source. The base model is fitted to the untouched rows of the whole set, so
+that its remainder is the machine's own. --show prints every wrong answer; --json keeps all answers,
+with --weighed for calibrate_posterior.py.
 """
 
 import argparse
@@ -22,7 +21,7 @@ import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "tests" / "diagnosis"))
 # ruff: noqa: E402
-from measured_cases import STATED, examine, right, said  # first: it settles the threads
+from measured_cases import STATED, examine, right, said  # first: sets the threads
 import measured_machines
 import numpy as np
 from measured_plants import CAUSES, FAMILIES, OUTSIDE
@@ -31,7 +30,7 @@ KINDS = ("single", "pair", "outside", "sparse", "outputs")
 
 
 def covered(finding, truth):
-    """For every shared parameter with an interval whether it holds the planted value."""
+    """For every shared parameter with an interval: True if it contains the planted value."""
     out = []
     for name, value in truth["parameters"].items():
         interval = finding.get("parameters_ci95", {}).get(name)
@@ -49,7 +48,7 @@ class Count:
         self.right = collections.Counter()
         self.family = collections.Counter()
         self.confusion = collections.Counter()
-        self.stated = []  # (probability, right) of every name
+        self.stated = []  # (probability, right) of every finding
         self.stated_family = []
         self.covers = []
         self.untouched, self.invented, self.named_untouched = 0, 0, 0
@@ -83,7 +82,7 @@ class Count:
         return self.judge(task, truth, found, answer, hit, family)
 
     def judge(self, task, truth, found, answer, hit, family, truths=None):
-        """Counts one planted machine. @return whether it was right"""
+        """Counts one planted machine. @return True if it was right"""
         _, _, machine, base, _, times, _ = task
         truths = truths or [truth]
         for key in ((times, "all"), (times, machine), (times, base), (times, truth["cause"])):
@@ -140,7 +139,7 @@ def tasks_of(options):
         machines = ["spindle_outputs" if options.kind == "outputs" else "spindle"]
     tasks = []
     for i in range(options.cases):
-        # One draw a case: no two of the cycles can fall in step.
+        # One draw per case, so that the cycles are independent.
         random = np.random.default_rng([options.seed, i])
         tasks.append((options.program, 100000 * options.seed + i, machines,
                       str(random.choice(bases)), causes[i % len(causes)],

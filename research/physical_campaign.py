@@ -1,9 +1,10 @@
 #!/usr/bin/python3
-"""Hides effects that physics makes (physical_effects.py), lets the tool look at the files alone, and
-counts what it says: cause and place right first, family, wrong names, by kind and by size.
+"""Hides physical effects (physical_effects.py) and counts the findings by kind and size.
 
-physical_campaign.py PROGRAM [--cases N] [--levels 1,2] [--seed S] [--jobs 2] [--show]
-                     [--json FILE] [--weighed]
+The tool gets only the files. Counted: cause and place right first, family, wrong findings.
+
+    physical_campaign.py PROGRAM [--cases N] [--levels 1,2] [--seed S] [--jobs 2] [--show]
+                         [--json FILE] [--weighed]
 """
 
 import argparse

@@ -1,14 +1,14 @@
 #!/usr/bin/python3
-"""Hides effects by seed, lets the tool look at the files alone, and counts what it says.
+"""Hides effects by seed and counts the findings of the tool, which gets only the files.
 
-simulated_campaign.py PROGRAM [--thermal] [--cases N] [--null N] [--outside N] [--double N]
-                      [--levels 1,2,3] [--seed S] [--jobs 2] [--keep FOLDER] [--show]
-                      [--answers FILE]
+    simulated_campaign.py PROGRAM [--thermal] [--cases N] [--null N] [--outside N] [--double N]
+                          [--levels 1,2,3] [--seed S] [--jobs 2] [--keep FOLDER] [--show]
+                          [--answers FILE]
 
 PROGRAM is thermocomp-modelling. --thermal changes the heat flow of machines, and the tool compares
-temperatures. Counts are for each level. --keep leaves the files in FOLDER and uses those that are
-there already; --show prints every answer that was not right; --answers keeps all but those to
-effects outside the catalogue for calibrate_posterior.py.
+temperatures. Counts are per level. --keep leaves the files in FOLDER and uses existing ones; --show
+prints every wrong answer; --answers keeps all answers, except to effects outside the catalogue, for
+calibrate_posterior.py.
 """
 
 import argparse
@@ -20,7 +20,7 @@ import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "tests" / "diagnosis"))
 # ruff: noqa: E402
-from cases import NULL_SEED, examined, said, same  # first: it settles the number of threads
+from cases import NULL_SEED, examined, said, same  # first: sets the number of threads
 import hidden_effects
 import hidden_heat
 import numpy as np
@@ -37,8 +37,8 @@ def examine_heat(task):
     return examined(task, hidden_heat.make, ("--thermal", "machine.toml"))
 
 
-# How a case is examined; causes of single cases, effects outside, causes of pairs; how many single,
-# untouched, outside and double cases at each level; the unit.
+# Examination of a case; causes of single cases, effects outside, causes of pairs; numbers of
+# single, untouched, outside and double cases at each level; the unit.
 DISPLACEMENT = (examine, (hidden_effects.CAUSES, hidden_effects.OUTSIDE, hidden_effects.ALWAYS),
                 (144, 100, 40, 40), "um")
 HEAT = (examine_heat, (hidden_heat.CAUSES + hidden_heat.FAULTS, hidden_heat.OUTSIDE,
@@ -46,7 +46,7 @@ HEAT = (examine_heat, (hidden_heat.CAUSES + hidden_heat.FAULTS, hidden_heat.OUTS
 
 
 def errors(finding, truth):
-    """Relative error of every parameter that both know."""
+    """Relative error of every parameter that both have."""
     out = {}
     for name, value in truth["parameters"].items():
         found = finding["parameters"].get(name)
@@ -77,7 +77,7 @@ def progress(done, total):
 
 
 class Count:
-    """What was right and what was not, at one level."""
+    """Right and wrong answers at one level."""
 
     def __init__(self, level, show, unit="um"):
         self.level, self.show = level, show
@@ -162,7 +162,7 @@ def print_confusion(confusion):
 
 
 def kept_answer(task, truth, answer):
-    """As measured_campaign.py keeps it; None where an effect outside the catalogue was hidden."""
+    """In the form of measured_campaign.py; None for an effect outside the catalogue."""
     if task[2] == "outside":
         return None
     hidden_ones = truth["hidden"] or [None]

@@ -1,5 +1,5 @@
 #!/bin/bash
-# Every C++ file of the project as clang-format would write it. With --fix: rewrites them.
+# Checks every C++ file of the project with clang-format. With --fix: rewrites them.
 set -euo pipefail
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
 

@@ -1,6 +1,5 @@
 #!/bin/bash
-# Whether each fuzz target still compiles: syntax alone, about a minute. Building and running them is
-# scripts/fuzz.sh, in the night.
+# Checks that each fuzz target compiles: syntax only, about a minute. scripts/fuzz.sh runs them.
 set -euo pipefail
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
 source scripts/common.sh

@@ -1,5 +1,5 @@
 #!/bin/bash
-# Links every program with the types of its files: a name with two definitions is an error.
+# Links every program with type information: a name with two definitions is an error.
 #   scripts/check-odr.sh
 set -euo pipefail
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."

@@ -7,7 +7,7 @@ source scripts/common.sh
 
 [[ -f build/release/compile_commands.json ]] || cmake --preset release >/dev/null
 
-# Clang cannot read GCC's precompiled headers, and here each file must name all that it uses.
+# Clang cannot read GCC's precompiled headers; without them each file must include all that it uses.
 build=build/tidy
 mkdir -p "$build"
 sed -e 's/ -Winvalid-pch//; s/ -fpch-preprocess//; s/ -include [^ ]*cmake_pch\.hxx//' \
@@ -20,7 +20,7 @@ if ((${#folders[@]} == 0)); then
 fi
 pattern="$PWD/($(IFS='|' && echo "${folders[*]%/}"))(/.*\.cpp)?$"
 
-# -quiet still leaves the commands and counts of suppressed warnings; they are no news.
+# Even with -quiet the commands and counts of suppressed warnings are printed; omit them.
 run-clang-tidy -quiet -p "$build" -j "$(build_jobs)" "$pattern" 2>/dev/null |
   sed -e 's/\x1b\[[0-9;]*m//g' |
   { grep -v -E '^(clang-tidy|[0-9]+ warnings? (generated|treated))|^$' || true; }

@@ -1,13 +1,13 @@
 #!/usr/bin/python3
-"""The structure as the #includes tell it: no circles, and floors that read downwards.
+"""The structure given by #includes: no cycles, and floors that include downwards.
 
-    scripts/check_includes.py            circles, and whether the drawing is current; exit status 1
-                                         when there is a circle or it is not
-    scripts/check_includes.py --write    draws the floors anew into docs/ARCHITECTURE.md
+    scripts/check_includes.py            cycles, and whether the table is current; exit status 1 if there
+                                         is a cycle or it is not
+    scripts/check_includes.py --write    renews the floors in docs/ARCHITECTURE.md
     scripts/check_includes.py --sizes    the largest folders and files
 
-A unit is a header and its source (`screening.hpp` and `screening.cpp`). A circle is a set of units, or
-of folders, each of which leads to each other one; a folder and one inside it are two folders.
+A unit is a header and its source (`screening.hpp` and `screening.cpp`). A cycle is a set of units,
+or of folders, that all lead to each other; a folder and one inside it are two folders.
 """
 import argparse
 import collections
@@ -17,13 +17,13 @@ import sys
 
 CODE = ("estimator", "drivers", "config", "status", "report", "daemon", "simulator", "cli", "gateway",
         "fleet", "linuxcnc", "modelling", "docs", "bench", "tests")
-DRAWN = CODE[:12]  # what a user installs
+DRAWN = CODE[:12]  # installed code
 BEGIN, END = "<!-- floors: begin (scripts/check_includes.py --write) -->", "<!-- floors: end -->"
 INCLUDE = re.compile(r'^\s*#\s*include\s*"([^"]+)"', re.MULTILINE)
 
 
 def read_includes(root):
-    """{file: [file that it includes]}, paths from `root`; what is not in the tree is left out."""
+    """{file: [file that it includes]}, paths from `root`; files outside the tree are omitted."""
     texts = {}
     for top in CODE:
         for folder, _, names in os.walk(os.path.join(root, top)):
@@ -57,7 +57,7 @@ def graph_of(includes, node_of):
 
 
 def reached(graph, start):
-    """Every node that a way of one or more edges leads to from `start`."""
+    """All nodes reached from `start` by one or more edges."""
     seen, waiting = set(), [start]
     while waiting:
         for other in graph.get(waiting.pop(), ()):
@@ -76,7 +76,7 @@ def circles(graph):
 
 
 def check(kind, graph):
-    """Prints each circle and the includes that make it; returns how many there are."""
+    """Prints each cycle and its includes; returns their count."""
     found = circles(graph)
     for circle in found:
         print(f"check_includes: {kind}s in a circle: {' '.join(circle)}")
@@ -88,8 +88,8 @@ def check(kind, graph):
 
 
 def floors(graph):
-    """The folders by floor, the lowest first: a folder stands above all that it includes. Folders
-    in a circle stand on one floor."""
+    """The folders by floor, the lowest first: a folder is above all that it includes. Folders in a
+    cycle share a floor."""
     together = {node: node for node in graph}
     for circle in circles(graph):
         together.update({node: circle[0] for node in circle})
@@ -121,7 +121,7 @@ def drawing(includes):
 
 
 def parts_of(path):
-    """What stands before the drawing in the document, the drawing, and what stands after it."""
+    """The document before the table, the table, and the document after it."""
     with open(path, encoding="utf-8") as text:
         document = text.read()
     if document.count(BEGIN) != 1 or document.count(END) != 1:

@@ -1,11 +1,11 @@
 # shellcheck shell=bash
-# Small things that the scripts at the top share. Sourced, with set -euo pipefail.
+# Common functions of the scripts. Sourced, with set -euo pipefail.
 
-# The interpreter that Debian's Python packages belong to; another python3 may be first on PATH.
+# The interpreter of Debian's Python packages; another python3 may be first on PATH.
 # shellcheck disable=SC2034
 python=/usr/bin/python3
 
-# At most one compiler a CPU, and one a GiB of memory: the sanitizer builds are large.
+# At most one compiler per CPU and per GiB of memory: the sanitizer builds are large.
 build_jobs() {
   local cpus memory_GiB
   cpus=$(nproc)
@@ -14,8 +14,7 @@ build_jobs() {
   if ((memory_GiB < cpus)); then echo "$memory_GiB"; else echo "$cpus"; fi
 }
 
-# stage "what" command...: says what begins, and how long it took, that it was left out (status 77) or
-# that it failed.
+# stage "what" command...: prints its beginning and its duration, omission (status 77) or failure.
 stage() {
   local title=$1 began=$SECONDS status=0
   shift
@@ -31,8 +30,8 @@ stage() {
   return "$status"
 }
 
-# With many bits of address randomisation GCC 12's thread sanitizer cannot map its shadow memory;
-# programs then start without randomisation.
+# GCC 12's thread sanitizer cannot map its shadow memory with many bits of address randomisation; programs
+# then start without it.
 run_as_sanitizers_need() {
   if setarch --addr-no-randomize true 2>/dev/null; then
     setarch --addr-no-randomize "$@"
@@ -41,8 +40,8 @@ run_as_sanitizers_need() {
   fi
 }
 
-# junit_counts FILE: "PASSED FAILED SKIPPED" of the tests in a file of `ctest --output-junit`; zeros
-# where there is none. A test whose program is missing is "skipped" there; here it has failed.
+# junit_counts FILE: "PASSED FAILED SKIPPED" of the tests in a file of `ctest --output-junit`; zeros if
+# there is none. A test without its program is "skipped" there and counted as failed here.
 junit_counts() {
   local passed=0 failed=0 skipped=0 missing=0
   if [[ -s $1 ]]; then

@@ -1,8 +1,8 @@
 #!/usr/bin/python3
 """coverage_by_folder.py FILE: line coverage of each folder, from a file of `gcovr --json`.
 
-A header is seen under as many names as there are libraries that include it (links below
-build/*/include-roots); here it counts once, a line being covered where any of them ran it.
+A header has one name per library that includes it (links below build/*/include-roots); it is
+counted once, a line being covered if any of them ran it.
 """
 import collections
 import json
@@ -13,7 +13,7 @@ import sys
 def main():
     with open(sys.argv[1], encoding="utf-8") as text:
         files = json.load(text)["files"]
-    lines = collections.defaultdict(dict)  # of a folder: (file, number) -> times run
+    lines = collections.defaultdict(dict)  # per folder: (file, number) -> count of executions
     for file in files:
         path = os.path.relpath(os.path.realpath(file["file"]))
         counts = lines[path.split(os.sep)[0]]

@@ -1,4 +1,4 @@
-# What really happened at the tool of the demonstration's machine.
+# True displacement at the tool of the demonstration's machine.
 #   gnuplot -e "truth='...'; events='...'; picture='...'; format='png'" demo.gnuplot
 set datafile separator ","
 set datafile columnheaders
@@ -17,7 +17,7 @@ set lmargin 9
 set rmargin 22
 set key outside right top Left reverse samplen 2
 
-# Events: a grey stripe each, its name above the first panel.
+# Events: a grey stripe each, with its name above the first panel.
 set datafile separator whitespace
 set datafile nocolumnheaders
 stats events using 1 nooutput
@@ -41,7 +41,7 @@ x_colour = "#1f6fb4"
 y_colour = "#d95f02"
 z_colour = "#1b9e77"
 
-# One scale for what is left without and with compensation.
+# A common scale for the errors without and with compensation.
 low = 0
 high = 0
 set xrange [*:*]

@@ -1,11 +1,12 @@
 #!/usr/bin/python3
-"""Twelve simulated machines of one type, two weeks, one store: who departs and why, what a new machine gains, and how
-its better model gets onto it and off again.
+"""Twelve simulated machines of one type, two weeks, one store: departures with reasons, the gain of
+a new machine, and the rollout and rollback of its better model.
 
     scripts/demo_fleet.py BIN OUT
 
-Starts a PostgreSQL of its own, which ends with it. Machine 5 gets an effect that its model does not know in the
-second week, the sensor at the spindle of machine 9 ages from then on. Writes OUT/fleet.png and OUT/fleet.svg.
+Starts a private PostgreSQL, which ends with it. Machine 5 gets an effect unknown to its model in
+the second week, and the sensor at the spindle of machine 9 ages from then on. Writes OUT/fleet.png
+and OUT/fleet.svg.
 """
 import datetime
 import json
@@ -81,7 +82,7 @@ class Workshop:
                        self.folder / f"{machine}.password")
 
     def load(self, days, *, with_model=False):
-        """The model in use is the machine's own fit to its first day; `diagnose`, which takes long, starts from it."""
+        """The model in use is the machine's own fit to its first day; the base model of the slow `diagnose`."""
         run = self.folder / "day.csv"
         for machine in range(MACHINES):
             for day in days:
@@ -113,7 +114,7 @@ class Workshop:
 
 
 def reason(answer):
-    """Of the output and comparison that departs most, the subject with the largest share."""
+    """The subject with the largest share, of the output and comparison that departs most."""
     departing = [(output["probability"], f"{name} from its {kind.replace('_', ' ')}", output["subjects"])
                  for kind in ("sisters", "own_past") for name, output in answer.get(kind, {}).items()
                  if output["departs"]]
@@ -140,8 +141,7 @@ def say_who_departs(found):
 
 
 def new_machine(workshop, folder):
-    """RMS on days that it has not seen, with one probed day: (own fit, mean of the type, both); the models of own and
-    both."""
+    """RMS on unseen days, with one probed day: (own fit, type's mean, both); models of own and both."""
     type_file = folder / "type.toml"
     type_file.write_text(json.loads(workshop.server.value(
         "SELECT to_json(content) FROM fleet.series WHERE kind = 'type' ORDER BY through LIMIT 1")))

@@ -1,5 +1,5 @@
-"""A thirteenth machine for demo_fleet.py, with a daemon, uplink and admission of its own: a model of the office gets
-onto it, and from it again. Its day passes 600 times as fast as a clock, as in ./demo.sh."""
+"""A thirteenth machine for demo_fleet.py, with its own daemon, uplink and admission: rollout and
+rollback of a model. Its day passes 600 times as fast as real time, as in ./demo.sh."""
 import csv
 import re
 import struct
@@ -22,7 +22,7 @@ PROBE_AT, APPLIED_AT, SIGNAL_AT = 40, 10, 20
 
 
 def entry(list_name, /, **values):
-    """An entry of a list of tables; a text that begins with { is a table itself."""
+    """An entry of a list of tables; a text that begins with { is itself a table."""
     lines = [f"{key} = {value if isinstance(value, str) and value[0] == '{' else repr(value)}"
              for key, value in values.items()]
     return "\n".join([f"[[{list_name}]]", *lines, ""])
@@ -33,7 +33,7 @@ def wide(table, address):
 
 
 def buses(sensors_port, controller_port, *, is_machine):
-    """What both ends of the two Modbus connections have in common."""
+    """Common keys of both ends of the two Modbus connections."""
     text = entry("bus", name="cabinet", kind="modbus_tcp", host="127.0.0.1", port=sensors_port)
     more = {} if is_machine else {"period_s": 0.02}
     text += entry("device", name="module", bus="cabinet", unit=1, encoding="int16", scale=0.01, table="input", **more)
@@ -67,20 +67,21 @@ def daemon_config(sensors_port, controller_port):
 
 
 def after_standing(day, minutes):
-    """A candidate's lags begin with it: it is offered while the machine still stands, evenly cold."""
+    """Prepends a standstill: a candidate's lags start when it is offered, so the machine must be
+    evenly cold then."""
     longer = {name: np.concatenate([np.full(minutes, values[0]), values]) for name, values in day.items()}
     longer["time_s"] = 60.0 * np.arange(len(longer["time_s"]))
     return longer
 
 
 def quick(model):
-    """The model of a machine whose day passes so much faster."""
+    """The model for the machine's accelerated day."""
     return re.sub(r"(?m)^tau_s = \[(.*)\]$", lambda found: "tau_s = [" + ", ".join(
         str(float(tau) / FACTOR) for tau in found[1].split(",")) + "]", model.read_text())
 
 
 class Mill:
-    """Its folder holds what /etc and /var/lib hold beside a machine."""
+    """Its folder replaces /etc and /var/lib."""
 
     def __init__(self, lab, programs, workshop, folder, day, model):
         self.programs, self.workshop, self.folder = programs, workshop, folder
@@ -107,13 +108,13 @@ class Mill:
         self.daemon.start().wait_for_mode("compensating")
 
     def left_um(self):
-        """What a probe finds at the tool, one value an axis: Modbus, read input registers."""
+        """Remaining displacement at the tool, one value per axis: Modbus, read input registers."""
         with self.machine.connect("cnc") as link, link.makefile("rb") as answer:
             link.sendall(struct.pack(">HHHBBHH", 1, 0, 6, 1, 4, PROBE_AT, 2 * len(AXES)))
             return [0.001 * nm for nm in struct.unpack(f">{len(AXES)}i", answer.read(9 + 4 * len(AXES))[9:])]
 
     def probe(self, times):
-        """Every ten minutes of its time; RMS over the axes [um]."""
+        """Probes every ten minutes of its time; RMS over the axes [um]."""
         squares = []
         for _ in range(times):
             time.sleep(600 / FACTOR)
@@ -124,7 +125,7 @@ class Mill:
         return (sum(squares) / len(squares)) ** 0.5
 
     def admit(self):
-        """As uplink and timer do every few minutes; what it said."""
+        """Runs uplink and `admit`, as timers do every few minutes; returns their output."""
         self.daemon.committed()
         said = ""
         for command, good in ((["thermocomp-uplink", "--once", "uplink.toml"], (0,)),
@@ -145,7 +146,7 @@ class Mill:
         return self.workshop.fleet(what, release, "--key", self.key)
 
     def largest_rate_um_per_s(self):
-        """Of the offsets that were sent, between two records."""
+        """Largest rate of the offsets sent, between two records."""
         run = self.folder / "sent.csv"
         assert self.daemon.cli("export", self.daemon.history, "-o", run)[0] == 0
         with run.open() as file:
@@ -156,7 +157,7 @@ class Mill:
 
 
 def show(programs, workshop, folder, day, own, better, strange):
-    """own, better, strange: model files of a machine whose day passes at its own pace."""
+    """own, better, strange: model files for a machine in real time."""
     folder.mkdir()
     lab = Lab(folder)
     try:

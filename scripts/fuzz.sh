@@ -1,12 +1,12 @@
 #!/bin/bash
-# Runs the fuzz targets of tests/fuzz (libFuzzer, address and undefined-behaviour sanitizers) and
-# prints a table: inputs executed, coverage, and what was broken.
+# Runs the fuzz targets of tests/fuzz (libFuzzer, address and undefined-behaviour sanitizers) and prints
+# a table: inputs executed, coverage, and failures.
 #   scripts/fuzz.sh [--minutes M | --seconds S] [--jobs N] [--no-build] [TARGET...]
 #   scripts/fuzz.sh --list | --build
-# Default: 10 minutes for each target, as many at a time as there are processors. Inputs that reach
-# something new are kept in build/fuzz/runs/TARGET/corpus and used again by the next run; what breaks
-# a target is written to build/fuzz/runs/TARGET/artifacts.
-# Exit status 0: nothing broke; 1: something did; 2: bad use or no build; 77: there is no clang here.
+# Default: 10 minutes per target, one target per processor at a time. Inputs with new coverage are kept in
+# build/fuzz/runs/TARGET/corpus for the next run; failing inputs are written to
+# build/fuzz/runs/TARGET/artifacts.
+# Exit status 0: no failure; 1: a failure; 2: bad use or no build; 77: clang is not installed.
 set -euo pipefail
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
 source scripts/common.sh
@@ -14,10 +14,10 @@ source scripts/common.sh
 usage() { sed -n 's/^# \{0,1\}//; 4,5p' "${BASH_SOURCE[0]}"; }
 
 runs=build/fuzz/runs
-readonly input_seconds_max=20    # one input may take so long, by the clock of a busy machine
-readonly structured_bytes_max=131072  # of an input whose mutator builds it
-readonly memory_MB_max=2048      # of the process, with the sanitizer's own
-readonly allocation_MB_max=512   # asked for at once
+readonly input_seconds_max=20    # longest time of one input on a busy machine
+readonly structured_bytes_max=131072  # of an input built by a mutator
+readonly memory_MB_max=2048      # of the process, including the sanitizer's
+readonly allocation_MB_max=512   # of one allocation
 mapfile -t known < <(basename -s .cpp -- tests/fuzz/*.cpp)
 
 fail() {
@@ -71,14 +71,14 @@ build() {
   fail "the targets could not be built (all of it: $log)"
 }
 
-# run TARGET: its log tells how it went; nothing here fails.
+# run TARGET: the result is in its log; never fails.
 run() {
   local target=$1 words=$runs/dictionaries/$1.dict found=() options=()
   mkdir -p "$runs/$target/corpus" "$runs/$target/artifacts"
   rm -f "$runs/$target/artifacts"/*
   if [[ -d tests/fuzz/seeds/$target ]]; then found=("tests/fuzz/seeds/$target"); fi
   if [[ -f $words ]]; then options=("-dict=$words"); fi
-  # A mutator of the target's own makes deep and long inputs from the first one on.
+  # The target's own mutator makes deep and long inputs from the start.
   if grep -q "^fuzz_target($target SOURCES common/[a-z]*_mutator.cpp" tests/fuzz/CMakeLists.txt; then
     options+=(-max_len="$structured_bytes_max" -len_control=0)
   fi
@@ -88,14 +88,14 @@ run() {
     "$runs/$target/corpus" "$runs/seeds/$target" "${found[@]}" >"$runs/$target/log" 2>&1 || true
 }
 
-# of TARGET STATISTIC: a number of libFuzzer's closing lines.
+# of TARGET STATISTIC: a number from libFuzzer's closing lines.
 statistic() { sed -n "s/^stat::$2: *//p" "$runs/$1/log" | tail -n 1; }
 
-# A line of the table. @return 1 when the target broke
+# A line of the table. @return 1 if the target failed
 report() {
   local target=$1 log=$runs/$1/log status=0 coverage features broken
   broken=$(find "$runs/$target/artifacts" -type f | wc -l)
-  # Without the closing line the program ended by itself, whatever it left behind.
+  # Without the closing line the program ended abnormally.
   if ! grep -q '^Done ' "$log" && ((broken == 0)); then broken=1; fi
   coverage=$(sed -n 's/.* cov: \([0-9]*\) .*/\1/p' "$log" | tail -n 1)
   features=$(sed -n 's/.* ft: \([0-9]*\) .*/\1/p' "$log" | tail -n 1)
@@ -116,7 +116,7 @@ report() {
 if [[ $builds == yes ]]; then build; fi
 if [[ $only == build ]]; then exit 0; fi
 
-# Files in memory that a target which broke could not remove.
+# Files in memory that a failing target could not remove.
 above=/dev/shm
 [[ -w $above ]] || above=${TMPDIR:-/tmp}
 THERMOCOMP_FUZZ_SCRATCH=$(mktemp -d "$above/thermocomp-fuzz-XXXXXX")

@@ -1,9 +1,9 @@
 #!/bin/bash
-# Puts Debian's kernel, with the modules that CAN needs, where the tests under QEMU find it
-# (tests/vm): unpacked into a folder, not installed, so that no boot loader hears of it.
+# Provides Debian's kernel with CAN modules for the tests under QEMU (tests/vm): unpacked into a folder and
+# not installed, so that boot loaders ignore it.
 #   scripts/guest-kernel.sh [FOLDER]      default: build/guest-kernel
-# Downloads about 70 MB with apt-get, which checks the signature. Does nothing where the folder is
-# complete. Exit status 0: FOLDER/vmlinux, FOLDER/lib/modules/VERSION and FOLDER/version are there.
+# Downloads about 70 MB with apt-get, which checks the signature. Does nothing if the folder is complete.
+# Exit status 0: FOLDER/vmlinux, FOLDER/lib/modules/VERSION and FOLDER/version exist.
 set -euo pipefail
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
 folder=${1:-build/guest-kernel}
@@ -13,7 +13,7 @@ fail() {
   exit 1
 }
 
-# The package that linux-image-amd64 stands for; empty where the package lists are missing.
+# The package on which linux-image-amd64 depends; empty without package lists.
 kernel_package() {
   apt-cache depends --no-recommends --no-suggests linux-image-amd64 2>/dev/null |
     sed -n 's/^ *Depends: \(linux-image-[0-9].*\)$/\1/p' | head -n 1

@@ -1,14 +1,14 @@
 #!/bin/bash
-# Everything, which takes some hours: what .ci/run does, but no test left out for its length, then
-# the debug build, line coverage, and every benchmark. Each part runs even when another failed; one
-# that this machine cannot do (exit status 77) is left out and named at the end.
+# All checks, for some hours: .ci/run with all long tests, then the debug build, line coverage, and every
+# benchmark. Each part runs even if another failed; parts impossible on this machine (exit status 77) are
+# left out and named at the end.
 #   scripts/nightly.sh       exit status 0: everything passed and could be measured
 set -euo pipefail
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
 source scripts/common.sh
 exec </dev/null
 
-# The kills fall at other moments, and other lives are lived, each night; the seed is printed.
+# Other kill times and other lives each night; the seed is printed.
 export SEED=${SEED:-$RANDOM}
 first_life=$((4000 + 2560 * SEED))
 
@@ -24,7 +24,7 @@ part() {
   esac
 }
 
-# Before anything is configured: thermocomp-petsc is built where PETSc is there.
+# Before configuration: thermocomp-petsc is built if PETSc is installed.
 part "packages of PETSc" scripts/setup.sh petsc
 for preset in release asan-ubsan-all tsan debug coverage; do
   part "$preset" ./test.sh --all --preset "$preset"

@@ -1,45 +1,45 @@
 # shellcheck shell=bash disable=SC2034
-# The Debian 12 packages, by what they are for. Sourced by setup.sh; nothing else names a package.
+# The Debian 12 packages by purpose. Sourced by setup.sh; packages are named only here.
 
-# What the daemon, its command and the simulated machine are built from and need to run.
+# To build and run the daemon, its command and the simulated machine.
 packages_machine=(
   cmake ninja-build g++ pkg-config
   libeigen3-dev libmodbus-dev libspdlog-dev libtomlplusplus-dev nlohmann-json3-dev
   libsqlite3-dev libsystemd-dev libssl-dev libcli11-dev
 )
 
-# All programs that run beside the machine.
+# All programs that run on the machine's computer.
 packages_build=(
   "${packages_machine[@]}" ccache
-  # Of thermocomp-gateway; its page takes its charts from the last.
+  # thermocomp-gateway; the last is for the charts of its page.
   libmicrohttpd-dev libmosquitto-dev libcrypt-dev zlib1g-dev libjs-dygraphs
-  # Of thermocomp-fleet and thermocomp-uplink.
+  # thermocomp-fleet and thermocomp-uplink.
   libpqxx-dev
 )
 
-# Besides, for thermocomp-modelling. OpenBLAS: with the reference BLAS a factorisation takes
-# several times as long.
+# Additionally for thermocomp-modelling. OpenBLAS: a factorisation takes several times as long with the
+# reference BLAS.
 packages_modelling=("${packages_build[@]}" libsuitesparse-dev libopenblas-dev libgmsh-dev
   libjs-three)
 
-# Besides, for meshes past the memory of a factorisation: thermocomp-petsc. Not part of the tests,
-# being large; they include it where it is there.
+# Additionally for meshes too large for a factorisation in memory: thermocomp-petsc. Too large to be
+# required; tests include it if installed.
 packages_petsc=("${packages_modelling[@]}" libpetsc-real-dev)
 
-# The demo builds what it runs, and draws a picture of itself.
+# The demo builds its programs and draws a plot.
 packages_demo=("${packages_machine[@]}" gnuplot-nox)
 
 # ./demo.sh fleet: the store, its server, and the simulated machines of bench/series.
 packages_demo_fleet=("${packages_demo[@]}" libpqxx-dev postgresql postgresql-client openssl python3-numpy)
 
-# Software that is not ours and that the tests talk to, and the tools of the checks.
+# Other projects' software used by the tests, and the tools of the checks.
 packages_test=(
   "${packages_demo[@]}" "${packages_modelling[@]}" catch2
-  # The finite elements are compared with it; test plans with the other.
+  # Reference for the finite elements; reference for test plans.
   calculix-ccx python3-allpairspy
   mbpoll can-utils python3-pymodbus python3-serial-asyncio python3-can python3-canmatrix
   python3-numpy python3-pytest python3-meshio
-  # What the gateway is read by: its page, metrics and messages.
+  # Clients of the gateway's page, metrics and messages.
   chromium chromium-driver python3-selenium prometheus mosquitto mosquitto-clients openssl
   # The store of a series.
   postgresql postgresql-client
@@ -47,13 +47,13 @@ packages_test=(
   clang-tidy clang-tools clang-format gcovr
   # The fuzz targets: the compiler, libFuzzer and the sanitizers' runtime.
   clang libclang-rt-14-dev
-  # Sanitizer builds on real CAN, with the kernel that guest-kernel.sh fetches.
+  # Sanitizer builds on real CAN, with the kernel from guest-kernel.sh.
   qemu-system-x86 busybox-static
-  # The real controller of tests/linuxcnc, and what its bridge is built with.
+  # The real controller of tests/linuxcnc, and headers for its bridge.
   linuxcnc-uspace linuxcnc-uspace-dev
-  # The Debian packages, and the booted systemd that they are tested in.
+  # The Debian packages, and the booted systemd for their tests.
   debhelper lintian mmdebstrap systemd-container man-db groff-base
 )
 
-# Peers of bench/run.sh measured, and the cluster of fleet_slurm; not part of the tests, being large.
+# Peers of bench/run.sh measured, and the cluster of fleet_slurm; too large for the tests.
 packages_bench=("${packages_test[@]}" python3-sklearn slurm-wlm munge)

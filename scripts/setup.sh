@@ -1,7 +1,7 @@
 #!/bin/bash
-# Installs the Debian packages that are missing, after saying which.
+# Lists and installs the missing Debian packages.
 #   scripts/setup.sh build|modelling|petsc|demo|demo_fleet|test|bench
-# Needs root or sudo only where something is missing. Exit status 0: everything is there.
+# Needs root or sudo only if packages are missing. Exit status 0: all are installed.
 set -euo pipefail
 here=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)
 # shellcheck source=packages.sh
@@ -12,7 +12,7 @@ fail() {
   exit 1
 }
 
-# One line a package that dpkg does not have installed.
+# Packages that dpkg does not list as installed, one per line.
 missing_packages() {
   local package status
   for package in "$@"; do
@@ -35,10 +35,10 @@ apt_get() {
     -o Dpkg::Use-Pty=0 "$@"
 }
 
-# The package lists are fetched only when the installation does not work with those at hand: on a
-# fresh system there are none, on an old one they name files that are gone.
+# Package lists are updated only if the installation fails with the existing ones: a fresh system has none,
+# an old one's name files that are gone.
 install_packages() {
-  # Asked quietly first: pages of "unable to locate" would only frighten.
+  # Simulated first, to avoid pages of "unable to locate".
   if apt_get install -y --no-install-recommends --simulate "$@" >/dev/null 2>&1 &&
     apt_get install -y --no-install-recommends "$@"; then
     return 0
