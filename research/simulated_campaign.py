@@ -77,8 +77,6 @@ def progress(done, total):
 
 
 class Count:
-    """Right and wrong answers at one level."""
-
     def __init__(self, level, show, unit="um"):
         self.level, self.show = level, show
         self.test_rms = "test_rms_" + unit

@@ -110,7 +110,6 @@ def floors(graph):
 
 
 def drawing(includes):
-    """The floors as a table, the highest first."""
     drawn = {path: [other for other in found if other.split("/")[0] in DRAWN]
              for path, found in includes.items() if path.split("/")[0] in DRAWN}
     stack = floors(graph_of(drawn, os.path.dirname))

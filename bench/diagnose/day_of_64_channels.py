@@ -34,7 +34,6 @@ def day(seed):
 
 
 def write(folder):
-    """train.csv, test.csv and model.toml."""
     folder = pathlib.Path(folder)
     coefficients = np.random.default_rng(1).uniform(-3.0, 3.0, INPUTS)
     signals = [f"s{i}_rpm" for i in range(SIGNALS)]

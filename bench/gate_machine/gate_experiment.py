@@ -35,8 +35,6 @@ PUBLISHED_RANGE_UM = {1: 52.0, 2: 49.0, 3: 60.0}
 
 
 class Registers:
-    """Input registers of a Modbus TCP unit."""
-
     def __init__(self, port):
         self.socket = socket.create_connection(("127.0.0.1", port), timeout=5)
         self.number = 0
@@ -60,8 +58,6 @@ class Registers:
 
 
 class Run:
-    """One condition with one procedure."""
-
     def __init__(self, programs, config, out, condition, procedure):
         self.programs, self.config = programs, config
         self.condition, self.procedure = condition, procedure

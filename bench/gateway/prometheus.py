@@ -37,8 +37,6 @@ def promtool(*arguments, text=None):
 
 
 class Prometheus:
-    """A real Prometheus that scrapes one gateway."""
-
     def __init__(self, folder, target):
         self.port = free_port()
         self.log = folder / "prometheus.log"
@@ -81,7 +79,6 @@ class Prometheus:
 
 
 def wait_for_alerts(prometheus, wanted, what):
-    """Seconds until exactly these alerts fire."""
     begun_s = time.monotonic()
     eventually(lambda: time.sleep(0.5) or prometheus.firing() == set(wanted), what, ALERT_PATIENCE_S)
     return time.monotonic() - begun_s

@@ -195,7 +195,6 @@ def write(run, path):
 
 
 def selection(run, path):
-    """The run as an argument of the programs."""
     if np.isinf(run.from_s) and np.isinf(run.to_s):
         return str(path)
     def bound(value):

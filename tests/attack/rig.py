@@ -35,8 +35,6 @@ def is_database(path):
 
 
 class Rig:
-    """`link` and `choices`: see Machine."""
-
     def __init__(self, programs, link, seed, **choices):
         self.bin = pathlib.Path(programs).resolve()
         self.random = random.Random(seed)

@@ -33,7 +33,6 @@ class Metronome:
             due = max(due + self.PERIOD_S, now)
 
     def lateness_s(self, since_s, until_s):
-        """Largest delay in this time."""
         first = bisect.bisect_left(self.at_s, since_s)
         late = 0.0
         for at, lateness in zip(self.at_s[first:], self.late_s[first:]):

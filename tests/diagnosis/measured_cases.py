@@ -33,7 +33,6 @@ def spared(machine, cause, random):
 
 
 def second_cause(first, random):
-    """A cause of another family."""
     family = lambda cause: FAMILIES["hysteresis" if cause.startswith("hysteresis") else cause]
     return str(random.choice([c for c in CAUSES if family(c) != family(first)]))
 
@@ -67,7 +66,6 @@ def untouched_case(seed, machines, base):
 
 
 def write(folder, machine, model):
-    """@return arguments of the program"""
     model.write(folder / "model.toml")
     train, test = [], []
     for number, (run, rows) in enumerate(zip(machine.runs, machine.train)):
@@ -86,7 +84,6 @@ def write(folder, machine, model):
 
 
 def diagnosed(program, machine, model):
-    """@param program  with its options"""
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(folder)
         command = [program[0], "diagnose", *write(folder, machine, model), *program[1:], "--json",

@@ -201,7 +201,6 @@ class Model:
         return self
 
     def predicted(self, run):
-        """Shape (outputs, rows)."""
         return np.hstack([self.matrix, self.gains.reshape(len(self.outputs), -1)]) @ \
             self.parts(run).T
 

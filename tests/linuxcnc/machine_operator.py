@@ -88,7 +88,6 @@ class Operator:
         return True
 
     def run(self, program):
-        """Starts the program."""
         self.mode(linuxcnc.MODE_AUTO)
         self.command.program_open(program)
         self.wait(lambda s: s.file.endswith(program), "the program is loaded")

@@ -131,7 +131,6 @@ def test_soft_limit(scenario):
 
 
 def assert_held(mill, what):
-    """Checks that the offsets of all drives are unchanged."""
     with recording(mill.cnc) as held:
         time.sleep(1.0)
     assert abs(held[0].applied_um[:, 0] - expected_um("x")).max() < 1.0, what

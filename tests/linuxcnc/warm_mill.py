@@ -118,7 +118,6 @@ commit_s = 1.0
 
 
 def expected_um(axis):
-    """The offset in the steady state."""
     return -UM_PER_K[axis] * STEADY_K
 
 

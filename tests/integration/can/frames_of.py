@@ -46,7 +46,6 @@ def random_raw(signal, random):
 
 
 def nearest_raw(signal, value):
-    """The signal's nearest representable value."""
     if not signal.is_float:
         return round(value)
     return value if signal.size == 64 else struct.unpack("<f", struct.pack("<f", value))[0]
@@ -103,7 +102,6 @@ def random_frame(frame, random):
 
 
 def raw_bits(signal, raw):
-    """Bits of a raw value as an unsigned number."""
     if signal.is_float:
         return int.from_bytes(struct.pack("<f" if signal.size == 32 else "<d", raw), "little")
     return raw & ((1 << signal.size) - 1)

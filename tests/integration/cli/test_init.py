@@ -32,7 +32,6 @@ def listens(port):
 
 @pytest.fixture(scope="module")
 def foreign():
-    """Ports of the modules and of the PLC."""
     ports = free_port(), free_port()
     machine = subprocess.Popen([sys.executable, HERE / "foreign_machine.py", *map(str, ports)],
                                stderr=subprocess.DEVNULL)

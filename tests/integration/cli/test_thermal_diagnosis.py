@@ -168,7 +168,6 @@ def machine(folder, size=150, joint=300.0, column_film=8.0):
 
 
 def measured(folder):
-    """Runs of the machine for training and testing."""
     text = (folder / "machine.toml").read_text()
     files = []
     for seed, hours in ((11, 14.0), (12, 8.0)):

@@ -43,8 +43,6 @@ class Refused(Exception):
 
 
 class Daemon:
-    """A running thermocompd and its files."""
-
     def __init__(self, folder, sockets, config, name="thermocompd"):
         self.folder = folder
         self.config = folder / (name + ".toml")
@@ -74,7 +72,6 @@ class Daemon:
         return self
 
     def log_text(self):
-        """Log of this start of the daemon."""
         with self.log.open() as log:
             log.seek(self.log_start)
             return log.read()
@@ -137,7 +134,6 @@ class Daemon:
         assert self.process.wait(PATIENCE_S) == 0, self.log_text()
 
     def committed(self):
-        """Waits until all records so far are on disk."""
         mark = time.monotonic_ns()
 
         def through():
@@ -156,8 +152,6 @@ def run_tool(*arguments):
 
 
 class Simulator:
-    """A running thermocomp-sim."""
-
     def __init__(self, folder, machine, *options):
         self.folder = folder
         self.machine = folder / "machine.toml"

@@ -109,8 +109,6 @@ def write_standing_run(folder):
 
 
 class Moving:
-    """The simulated controller with its slide, and the daemon."""
-
     def __init__(self, lab, machine, daemon_text, stay=True, tick_ms=5):
         """daemon_text: function of the simulator's ports."""
         self.lab = lab

@@ -126,7 +126,6 @@ class PlainController(PlainDevice):
             self.show_applied()
 
     def show_more_um(self, um):
-        """Adds a constant to the read-back."""
         with self.lock:
             self.shown_more_um = um
             self.show_applied()

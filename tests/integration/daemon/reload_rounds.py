@@ -13,8 +13,6 @@ CLIENTS = 4
 
 
 class ReloadRounds:
-    """A daemon with a given cycle rate, reloaded repeatedly."""
-
     def __init__(self, lab, rate_hz):
         self.lab = lab
         self.rate_hz = rate_hz

@@ -31,7 +31,6 @@ class Store:
         self.fleet("init")
 
     def fleet(self, *arguments, status=0):
-        """Output of thermocomp-fleet."""
         done = subprocess.run([str(BIN / "thermocomp-fleet"), "--store", self.local, *map(str, arguments)],
                               stdin=subprocess.DEVNULL, capture_output=True, text=True, cwd=self.folder)
         assert done.returncode == status, done.stdout + done.stderr
@@ -207,7 +206,6 @@ class Machine:
         return {begin: {name: total / count for name, (total, count) in row.items()} for begin, row in means.items()}
 
     def taken(self):
-        """The same from the store."""
         columns = self.store.value(f"SELECT array_to_string(columns, ' ') FROM fleet.setup JOIN fleet.machine "
                                    f"ON id = machine WHERE name = '{self.name}' ORDER BY number LIMIT 1").split()
         rows = self.store.ask(f"SELECT extract(epoch FROM at)::bigint, array_to_string(value, ' ', 'nan') "

@@ -62,7 +62,6 @@ class Postgres:
             file.writelines(f"{name} = {value}\n" for name, value in settings.items())
 
     def allow(self, *lines):
-        """Content of pg_hba.conf."""
         (self.data / "pg_hba.conf").write_text("\n".join(lines) + "\n")
 
     def require_tls(self):

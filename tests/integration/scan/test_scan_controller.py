@@ -12,7 +12,6 @@ SHOWN = {"x_mm": 250.0, "spindle_rpm": 3000, "cutting_on": 1}
 
 
 def signals(is_simulated):
-    """Signals at these places, with the simulated values."""
     places = (("x_mm", {"table": "input", "address": 20, "encoding": "int32", "scale": 0.001}),
               ("spindle_rpm", {"table": "input", "address": 24, "encoding": "uint16"}),
               ("cutting_on", {"table": "discrete_input", "address": 0}))

@@ -33,7 +33,6 @@ def run(*command, check=True, **more):
 
 
 def package(name):
-    """The file of a built package."""
     found, = FILES.glob(f"packages/{name}_*.deb")
     return found
 
@@ -63,7 +62,6 @@ def journal(since=None):
 
 
 def drop_in(name, text):
-    """A drop-in for the unit; None removes it."""
     DROP_INS.mkdir(exist_ok=True)
     file = DROP_INS / f"{name}.conf"
     if text is None:
@@ -198,7 +196,6 @@ def start(mode="compensating"):
 
 
 def committed_chunks():
-    """All history chunks on disk."""
     with contextlib.closing(sqlite3.connect(HISTORY)) as base:
         return set(base.execute("SELECT segment, number, through_cycle, count, records FROM chunk"))
 

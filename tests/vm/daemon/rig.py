@@ -140,7 +140,6 @@ class Recovery:
 
 @dataclasses.dataclass
 class Window:
-    """An outage as observed by the test."""
     fault: str
     bus: str
     holding: float  # CLOCK_MONOTONIC
@@ -163,8 +162,6 @@ def computed_until_s(cycle):
 
 
 class Rig:
-    """The daemon, its machine and the faults of the run."""
-
     def __init__(self, lab, interfaces, machine_interfaces=None):
         self.lab = lab
         self.windows = []
@@ -333,6 +330,5 @@ def assert_no_jump_on_the_bus(offsets):
 
 
 def cpu_s(process):
-    """Processor time used by a process."""
     fields = (open(f"/proc/{process.pid}/stat").read().rpartition(")")[2]).split()
     return (int(fields[11]) + int(fields[12])) / 100.0

@@ -38,12 +38,10 @@ matrix_um_per_K = [[1.0]]
 
 
 def read_object(index, sub):
-    """The SDO request that reads an object."""
     return struct.pack("<BHB4x", 0x40, index, sub)
 
 
 def answer(index, sub, *value):
-    """The answer with its data bytes."""
     return struct.pack("<BHB4s", 0x43 | (4 - len(value)) << 2, index, sub, bytes(value))
 
 

@@ -75,7 +75,6 @@ commit_s = 0.2
 
 
 def send_temperatures(column_degC, spindle_degC):
-    """One frame from can-utils."""
     data = (struct.pack("<h", round(100 * column_degC)) +
             struct.pack(">h", round(100 * spindle_degC)))
     subprocess.run(["cansend", "vcan0", "181#" + data.hex().upper()], check=True, timeout=20)
@@ -111,8 +110,6 @@ class Controller:
 
 
 class Candump:
-    """Frames on vcan1, from can-utils."""
-
     def __init__(self, path):
         self.path = path
         with path.open("w") as out:

@@ -13,8 +13,6 @@ pytestmark = pytest.mark.skipif(not serial_adapter.is_possible(),
 
 
 class OneBusRig(rigs.Rig):
-    """Sensors and controller behind one adapter."""
-
     def __init__(self, lab, adapter):
         self.lab = lab
         self.windows = []

@@ -27,7 +27,6 @@ def smoothing(form, history, half_width_K):
 
 
 def start(lab, rows, text):
-    """Simulator and daemon with the run's first rows."""
     run = lab.folder / "spindle.csv"
     spindle.write_replay_file(run, rows, ROW_PERIOD_S)
     simulator = lab.simulator(spindle.machine_text(over_tcp()), "--replay", run,

@@ -103,7 +103,6 @@ def differences(told, answer, place="answer"):
 
 
 def pruned(value, seen):
-    """Lists shortened to their first element."""
     if isinstance(value, dict):
         return {key: pruned(each, seen) for key, each in value.items()}
     if isinstance(value, list):
@@ -122,7 +121,6 @@ def once(element, seen):
 
 
 def shown(answer, folder, seen):
-    """Wrapped to the document's width."""
     text = json.dumps(pruned(answer, seen)).replace(str(folder) + "/", "/etc/thermocomp/")
     return "\n  ".join(textwrap.wrap(text, 100, break_long_words=False, break_on_hyphens=False))
 
