@@ -12,11 +12,17 @@ constexpr const char* style =
     "body{font:16px/1.5 sans-serif;max-width:900px;margin:1.5em auto;padding:0 1em;color:#1a202c;"
     "background:#fff}h1,h2,p,li{overflow-wrap:anywhere}h1{font-size:1.6em;line-height:1.2}h2{font-"
     "size:1.2em;margin:1.6em 0 .3em}"
-    ".wide{overflow-x:auto}table{border-collapse:collapse;margin:.5em 0}"
+    // A shade at the side on which more can be scrolled to.
+    ".wide,figure{overflow-x:auto;background:linear-gradient(90deg,#fff 60%,#fff0) local,"
+    "linear-gradient(270deg,#fff 60%,#fff0) 100% 0 "
+    "local,linear-gradient(90deg,#4a556866,#4a556800),"
+    "linear-gradient(270deg,#4a556866,#4a556800) 100% 0;background-repeat:no-repeat;"
+    "background-size:40px 100%,40px 100%,14px 100%,14px 100%}"
+    "table{border-collapse:collapse;margin:.5em 0}"
     "td,th{border:1px solid #cbd5e0;padding:.25em .6em;text-align:right;vertical-align:top}"
     "td:first-child,th:first-child{text-align:left}th{background:#edf2f7;font-weight:600}"
-    ".text td{text-align:left}figure{margin:.6em 0;overflow-x:auto}"
-    "figcaption{color:#4a5568;font-size:.9em}svg{width:100%;min-width:560px;height:auto}"
+    ".line{white-space:nowrap}.long{min-width:11em}.text td{text-align:left}figure{margin:.6em 0}"
+    "figcaption{color:#4a5568;font-size:.9em}svg{width:100%;min-width:680px;height:auto}"
     ".small{font-size:.85em;color:#4a5568}.good{color:#22543d}.bad{color:#9b2c2c}"
     "@media print{@page{size:A4;margin:12mm}body{font-size:8.5pt;line-height:1.25;margin:0;"
     "max-width:none}h2{margin:.8em 0 .2em}p,ul,table,figure{margin:.3em 0}td,th{padding:0 "
@@ -25,8 +31,13 @@ constexpr const char* style =
 
 std::string row(const std::vector<std::string>& cells, const char* tag) {
   std::string html = "<tr>";
+  // On a phone neither a figure with its unit is broken, nor a sentence after each word.
+  constexpr std::size_t line_max = 24;
   for (const std::string& cell : cells) {
-    html.append("<").append(tag).append(">").append(xml_text(cell));
+    const bool is_figure = cell.find_first_of("0123456789") < 2;
+    html.append("<").append(tag);
+    html.append(cell.size() > line_max ? " class=\"long\">" : is_figure ? " class=\"line\">" : ">");
+    html.append(xml_text(cell));
     html.append("</").append(tag).append(">");
   }
   return html + "</tr>\n";

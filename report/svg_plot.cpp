@@ -1,6 +1,7 @@
 #include "report/svg_plot.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <utility>
@@ -29,6 +30,10 @@ constexpr std::size_t panel_points_max = 8000;
 constexpr std::size_t points_max = 2000;
 constexpr std::size_t dots_max = 300;
 constexpr double rounding_share = 1e-9;
+constexpr double bad_width_min = 1.5;
+constexpr double legend_row = 16.0;
+constexpr double legend_stroke = 16.0;
+constexpr double legend_gap = 14.0;
 
 struct Range {
   double low{0.0};
@@ -84,7 +89,7 @@ std::string way(char direction, double length) {
 
 /// Approximate width in the labels' font.
 double text_width(const std::string& text) {
-  return 6.6 * static_cast<double>(text.size());
+  return 7.0 * static_cast<double>(text.size());
 }
 
 std::string straight(double x, double y, const std::string& along, const char* kind) {
@@ -178,13 +183,19 @@ std::vector<std::size_t> extreme_rows(Values values, std::size_t begin, std::siz
   return {std::min(low, high), std::max(low, high)};
 }
 
+/// Within the quotation marks of the attribute before it.
+std::string dash_attribute(const PlotLine& line) {
+  constexpr std::array<const char*, 4> patterns = {"", "5 4", "2 3", "10 3 2 3"};
+  const std::size_t pattern = line.dashes % patterns.size();
+  return pattern == 0 ? "" : std::string("\" stroke-dasharray=\"") + patterns[pattern];
+}
+
 std::string curve(const Box& box, const Range& x, const Range& y, Values time, const PlotLine& line,
                   std::size_t points) {
   std::string svg = "<path fill=\"none\" stroke=\"";
   svg.append(line.colour);
   if (line.as_dots) svg.append("\" stroke-width=\"5\" stroke-linecap=\"round");
-  if (line.dashed) svg.append("\" stroke-dasharray=\"5 4");
-  svg.append("\" d=\"");
+  svg.append(dash_attribute(line)).append("\" d=\"");
   const std::size_t stride = time.size() <= points ? 1 : 1 + 2 * (time.size() - 1) / points;
   const double bridged = gap_max(x, time, line.values) + static_cast<double>(stride) *
                                                              (x.high - x.low) /
@@ -207,9 +218,10 @@ std::string curve(const Box& box, const Range& x, const Range& y, Values time, c
 
 std::string span_svg(const PlotSpan& span, const Box& box, const Range& x, bool named) {
   const double from = box.across(x, std::max(x.low, span.from_s));
-  const double to = box.across(x, std::min(x.high, span.to_s));
+  double to = box.across(x, std::min(x.high, span.to_s));
   if (!(to > from)) return "";
-  std::string svg = "<path class=\"span\" d=\"M";
+  if (span.is_bad) to = std::max(to, from + bad_width_min);
+  std::string svg = span.is_bad ? "<path class=\"bad\" d=\"M" : "<path class=\"span\" d=\"M";
   svg.append(place(from, box.y)).append(way('h', to - from)).append(way('v', box.height));
   svg.append(way('h', from - to)).append("z\"/>");
   return named ? svg + label(from + 3, box.y + 12, span.label, "class=\"note\"") : svg;
@@ -230,23 +242,69 @@ std::string square(double x, double y, double side, const std::string& attribute
   return svg.append(">").append(body).append("</rect>");
 }
 
-std::string panel_svg(const PlotPanel& panel, const Box& box, Values time, const Range& x) {
+std::string title_of(const PlotPanel& panel) {
+  return panel.title + (panel.unit.empty() ? "" : ", " + panel.unit);
+}
+
+/// Strokes with their names: beside the title where there is room, else in rows below it.
+class Legend {
+ public:
+  explicit Legend(const PlotPanel& panel) {
+    constexpr double bold = 1.15;
+    double all = 0.0;
+    for (const PlotLine& line : panel.lines) all += width_of(line);
+    // On a narrow screen the left part of a picture is seen.
+    double x = left + legend_gap + bold * text_width(title_of(panel));
+    double row = 0.0;
+    if (x + all > width - right) {
+      x = left;
+      row = 1.0;
+    }
+    for (const PlotLine& line : panel.lines) {
+      if (line.label.empty()) continue;
+      if (x > left && x + width_of(line) > width - right + 1.0) {
+        x = left;
+        row += 1.0;
+      }
+      entries_.push_back({&line, x, row * legend_row});
+      x += width_of(line);
+    }
+  }
+
+  [[nodiscard]] double below() const { return entries_.empty() ? 0.0 : entries_.back().y; }
+  /// @param y  of the title's line
+  [[nodiscard]] std::string svg(double y) const {
+    std::string svg;
+    for (const Entry& entry : entries_) {
+      svg.append("<path stroke-width=\"2\" stroke=\"").append(entry.line->colour);
+      svg.append(dash_attribute(*entry.line)).append("\" d=\"M");
+      svg.append(place(entry.x, y + entry.y - 4)).append(way('h', legend_stroke)).append("\"/>");
+      svg += label(entry.x + legend_stroke + 4, y + entry.y, entry.line->label);
+    }
+    return svg;
+  }
+
+ private:
+  struct Entry {
+    const PlotLine* line;
+    double x;
+    double y;
+  };
+  static double width_of(const PlotLine& line) {
+    return line.label.empty() ? 0.0 : legend_stroke + 4 + text_width(line.label) + legend_gap;
+  }
+  std::vector<Entry> entries_;
+};
+
+std::string panel_svg(const PlotPanel& panel, const Legend& legend, const Box& box, Values time,
+                      const Range& x) {
   std::vector<Values> columns;
   columns.reserve(panel.lines.size());
   for (const PlotLine& line : panel.lines) columns.push_back(line.values);
   const Range y = range_of(columns);
-  const std::string title = panel.title + (panel.unit.empty() ? "" : ", " + panel.unit);
-  std::string svg = label(4, box.y - title_up, title, "class=\"title\"");
+  std::string svg = label(4, box.y - title_up - legend.below(), title_of(panel), "class=\"title\"");
   svg += vertical_axis(box, y, panel.height > 100 ? 5 : 3);
-  std::string legend;
-  for (const PlotLine& line : panel.lines) {
-    if (line.label.empty()) continue;
-    legend.append(legend.empty() ? "" : "&#160;&#160; ");
-    legend.append("<tspan fill=\"").append(line.colour).append("\">");
-    legend.append(xml_text(line.label)).append("</tspan>");
-  }
-  svg += "<text x=\"" + coordinate(width - right) + "\" y=\"" + coordinate(box.y - title_up) +
-         "\" text-anchor=\"end\">" + legend + "</text>";
+  svg += legend.svg(box.y - title_up - legend.below());
   const auto points =
       std::min(points_max, panel_points_max / std::max<std::size_t>(1, panel.lines.size()));
   for (const PlotLine& line : panel.lines) svg += curve(box, x, y, time, line, points);
@@ -260,17 +318,18 @@ Drawing panels_drawing(Values along, const std::string& along_title,
   Drawing drawing{width, axis_height, "", ""};
   const Range x = range_of({along});
   for (const PlotPanel& panel : panels) {
-    const double top = drawing.height - axis_height + title_height;
+    const Legend legend(panel);
+    const double top = drawing.height - axis_height + title_height + legend.below();
     const Box box{left, top, width - left - right, panel.height};
     drawing.name += (drawing.name.empty() ? "" : "; ") + panel.title;
     std::string& svg = drawing.body;
     for (const PlotSpan& span : spans) svg += span_svg(span, box, x, &panel == &panels.front());
     for (const TimeTick& tick : ticks)
       svg += straight(box.across(x, tick.at_s), box.y, way('v', box.height), "grid");
-    svg += panel_svg(panel, box, along, x);
+    svg += panel_svg(panel, legend, box, along, x);
     if (&panel == &panels.back())
       svg += ticks.empty() ? horizontal_axis(box, x, along_title, 10) : named_axis(box, x, ticks);
-    drawing.height += title_height + panel.height + gap;
+    drawing.height += title_height + legend.below() + panel.height + gap;
   }
   return drawing;
 }
@@ -280,7 +339,14 @@ Drawing panels_drawing(Values along, const std::string& along_title,
 const char* const svg_style =
     "svg text{font:13px sans-serif}svg .title{font-weight:bold}svg .note{fill:#4a5568}"
     ".zero{stroke:#718096}.grid{stroke:#e2e8f0}.axis{stroke:#718096}"
-    ".span{fill:#2b6cb0;fill-opacity:.07}";
+    ".span{fill:#2b6cb0;fill-opacity:.07}svg .bad{fill:#b3261e;fill-opacity:.14}";
+
+PlotLine numbered_line(std::string label, std::size_t number, Values values) {
+  constexpr std::array<const char*, 8> colours = {"#2b6cb0", "#c05621", "#2f855a", "#6b46c1",
+                                                  "#b7791f", "#97266d", "#285e61", "#4a5568"};
+  return {std::move(label), colours[number % colours.size()], values, false,
+          static_cast<unsigned>(number / colours.size())};
+}
 
 std::string Drawing::svg() const {
   return begin(width, height, name) + body + "</svg>\n";

@@ -31,14 +31,19 @@ struct PlotLine {
   /// One per time. NaN is skipped; a gap much longer than the others of the line is not bridged.
   std::span<const double> values;
   bool as_dots{false};  ///< dots without a line
-  bool dashed{false};
+  unsigned dashes{0};   ///< 0: solid; else one of three patterns
 };
+
+/// A line of many: the first eight differ in colour, the next eight in their dashes too.
+[[nodiscard]] PlotLine numbered_line(std::string label, std::size_t number,
+                                     std::span<const double> values);
 
 /// A shaded time span behind all panels, with its label at the top.
 struct PlotSpan {
   std::string label;
   double from_s{0.0};
   double to_s{0.0};
+  bool is_bad{false};  ///< red, with a least width
 };
 
 /// A labelled time on the axis, with a line through all panels.

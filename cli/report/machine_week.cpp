@@ -17,6 +17,8 @@ constexpr double point_s_min = 10.0;
 constexpr double at_bound_share = 0.995;
 /// Around a probing: offsets change by a fraction of a micrometre in that time.
 constexpr double probing_half_s = 2.0;
+/// Between segments without a pause.
+constexpr double apart_s = 1.0;
 
 double end_s(const SegmentInfo& segment) {
   const double cycles =
@@ -76,7 +78,6 @@ class Setups {
 /// Of segments with or without a dry run; one behind the other they are one.
 std::vector<WallSpan> spans_of(const std::vector<SegmentInfo>& segments, const Setups& setups,
                                bool dry_run, const WallSpan& span) {
-  constexpr double apart_s = 1.0;
   std::vector<WallSpan> spans;
   for (const SegmentInfo& segment : segments) {
     const ReplaySetup* setup = setups.of(segment);
@@ -144,7 +145,6 @@ AxisWeek axis_week(const AxisConfig& axis, const ThinnedHistory& course,
   return week;
 }
 
-/// The offset right then is what the model claimed, as far as slew and bound let it.
 double offset_at(const std::filesystem::path& history, double moment_s, const std::string& axis,
                  const SetupParser& parser) {
   const ThinnedHistory there = thin_history(history, moment_s - probing_half_s,
@@ -161,10 +161,10 @@ ProbingWeek probing_of(const std::filesystem::path& history, const ReplaySetup& 
   const auto of = std::find_if(axes.begin(), axes.end(),
                                [&](const AxisConfig& one) { return one.name == axis; });
   if (of == axes.end()) return probing;
-  probing.claimed_um = -offset_at(history, moment_s, axis, parser) * of->sign;
+  probing.offset_um = offset_at(history, moment_s, axis, parser);
   // Given as a whole (always so in a dry run), what the offset takes out is still in it.
   if (setup.estimator.correction.measured == MeasuredMeaning::total || setup.dry_run)
-    probing.left_um = value_um - probing.claimed_um;
+    probing.left_um = value_um + probing.offset_um * of->sign;
   return probing;
 }
 
@@ -284,11 +284,34 @@ std::vector<ModeSpell> mode_spells(const WeekEvents& events, const WallSpan& spa
   return spells;
 }
 
+std::vector<ModeSpell> daemon_pauses(const WeekEvents& events, std::vector<WallSpan> recorded,
+                                     const WallSpan& span) {
+  std::sort(recorded.begin(), recorded.end(),
+            [](const WallSpan& a, const WallSpan& b) { return a.from_s < b.from_s; });
+  recorded.push_back({span.to_s + apart_s, span.to_s + apart_s});
+  std::vector<ModeSpell> pauses;
+  double until_s = span.from_s - apart_s;
+  for (const WallSpan& one : recorded) {
+    const WallSpan pause = WallSpan{until_s, one.from_s}.within(span);
+    if (one.from_s - until_s > apart_s && pause.length_s() > 0.0) {
+      bool asked = false;
+      for (const RecordedEvent& event : events.events)
+        if (event.kind == EventKind::daemon && event.wall_s < until_s + apart_s)
+          asked = event.code == "stopping" || (asked && event.code != "started");
+      pauses.push_back({pause, asked ? daemon_stopped : daemon_ended});
+    }
+    until_s = std::max(until_s, one.to_s);
+  }
+  return pauses;
+}
+
 std::vector<Outages> outages_of(const WeekEvents& events, const WallSpan& span) {
   std::map<Subject, Outages> found;
   const auto& list = events.events;
+  std::int64_t stopping = -1;  // run
   for (std::size_t i = 0; i < list.size(); ++i) {
-    if (list[i].kind != EventKind::fault) continue;
+    if (list[i].kind == EventKind::daemon && list[i].code == "stopping") stopping = list[i].run;
+    if (list[i].kind != EventKind::fault || list[i].run == stopping) continue;
     const auto end = events.run_ends_s.find(list[i].run);
     double until_s = end == events.run_ends_s.end() ? span.to_s : end->second;
     bool ended = false;
@@ -396,12 +419,13 @@ MachineWeek machine_week(const std::filesystem::path& history, const WallSpan& s
     double& end = events.run_ends_s[segment.run];
     end = std::max(end, end_s(segment));
   }
-  for (const WallSpan& one : recorded_spans(reader.segments()))
-    week.recorded_s += one.within(span).length_s();
   const auto points = static_cast<std::size_t>(
       std::clamp(span.length_s() / point_s_min, 60.0, static_cast<double>(points_max)));
   week.course = thin_history(history, span.from_s, span.to_s, points, ThinningLimits{}, parser);
-  week.modes = mode_spells(events, span);
+  week.modes = daemon_pauses(events, recorded_spans(reader.segments()), span);
+  week.recorded_s = span.length_s();
+  for (const ModeSpell& pause : week.modes) week.recorded_s -= pause.span.length_s();
+  for (ModeSpell& spell : mode_spells(events, span)) week.modes.push_back(std::move(spell));
   week.outages = outages_of(events, span);
   week.sensors = sensors_of(week.course);
   const Setups setups(reader, parser, week.damage);

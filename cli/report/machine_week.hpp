@@ -27,9 +27,13 @@ struct WallSpan {
   [[nodiscard]] WallSpan within(const WallSpan& other) const noexcept;
 };
 
+/// In the place of a mode where no daemon ran: it was stopped, or ended without that.
+inline constexpr const char* daemon_stopped = "daemon_stopped";
+inline constexpr const char* daemon_ended = "daemon_ended";
+
 struct ModeSpell {
   WallSpan span;
-  std::string mode;  ///< name of a mode: "compensating", "holding", ...
+  std::string mode;  ///< name of a mode: "compensating", "holding", ...; or one of the above
 };
 
 /// Faults of one subject.
@@ -67,8 +71,8 @@ struct AxisWeek {
 struct ProbingWeek {
   double wall_s{0.0};
   std::string axis;
-  double claimed_um{std::numeric_limits<double>::quiet_NaN()};  ///< displacement by the offset
-  double left_um{std::numeric_limits<double>::quiet_NaN()};     ///< at the tool, with the offset
+  double offset_um{std::numeric_limits<double>::quiet_NaN()};  ///< as sent
+  double left_um{std::numeric_limits<double>::quiet_NaN()};    ///< at the tool, with the offset
   bool dry_run{false};  ///< the offset was not sent: both are what they would have been
 };
 
@@ -88,7 +92,7 @@ struct MachineWeek {
   std::string history;
   WallSpan span;
   double recorded_s{0.0};        ///< the daemon ran
-  std::vector<ModeSpell> modes;  ///< within the span, in order
+  std::vector<ModeSpell> modes;  ///< within the span
   std::vector<Outages> outages;  ///< longest first
   std::vector<AxisWeek> axes;
   std::vector<ProbingWeek> probings;
@@ -112,6 +116,11 @@ struct WeekEvents {
   std::map<std::int64_t, double> run_ends_s;  ///< of each start of the daemon: its last record
 };
 [[nodiscard]] std::vector<ModeSpell> mode_spells(const WeekEvents& events, const WallSpan& span);
+/// When no daemon ran. @param recorded  in any order
+[[nodiscard]] std::vector<ModeSpell> daemon_pauses(const WeekEvents& events,
+                                                   std::vector<WallSpan> recorded,
+                                                   const WallSpan& span);
+/// Faults after the daemon began to stop do not count: with the machine everything is switched off.
 [[nodiscard]] std::vector<Outages> outages_of(const WeekEvents& events, const WallSpan& span);
 [[nodiscard]] std::vector<SensorWeek> sensors_of(const ThinnedHistory& course);
 

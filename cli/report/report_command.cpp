@@ -65,7 +65,7 @@ void add_report_command(CLI::App& app, Action& action) {
   CLI::App* sub = app.add_subcommand(
       "report",
       "the last week of a machine for its owner, as a page: hours compensated and why not more, "
-      "displacement taken out, probings, sensors, buses, what to do");
+      "offsets, probings, sensors, buses, what to do");
   sub->add_option("HISTORY", options->history, "history of thermocompd")
       ->type_name("FILE")
       ->required();

@@ -30,7 +30,7 @@ double rms_left_um(const MachineWeek& week, const std::string& axis, double& cla
   for (const ProbingWeek& probing : week.probings) {
     if (probing.axis != axis || !std::isfinite(probing.left_um)) continue;
     squares += probing.left_um * probing.left_um;
-    claims += probing.claimed_um * probing.claimed_um;
+    claims += probing.offset_um * probing.offset_um;
     ++count;
   }
   const double n = std::max(1.0, static_cast<double>(count));

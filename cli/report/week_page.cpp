@@ -1,10 +1,11 @@
 #include "cli/report/week_page.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <ctime>
 #include <deque>
+#include <iomanip>
+#include <sstream>
 #include <string_view>
 #include <utility>
 
@@ -17,20 +18,20 @@
 namespace thermocomp::cli {
 namespace {
 
-constexpr std::array<const char*, 8> colours = {"#2b6cb0", "#c05621", "#2f855a", "#6b46c1",
-                                                "#b7791f", "#97266d", "#285e61", "#4a5568"};
-constexpr std::size_t named_max = 8;
+constexpr const char* in_the_week = "%a %d, %H:%M";
 
-std::string local_text(double wall_s) {
+std::string local_text(double wall_s, const char* form = "%Y-%m-%d %H:%M") {
   const auto seconds = static_cast<std::time_t>(wall_s);
   std::tm parts{};
   localtime_r(&seconds, &parts);
-  std::array<char, 40> text{};
-  std::strftime(text.data(), text.size(), "%Y-%m-%d %H:%M", &parts);
-  return text.data();
+  std::ostringstream text;
+  text << std::put_time(&parts, form);
+  return text.str();
 }
 
 std::string mode_words(const std::string& name) {
+  if (name == daemon_stopped) return "the daemon was stopped";
+  if (name == daemon_ended) return "no daemon ran, and none was stopped (power cut, crash)";
   const auto mode = mode_named(name);
   return mode ? std::string(code_text(*mode, name == "dry_run").meaning) : name;
 }
@@ -43,55 +44,60 @@ std::string summary(const MachineWeek& week) {
   const double on_s = week.mode_s("compensating");
   std::string text = "From " + local_text(week.span.from_s) + " to " + local_text(week.span.to_s) +
                      " (" + duration_text(week.span.length_s()) +
-                     ") the machine was compensated for " + duration_text(on_s);
-  if (week.recorded_s > 0.0)
-    text += ", that is " + figure_text(100.0 * on_s / week.recorded_s) +
-            " % of the time in which the daemon ran";
-  text += ".";
+                     ") the machine was compensated for " + duration_text(on_s) + ".";
   if (week.dry_run_s() > 0.0)
-    text += " Of the time in which it ran, " + duration_text(week.dry_run_s()) +
+    text += " " + duration_text(week.dry_run_s()) +
             " were a dry run: everything was computed and recorded, and nothing was sent to the "
             "machine.";
   return text;
 }
 
+/// Seconds and tenths of a percent of the rows add up to those of the whole.
 std::string time_table(const MachineWeek& week) {
-  std::vector<std::vector<std::string>> rows{{"mode", "time", "share of the whole"}};
-  const auto add = [&](const std::string& what, double seconds) {
-    constexpr double told_s_min = 1.0;
-    if (seconds < told_s_min) return;
-    rows.push_back(
-        {what, duration_text(seconds), figure_text(100.0 * seconds / week.span.length_s()) + " %"});
+  constexpr double tenths = 1000.0;
+  const double whole_s = std::floor(week.span.length_s());
+  std::vector<std::vector<std::string>> rows{{"mode", "time", "of the whole"}};
+  double rest_s = whole_s;
+  double rest = tenths;
+  const auto add = [&](const std::string& what, double seconds, double share) {
+    if (seconds < 1.0 && share < 1.0) return;
+    rest_s -= seconds;
+    rest -= share;
+    rows.push_back({what, duration_text(seconds), fixed(0.1 * share, 1) + " %"});
   };
-  double told_s = 0.0;
-  for (const char* mode :
-       {"compensating", "holding", "ramping_to_zero", "disabled", "starting", "dry_run"}) {
-    add(mode_words(mode), week.mode_s(mode));
-    told_s += week.mode_s(mode);
+  for (const char* mode : {"compensating", "holding", "ramping_to_zero", "disabled", "starting",
+                           "dry_run", daemon_stopped, daemon_ended}) {
+    const double seconds = week.mode_s(mode);
+    add(mode_words(mode), std::floor(seconds), std::floor(tenths * seconds / whole_s));
   }
-  add("recorded, mode not known", week.recorded_s - told_s);
-  add("the daemon did not run", week.span.length_s() - week.recorded_s);
+  add("mode not known, and what rounding leaves", rest_s, rest);
+  rows.push_back({"the whole", duration_text(whole_s), "100 %"});
   return html_table(rows);
 }
 
+/// The longest; what is shorter in one row, so that nothing is left out.
 std::string spells_part(const MachineWeek& week) {
-  constexpr std::size_t told_max = 12;
-  constexpr double told_s = 60.0;
+  constexpr std::size_t listed_max = 12;
+  std::vector<ModeSpell> spells;
+  for (const ModeSpell& spell : week.modes)
+    if (spell.mode != "compensating") spells.push_back(spell);
+  std::sort(spells.begin(), spells.end(), [](const ModeSpell& a, const ModeSpell& b) {
+    return a.span.length_s() > b.span.length_s();
+  });
+  const std::size_t listed = std::min(listed_max, spells.size());
+  double shorter_s = 0.0;
+  for (std::size_t i = listed; i < spells.size(); ++i) shorter_s += spells[i].span.length_s();
+  const std::size_t shorter = spells.size() - listed;
+  spells.resize(listed);
+  std::sort(spells.begin(), spells.end(),
+            [](const ModeSpell& a, const ModeSpell& b) { return a.span.from_s < b.span.from_s; });
   std::vector<std::vector<std::string>> rows{{"not compensating", "from", "for"}};
-  std::size_t more = 0;
-  for (const ModeSpell& spell : week.modes) {
-    if (spell.mode == "compensating" || spell.span.length_s() < told_s) continue;
-    if (rows.size() > told_max) {
-      ++more;
-      continue;
-    }
-    rows.push_back({mode_words(spell.mode), local_text(spell.span.from_s),
+  for (const ModeSpell& spell : spells)
+    rows.push_back({mode_words(spell.mode), local_text(spell.span.from_s, in_the_week),
                     duration_text(spell.span.length_s())});
-  }
-  std::string html = html_table(rows);
-  if (more > 0)
-    html += html_paragraph("and " + std::to_string(more) + " more of a minute or longer", "small");
-  return html;
+  if (shorter > 0)
+    rows.push_back({std::to_string(shorter) + " shorter ones", "", duration_text(shorter_s)});
+  return html_table(rows);
 }
 
 std::string why_part(const MachineWeek& week) {
@@ -112,18 +118,18 @@ std::string ranges_table(const MachineWeek& week, const std::string& what,
   for (const AxisWeek& axis : week.axes) {
     const OffsetRange& of = axis.*range;
     if (of.is_there())
-      rows.push_back({axis.name + ", " + unit_words(axis.unit), figure_text(-of.high_um),
-                      figure_text(-of.low_um), figure_text(of.mean_size_um),
+      rows.push_back({axis.name + ", " + unit_words(axis.unit), figure_text(of.low_um),
+                      figure_text(of.high_um), figure_text(of.mean_size_um),
                       figure_text(axis.bound_um), figure_text(100.0 * of.at_bound_share) + " %"});
   }
   return html_table(rows);
 }
 
 std::string axes_part(const MachineWeek& week) {
-  std::string html = ranges_table(week, "displacement taken out", &AxisWeek::sent);
-  if (html.empty()) html = html_paragraph("Nothing was taken out.");
+  std::string html = ranges_table(week, "offset sent", &AxisWeek::sent);
+  if (html.empty()) html = html_paragraph("Nothing was sent.");
   const std::string dry =
-      ranges_table(week, "computed in the dry run, not taken out", &AxisWeek::dry_run);
+      ranges_table(week, "computed in the dry run, not sent", &AxisWeek::dry_run);
   return dry.empty() ? html : html + dry;
 }
 
@@ -131,14 +137,14 @@ std::string probings_part(const MachineWeek& week) {
   std::string html = html_heading("Probings");
   if (week.probings.empty())
     return html + html_paragraph("Nothing was probed, so nothing says what is left at the tool.");
-  std::vector<std::vector<std::string>> rows{{"when", "axis", "taken out", "left at the tool"}};
+  std::vector<std::vector<std::string>> rows{{"when", "axis", "offset", "left at the tool"}};
   for (const ProbingWeek& probing : week.probings) {
     std::string unit = "µm";
     for (const AxisWeek& axis : week.axes)
       if (axis.name == probing.axis) unit = unit_words(axis.unit);
     if (probing.dry_run) unit += " (dry run)";
-    rows.push_back({local_text(probing.wall_s), probing.axis,
-                    figure_text(probing.claimed_um).append(" ").append(unit),
+    rows.push_back({local_text(probing.wall_s, in_the_week), probing.axis,
+                    figure_text(probing.offset_um).append(" ").append(unit),
                     figure_text(probing.left_um).append(" ").append(unit)});
   }
   html += html_table(rows);
@@ -146,10 +152,8 @@ std::string probings_part(const MachineWeek& week) {
     html += html_paragraph(
         "A model that runs beside and is not used: " + candidate_text(*week.candidate) + ".");
   return html + html_paragraph(
-                    "Taken out: the offset at that moment, which is what the model "
-                    "claimed as far as bound and slew let it. Left: what the probing "
-                    "found with it. In a dry run nothing was sent: what would have been taken "
-                    "out, and what would have been left.",
+                    "Left: what the probing found with the offset of that moment. In a dry run "
+                    "nothing was sent: the offset and the rest that would have been.",
                     "small");
 }
 
@@ -211,11 +215,7 @@ bool has_values(const std::vector<double>& values) {
 }
 
 std::string day_text(std::time_t seconds) {
-  std::tm day{};
-  localtime_r(&seconds, &day);
-  std::array<char, 16> text{};
-  std::strftime(text.data(), text.size(), "%a %d", &day);
-  return text.data();
+  return local_text(static_cast<double>(seconds), "%a %d");
 }
 
 /// The beginning, and the midnights of the machine's place: a course of some days is read by them.
@@ -256,13 +256,12 @@ void add_offsets(const MachineWeek& week, const std::string& title, PointPlace p
   for (const ThinnedColumn& column : week.course.columns) {
     constexpr std::string_view offset = "_offset_um";
     if (!column.name.ends_with(offset)) continue;
-    const char* colour = colours[next++ % colours.size()];
+    const std::size_t number = next++;
     std::vector<double> values = only(column.values, places, place);
     if (!has_values(values)) continue;
-    for (double& value : values) value = -value;  // of the offset: what it takes out
     all.kept.push_back(std::move(values));
-    panel.lines.push_back(
-        {column.name.substr(0, column.name.size() - offset.size()), colour, all.kept.back()});
+    panel.lines.push_back(numbered_line(column.name.substr(0, column.name.size() - offset.size()),
+                                        number, all.kept.back()));
   }
   if (!panel.lines.empty()) all.panels.push_back(std::move(panel));
 }
@@ -272,27 +271,25 @@ void add_temperatures(const MachineWeek& week, WeekPanels& all) {
   constexpr std::string_view ending = "_degC";
   for (const ThinnedColumn& column : week.course.columns) {
     if (!column.name.ends_with(ending)) continue;
-    panel.lines.push_back({column.name.substr(0, column.name.size() - ending.size()),
-                           colours[panel.lines.size() % colours.size()], column.values});
+    panel.lines.push_back(numbered_line(column.name.substr(0, column.name.size() - ending.size()),
+                                        panel.lines.size(), column.values));
   }
-  if (panel.lines.size() > named_max)
-    for (PlotLine& line : panel.lines) line.label.clear();
   if (!panel.lines.empty()) all.panels.push_back(std::move(panel));
 }
 
 std::string picture(const MachineWeek& week) {
   WeekPanels all;
-  add_offsets(week, "displacement taken out", PointPlace::sent, all);
-  add_offsets(week, "computed in the dry run, not taken out", PointPlace::dry_run, all);
+  add_offsets(week, "offset sent", PointPlace::sent, all);
+  add_offsets(week, "computed in the dry run, not sent", PointPlace::dry_run, all);
   add_temperatures(week, all);
   if (all.panels.empty()) return "";
   std::vector<double> since_s = week.course.time_s;
   for (double& time : since_s) time -= week.span.from_s;
   std::vector<PlotSpan> spans;
   for (const ModeSpell& spell : week.modes)
-    if (spell.mode == "compensating")
+    if (spell.mode != "compensating")
       spans.push_back(
-          {"", spell.span.from_s - week.span.from_s, spell.span.to_s - week.span.from_s});
+          {"", spell.span.from_s - week.span.from_s, spell.span.to_s - week.span.from_s, true});
   constexpr double days_told_s = 36.0 * 3600.0;
   const bool by_days = week.span.length_s() > days_told_s;
   const double mean_s = week.span.length_s() / static_cast<double>(week.course.time_s.size());
@@ -300,7 +297,7 @@ std::string picture(const MachineWeek& week) {
       panels_plot(since_s, all.panels, spans,
                   by_days ? days_of(week.span) : std::vector<TimeTick>{}),
       (by_days ? "A day begins at its line" : "From " + local_text(week.span.from_s)) +
-          "; shaded: compensating. Means of " +
+          "; red: not compensating. Means of " +
           (mean_s < 1.0 ? "less than a second" : duration_text(mean_s)) + " each.");
 }
 
@@ -318,7 +315,7 @@ std::string week_html(const MachineWeek& week) {
   html += html_paragraph(summary(week));
   if (!lines.empty()) html += html_heading("What to do") + html_list(lines);
   html += html_heading("Time") + time_table(week) + why_part(week) + spells_part(week);
-  html += html_heading("Displacement") + axes_part(week) + picture(week);
+  html += html_heading("Offsets") + axes_part(week) + picture(week);
   html += probings_part(week) + sensors_part(week) + outages_part(week);
   html += html_paragraph("The daemon was started " + std::to_string(week.starts) +
                              (week.starts == 1 ? " time" : " times") + " and was given " +

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdio>
 #include <memory>
@@ -11,10 +10,6 @@
 
 namespace thermocomp::thermal_test {
 namespace {
-
-constexpr std::array<const char*, 8> colours = {"#2b6cb0", "#c05621", "#2f855a", "#6b46c1",
-                                                "#b7791f", "#97266d", "#285e61", "#4a5568"};
-constexpr std::size_t named_max = 8;
 
 std::string title_of(TestKind kind) {
   if (kind == TestKind::environment) return "Drift with the surroundings";
@@ -125,7 +120,7 @@ class TestPicture {
       any = true;
       kept_.push_back(
           std::make_unique<std::vector<double>>(resampled(time_s_, axis.time_s, axis.course)));
-      panels_.back().lines.push_back({axis.name, colours[i % colours.size()], *kept_.back()});
+      panels_.back().lines.push_back(numbered_line(axis.name, i, *kept_.back()));
     }
   }
 
@@ -136,10 +131,9 @@ class TestPicture {
       const TestTemperature& temperature = data_.temperatures[i];
       std::vector<double> rise = temperature.temp_degC;
       for (double& value : rise) value -= figures_.temperatures[i].at_start_degC;
-      const bool named = data_.temperatures.size() <= named_max || temperature.is_room;
-      panels_.back().lines.push_back({named ? temperature.name : "",
-                                      temperature.is_room ? "#1a202c" : colours[i % colours.size()],
-                                      keep(temperature.time_s, rise)});
+      panels_.back().lines.push_back(
+          numbered_line(temperature.name, i, keep(temperature.time_s, rise)));
+      if (temperature.is_room) panels_.back().lines.back().colour = "#1a202c";
     }
   }
 
@@ -158,7 +152,7 @@ std::string figure_cell(const Figure& figure) {
 std::string axes_table(const TestFigures& figures, TestKind kind) {
   std::vector<std::vector<std::string>> rows;
   if (kind == TestKind::environment)
-    rows.push_back({"", "whole test", "hour with most"});
+    rows.push_back({"axis", "whole test", "hour with most"});
   else
     rows.push_back(
         {"range of", "first 60 min", "until the end", "cooling", "last by first hour", "settled"});

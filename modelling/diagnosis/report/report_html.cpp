@@ -107,7 +107,8 @@ std::string summary(const Diagnosis& diagnosis, const ReportData& report) {
 }
 
 std::string gains_table(const Diagnosis& diagnosis) {
-  Table rows{{"", "RMS before", "RMS after", "peak before", "peak after", "of it without a name"}};
+  Table rows{
+      {"output", "RMS before", "RMS after", "peak before", "peak after", "of it without a name"}};
   for (const auto& [output, of] : diagnosis.outputs)
     rows.push_back({name_of_column(output) + ", " + unit_text(diagnosis, output),
                     figure(of.test_rms_um), figure(of.extended_test_rms_um),
@@ -244,7 +245,7 @@ std::string finding_html(const NamedFinding& finding, std::size_t number, const 
 /// What was weighed where nothing is named.
 std::string candidates_html(const Diagnosis& diagnosis) {
   if (!diagnosis.findings.empty()) return "";
-  Table rows{{"", "probability", "of the error on left-out rows", "error on the test rows",
+  Table rows{{"cause", "probability", "of the error on left-out rows", "error on the test rows",
               "what would decide"}};
   for (std::size_t i = 0; i < std::min(candidates_told, diagnosis.weighed.size()); ++i) {
     const Candidate& each = diagnosis.weighed[i];

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdio>
 #include <span>
@@ -13,16 +12,12 @@ namespace {
 
 constexpr std::size_t scatters_max = 3;
 constexpr std::size_t signals_max = 4;
-/// More temperatures than this are drawn without their names.
-constexpr std::size_t named_max = 6;
 constexpr double output_height = 130.0;
 constexpr double error_height = 90.0;
 constexpr double signal_height = 40.0;
 constexpr const char* measured_colour = "#222";
 constexpr const char* model_colour = "#c53030";
 constexpr const char* extended_colour = "#2b6cb0";
-constexpr std::array<const char*, 8> colours = {"#2b6cb0", "#c05621", "#2f855a", "#6b46c1",
-                                                "#b7791f", "#97266d", "#285e61", "#718096"};
 
 std::span<const double> all_of(const Column& column) {
   return {column.data(), static_cast<std::size_t>(column.size())};
@@ -50,8 +45,7 @@ PlotPanel temperatures_panel(const ReportRun& run, const ReportData& report) {
   PlotPanel panel{"temperatures, rise", "K", {}, error_height};
   for (std::size_t i = 0; i < run.inputs_K.size(); ++i)
     panel.lines.push_back(
-        {run.inputs_K.size() <= named_max ? name_of_column(report.inputs[i]) : std::string(),
-         colours[i % colours.size()], all_of(run.inputs_K[i])});
+        numbered_line(name_of_column(report.inputs[i]), i, all_of(run.inputs_K[i])));
   return panel;
 }
 

@@ -37,7 +37,7 @@ Drawing curves_over_a(const TiedColumns& columns, const std::string& title, cons
     }
     const bool own = i == 0;
     panel.lines.push_back({printed(own ? "this machine, beta %.3g" : "beta %.2g", betas[i]),
-                           colours[i], values[i], false, !own});
+                           colours[i], values[i], false, own ? 0U : 1U});
   }
   return curves_drawing(ratios, "l / l4", {panel});
 }

@@ -305,6 +305,20 @@ TEST_CASE("a constant is drawn flat, whatever its rounding", "[diagnosis][report
   CHECK(heights[1] == heights[2]);
 }
 
+TEST_CASE("each of many curves has its name and a stroke of its own", "[diagnosis][report]") {
+  const std::vector<double> values{0.0, 1.0, 3.0};
+  std::vector<PlotLine> lines;
+  for (std::size_t i = 0; i < 30; ++i)
+    lines.push_back(numbered_line("sensor" + std::to_string(i), i, values));
+  const std::string svg = panels_plot(values, {{"temperatures", "K", lines}});
+  for (const PlotLine& line : lines) {
+    CHECK(count(svg, ">" + line.label + "</text>") == 1);
+    CHECK(std::count_if(lines.begin(), lines.end(), [&](const PlotLine& other) {
+            return other.colour == line.colour && other.dashes == line.dashes;
+          }) == 1);
+  }
+}
+
 TEST_CASE("only what has the unit of a speed is called one", "[diagnosis][report]") {
   NamedFinding finding;
   finding.cause = "speed_growth";

@@ -112,6 +112,30 @@ TEST_CASE("outages count and last until their recovery, or the run's end", "[wee
   CHECK_FALSE(outages[1].lasts);
 }
 
+TEST_CASE("where no daemon ran, the page has the time, and whether it was stopped", "[week]") {
+  const WeekEvents events{
+      {event_at(0, EventKind::daemon, {}, "started"), mode_at(0.4, "compensating"),
+       event_at(1000, EventKind::daemon, {}, "stopping"), fault_at(1000, bed, "no_answer"),
+       event_at(1100, EventKind::daemon, {}, "started", 2), mode_at(1100.7, "compensating", 2)},
+      {{1, begin_s + 1000}, {2, begin_s + 1500}}};
+  MachineWeek week;
+  week.span = {begin_s, begin_s + 1800.4};
+  const std::vector<WallSpan> recorded{{begin_s + 1100, begin_s + 1500}, {begin_s, begin_s + 1000}};
+  week.modes = daemon_pauses(events, recorded, week.span);
+  REQUIRE(week.modes.size() == 2);
+  CHECK(week.mode_s(daemon_stopped) == Approx(100.0).margin(1e-3));
+  CHECK(week.mode_s(daemon_ended) == Approx(300.4).margin(1e-3));
+  for (const ModeSpell& spell : mode_spells(events, week.span)) week.modes.push_back(spell);
+  CHECK(outages_of(events, week.span).empty());  // switched off together with the daemon
+  const std::string html = week_html(week);
+  CHECK_THAT(
+      html,
+      Contains("<td>the daemon was stopped</td><td class=\"line\">1 min 40 s</td><td "
+               "class=\"line\">5.5 %</td>") &&
+          Contains("none was stopped (power cut, crash)</td><td class=\"line\">5 min 0 s</td>") &&
+          Contains("<td class=\"line\">30 min 0 s</td><td class=\"line\">100 %</td>"));
+}
+
 TEST_CASE("a sensor's drift against its neighbour is within its interval of the truth", "[week]") {
   int within = 0;
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
@@ -162,7 +186,7 @@ TEST_CASE("a sensor that was suspected is named with what to do, in its own line
     CHECK_THAT(line, !Contains("a sensor shows what its neighbours contradict"));
   }
   const std::string html = week_html(week);
-  CHECK_THAT(html, Contains("<td>2 h 0 min</td>"));
+  CHECK_THAT(html, Contains(">2 h 0 min</td>"));
   CHECK_THAT(html, Contains("No faults of buses, devices or controller."));
 }
 
@@ -198,7 +222,7 @@ TEST_CASE("a picture does not bridge the hours in which the daemon did not run",
   week.course = week_of_sensors(0.0, 3);
   const auto pens = [&] {
     const std::string html = week_html(week);
-    const std::size_t at = html.find("stroke=\"#2b6cb0\"");
+    const std::size_t at = html.find("fill=\"none\" stroke=\"#2b6cb0\"");
     const std::string path = html.substr(at, html.find("/>", at) - at);
     return std::count(path.begin(), path.end(), 'M');
   };
@@ -265,20 +289,19 @@ TEST_CASE("what a dry run computed is not said to have been taken out", "[week]"
         Approx(sent_um).margin(0.1 * sent_um + 0.5));
   REQUIRE(week.probings.size() == 1);
   CHECK(week.probings[0].dry_run);
-  const double computed_um = -at_probing_um / static_cast<double>(near);
-  CHECK(week.probings[0].claimed_um == Approx(computed_um).margin(0.3));
+  const double computed_um = at_probing_um / static_cast<double>(near);
+  CHECK(week.probings[0].offset_um == Approx(computed_um).margin(0.3));
   // In a dry run a probing is the whole displacement.
-  CHECK(week.probings[0].left_um == Approx(2.5 - computed_um).margin(0.3));
+  CHECK(week.probings[0].left_um == Approx(2.5 + computed_um).margin(0.3));
   const std::string html = week_html(week);
-  CHECK_THAT(html, Contains("displacement taken out") &&
-                       Contains("computed in the dry run, not taken out") &&
+  CHECK_THAT(html, Contains("offset sent") && Contains("computed in the dry run, not sent") &&
                        Contains("(dry run)") && Contains("were a dry run"));
 
   const MachineWeek dry = machine_week(config.file, {zero_s, zero_s + 110.0}, parser);
   CHECK(dry.dry_run);
   CHECK_FALSE(dry.axes.at(1).sent.is_there());
   const std::string dry_html = week_html(dry);
-  CHECK_THAT(dry_html, Contains("Nothing was taken out.") && !Contains(">displacement taken out<"));
+  CHECK_THAT(dry_html, Contains("Nothing was sent.") && !Contains(">offset sent<"));
 }
 
 TEST_CASE("a recorded machine: offsets and probings as replay has them", "[week]") {
@@ -321,8 +344,8 @@ TEST_CASE("a recorded machine: offsets and probings as replay has them", "[week]
   CHECK(week.axes[1].sent.high_um == Approx(*high).margin(0.1 * (*high - *low) + 0.5));
   REQUIRE(week.probings.size() == 1);
   CHECK(week.probings[0].left_um == 2.5);
-  CHECK(week.probings[0].claimed_um ==
-        Approx(-at_probing_um / static_cast<double>(near)).margin(0.3));
+  CHECK(week.probings[0].offset_um ==
+        Approx(at_probing_um / static_cast<double>(near)).margin(0.3));
   const std::string html = week_html(week);
   CHECK_THAT(html, Contains("What to do") && Contains("2.50 µm"));
   CHECK(html.find("http") == std::string::npos);
