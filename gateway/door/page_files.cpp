@@ -10,6 +10,7 @@
 
 #include "config/text/problems.hpp"
 #include "config/toml/toml_reader.hpp"
+#include "gateway/settings/gateway_settings.hpp"
 
 namespace thermocomp::gateway {
 namespace {
@@ -76,8 +77,7 @@ PageFiles::PageFiles(const std::filesystem::path& folder, const std::filesystem:
 }
 
 void PageFiles::add(const std::string& path, const std::filesystem::path& file) {
-  constexpr std::uintmax_t bytes_max = 64 * bytes_per_MB;  // a body of many faces
-  std::string bytes = read_text_file(file, bytes_max);
+  std::string bytes = read_text_file(file, HttpSettings::body_bytes_max);
   std::string gzip = gzipped(bytes);
   files_[path] = {type_of(file), std::move(bytes), std::move(gzip)};
 }

@@ -7,25 +7,16 @@
 #include <memory>
 #include <openssl/crypto.h>
 #include <openssl/evp.h>
-#include <sstream>
 #include <stdexcept>
-#include <vector>
 
 #include <sys/random.h>
 
-#include "config/text/problems.hpp"
-#include "config/toml/toml_reader.hpp"
+#include "gateway/settings/secret_files.hpp"
 
 namespace thermocomp::gateway {
 namespace {
 
 constexpr std::size_t password_bytes_max = 256;
-
-bool is_user_name(const std::string& name) {
-  return !name.empty() && name.size() <= 64 && std::all_of(name.begin(), name.end(), [](char c) {
-    return c > ' ' && c < 127 && c != ':' && c != '#';
-  });
-}
 
 std::string random_bytes(std::size_t count) {
   std::string bytes(count, '\0');
@@ -43,25 +34,8 @@ std::string crypted(const std::string& password, const std::string& setting) {
 
 }  // namespace
 
-PasswordFile::PasswordFile(const std::filesystem::path& file) : key_(random_bytes(32)) {
-  std::vector<Problem> problems;
-  std::istringstream lines(read_text_file(file));
-  std::string line;
-  for (int number = 1; std::getline(lines, line); ++number) {
-    if (line.empty() || line.front() == '#') continue;
-    const std::size_t colon = line.find(':');
-    const std::string user = line.substr(0, colon);
-    const std::string hash = colon == std::string::npos ? "" : line.substr(colon + 1);
-    if (!is_user_name(user) || crypt_checksalt(hash.c_str()) != CRYPT_SALT_OK)
-      problems.push_back({file.string(), number, user, "",
-                          "must be user:hash as thermocomp-gateway --password-line prints it"});
-    else if (!hashes_.emplace(user, hash).second)
-      problems.push_back({file.string(), number, user, "", "is there twice"});
-  }
-  if (problems.empty() && hashes_.empty())
-    problems.push_back({file.string(), 0, "", "", "must have at least one line user:hash"});
-  if (!problems.empty()) throw ConfigurationError(problems);
-}
+PasswordFile::PasswordFile(const std::filesystem::path& file)
+    : hashes_(read_passwords(file)), key_(random_bytes(32)) {}
 
 std::string PasswordFile::digest(const std::string& user, const std::string& password) const {
   const std::string text = key_ + user + '\n' + password;

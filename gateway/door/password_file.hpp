@@ -13,8 +13,7 @@ class PasswordFile {
   using Clock = std::chrono::steady_clock;
   enum class Answer { right, wrong, too_many };
 
-  /// Lines `user:hash`; empty ones and those that begin with # are passed over.
-  /// @throws ConfigurationError naming file, line and rule
+  /// @throws ConfigurationError as read_passwords()
   explicit PasswordFile(const std::filesystem::path& file);
 
   /// A hash takes some hundredths of a second, on purpose. So what was right is remembered (as a

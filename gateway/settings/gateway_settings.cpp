@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "config/toml/toml_reader.hpp"
+#include "gateway/settings/secret_files.hpp"
 
 namespace thermocomp::gateway {
 namespace {
@@ -38,13 +39,44 @@ fs::path path_in(const TomlTable& table, std::string_view key, const fs::path& f
   return named.is_absolute() ? named : (folder / named).lexically_normal();
 }
 
-/// The same for a file that must be there; its secrets are not looked at here.
-fs::path existing_in(const TomlTable& table, std::string_view key, const fs::path& folder) {
+using ReadFile = void (*)(const fs::path&);
+
+void read_text(const fs::path& file) {
+  static_cast<void>(read_text_file(file));
+}
+
+/// The same for a file that must be there, and that `read` takes: the start would fail otherwise.
+fs::path existing_in(const TomlTable& table, std::string_view key, const fs::path& folder,
+                     ReadFile read) {
   fs::path named = path_in(table, key, folder);
   std::error_code ignored;
-  if (!named.empty() && !fs::is_regular_file(named, ignored))
+  if (named.empty()) return named;
+  if (!fs::is_regular_file(named, ignored)) {
     table.problem(key, "must name a file that exists");
+    return named;
+  }
+  try {
+    read(named);
+  } catch (const ConfigurationError& error) {
+    for (const Problem& problem : error.problems()) table.problem(key, to_string(problem));
+  }
   return named;
+}
+
+/// Reads `certificate` and `key`. Both or neither.
+void read_pair(const TomlTable& table, const fs::path& folder, fs::path& certificate,
+               fs::path& key) {
+  certificate = existing_in(table, "certificate", folder, &read_certificate);
+  key = existing_in(table, "key", folder, &read_key);
+  if (certificate.empty() != key.empty())
+    table.problem(key.empty() ? "key" : "certificate",
+                  "certificate and key must be given together");
+  try {
+    if (!certificate.empty() && !key.empty() && !fit_each_other(certificate, key))
+      table.problem("key", "must be the key of the certificate");
+  } catch (const ConfigurationError&) {
+    // Said above, of the file.
+  }
 }
 
 std::string address_in(const TomlTable& table, const std::string& otherwise) {
@@ -82,9 +114,6 @@ class SettingsReader {
   [[nodiscard]] fs::path path(const TomlTable& table, std::string_view key) const {
     return path_in(table, key, folder_);
   }
-  [[nodiscard]] fs::path existing(const TomlTable& table, std::string_view key) const {
-    return existing_in(table, key, folder_);
-  }
 
   void read_daemon(const TomlTable& table, GatewaySettings& settings) const {
     if (const fs::path socket = path(table, "socket"); !socket.empty()) settings.socket = socket;
@@ -115,22 +144,18 @@ class SettingsReader {
     if (!table) return mqtt;
     mqtt.enabled = table.flag("enabled", true);
     mqtt.host = table.text("host");
-    mqtt.authority = existing(table, "authority");
+    mqtt.authority = existing_in(table, "authority", folder_, &read_certificate);
     mqtt.port =
         table.integer<std::uint16_t>("port", 1, 65535, mqtt.authority.empty() ? 1883 : 8883);
     mqtt.client_id = table.text("client_id", "");
     mqtt.user = table.text("user", "");
-    mqtt.password_file = existing(table, "password_file");
-    mqtt.certificate = existing(table, "certificate");
-    mqtt.key = existing(table, "key");
+    mqtt.password_file = existing_in(table, "password_file", folder_, &read_text);
+    read_pair(table, folder_, mqtt.certificate, mqtt.key);
     mqtt.period_s = table.number("period_s", Range::between(0.5, 60), mqtt.period_s);
     mqtt.buffer_messages =
         table.integer<std::size_t>("buffer_messages", 100, 100000, mqtt.buffer_messages);
     if (!mqtt.password_file.empty() && mqtt.user.empty())
       table.problem("password_file", "needs user");
-    if (mqtt.certificate.empty() != mqtt.key.empty())
-      table.problem(mqtt.key.empty() ? "key" : "certificate",
-                    "certificate and key must be given together");
     if (!mqtt.certificate.empty() && mqtt.authority.empty())
       table.problem("certificate", "needs authority, which says that TLS is used");
     return mqtt;
@@ -169,7 +194,10 @@ class SettingsReader {
   fs::path folder_;
 };
 
-GatewaySettings read_document(const TomlDocument& document, const fs::path& file) {
+}  // namespace
+
+GatewaySettings load_gateway_settings(const fs::path& file) {
+  const TomlDocument document = TomlDocument::from_file(file);
   GatewaySettings settings;
   settings.file = file;
   const TomlTable root = document.root();
@@ -178,8 +206,6 @@ GatewaySettings read_document(const TomlDocument& document, const fs::path& file
   if (settings.mqtt.client_id.empty()) settings.mqtt.client_id = "thermocomp-" + settings.machine;
   return settings;
 }
-
-}  // namespace
 
 bool is_loopback(const std::string& address) {
   in_addr four{};
@@ -194,15 +220,15 @@ HttpSettings read_http(const TomlTable& table, const fs::path& folder) {
   http.address = address_in(table, http.address);
   http.port = table.integer<std::uint16_t>("port", 0, 65535, http.port);
   http.names = table.texts("names", {});
-  http.certificate = existing_in(table, "certificate", folder);
-  http.key = existing_in(table, "key", folder);
-  http.passwords = existing_in(table, "passwords", folder);
-  http.body = existing_in(table, "body", folder);
+  read_pair(table, folder, http.certificate, http.key);
+  http.passwords = existing_in(table, "passwords", folder, [](const fs::path& file) {
+    static_cast<void>(read_passwords(file));
+  });
+  http.body = existing_in(table, "body", folder, [](const fs::path& file) {
+    static_cast<void>(read_text_file(file, HttpSettings::body_bytes_max));
+  });
   http.report = path_in(table, "report", folder);  // made on a Monday
   http.connections_max = table.integer<unsigned>("connections_max", 4, 2000, http.connections_max);
-  if (http.certificate.empty() != http.key.empty())
-    table.problem(http.key.empty() ? "key" : "certificate",
-                  "certificate and key must be given together");
   if (!http.passwords.empty() && !http.has_tls())
     table.problem("passwords",
                   "needs certificate and key: passwords never go over the network "
@@ -213,14 +239,6 @@ HttpSettings read_http(const TomlTable& table, const fs::path& folder) {
                   "other computers reach this one: needs certificate, key and "
                   "passwords");
   return http;
-}
-
-GatewaySettings load_gateway_settings(const fs::path& file) {
-  return read_document(TomlDocument::from_file(file), file);
-}
-
-GatewaySettings parse_gateway_settings(std::string text, const std::string& name) {
-  return read_document(TomlDocument::from_text(std::move(text), name), name);
 }
 
 bool is_gateway_file(const fs::path& file) {

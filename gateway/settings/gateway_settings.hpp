@@ -13,6 +13,7 @@
 namespace thermocomp::gateway {
 
 struct HttpSettings {
+  static constexpr std::uintmax_t body_bytes_max = 64 * bytes_per_MB;  ///< of many faces
   bool enabled{true};
   std::string address{"127.0.0.1"};
   std::uint16_t port{8420};           ///< 0: any that is free
@@ -80,10 +81,9 @@ struct GatewaySettings {
   AlarmSettings alarm;
 };
 
+/// Looks into the files it names too.
 /// @throws ConfigurationError with every problem: file, line, key, value, rule
 [[nodiscard]] GatewaySettings load_gateway_settings(const std::filesystem::path& file);
-/// @param name  stands for the file, and its folder for paths that do not begin with a slash
-[[nodiscard]] GatewaySettings parse_gateway_settings(std::string text, const std::string& name);
 
 /// A table [http], of any program that serves a page.
 /// @param folder  of the file, for paths that do not begin with a slash

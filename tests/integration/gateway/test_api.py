@@ -8,7 +8,7 @@ import subprocess
 import time
 
 
-from gateway_lab import Gateway
+from gateway_lab import Gateway, make_certificate, password_line
 from lab import eventually, run_tool
 
 
@@ -172,6 +172,37 @@ def test_check_knows_the_configuration(lab, machine, gateway):
         started = subprocess.run([str(gateway.process.args[0]), str(wrong)], capture_output=True,
                                  text=True, timeout=60)
         assert started.returncode == 2 and said in started.stderr
+
+
+def test_check_refuses_the_files_that_the_start_refuses(lab, machine, gateway):
+    certificate, key = make_certificate(lab.folder)
+    _, other_key = make_certificate(lab.folder, "other")
+    passwords, empty, words = (lab.folder / name for name in ("passwords", "empty", "words"))
+    passwords.write_text(password_line("maria", "long and secret"))
+    empty.write_text("# nobody yet\n")
+    words.write_text("maria:secret\n")
+    right = {"certificate": certificate, "key": key, "passwords": passwords}
+    text = gateway.config.read_text()
+
+    def answers(files, more=""):
+        changed = lab.folder / "changed.toml"
+        changed.write_text(text.replace("[http]\n", "[http]\n" + "".join(
+            f'{name} = "{file}"\n' for name, file in files.items()), 1) + more)
+        return run_tool("check", changed), changed
+
+    assert answers(right)[0][0] == 0
+    for wrong, said in (({"passwords": empty}, f"{empty}: must have at least one line user:hash"),
+                        ({"passwords": words}, f"{words}:1: maria: must be user:hash"),
+                        ({"certificate": words}, f"{words}: must be a certificate in PEM"),
+                        ({"key": certificate}, f"{certificate}: must be a private key in PEM"),
+                        ({"key": other_key}, "must be the key of the certificate")):
+        (status, _, err), changed = answers(right | wrong)
+        assert status == 2 and said in err and f"http.{next(iter(wrong))} = " in err, (wrong, err)
+        started = subprocess.run([str(gateway.process.args[0]), str(changed)], capture_output=True,
+                                 text=True, timeout=60)
+        assert started.returncode == 2 and said in started.stderr, (wrong, started.stderr)
+    (status, _, err), _ = answers(right, f'[mqtt]\nhost = "broker"\nauthority = "{words}"\n')
+    assert status == 2 and f"{words}: must be a certificate in PEM" in err, err
 
 
 def test_the_example_is_complete_and_right(lab):
