@@ -3,7 +3,7 @@
 
     scripts/check_includes.py            cycles, and whether the table is current; exit status 1 if there
                                          is a cycle or it is not
-    scripts/check_includes.py --write    renews the floors in docs/ARCHITECTURE.md
+    scripts/check_includes.py --write    renews the floors in scripts/floors.md
     scripts/check_includes.py --sizes    the largest folders and files
 
 A unit is a header and its source (`screening.hpp` and `screening.cpp`). A cycle is a set of units,
@@ -18,7 +18,6 @@ import sys
 CODE = ("estimator", "drivers", "config", "status", "report", "daemon", "simulator", "cli", "gateway",
         "fleet", "linuxcnc", "modelling", "docs", "bench", "tests")
 DRAWN = CODE[:12]  # installed code
-BEGIN, END = "<!-- floors: begin (scripts/check_includes.py --write) -->", "<!-- floors: end -->"
 INCLUDE = re.compile(r'^\s*#\s*include\s*"([^"]+)"', re.MULTILINE)
 
 
@@ -119,17 +118,6 @@ def drawing(includes):
     return "\n".join(lines)
 
 
-def parts_of(path):
-    """The document before the table, the table, and the document after it."""
-    with open(path, encoding="utf-8") as text:
-        document = text.read()
-    if document.count(BEGIN) != 1 or document.count(END) != 1:
-        sys.exit(f"check_includes: {path} must have each of these lines once: {BEGIN} {END}")
-    before, rest = document.split(BEGIN)
-    drawn, after = rest.split(END)
-    return before, drawn.strip("\n"), after
-
-
 def print_sizes(root, includes):
     folders = collections.Counter(os.path.dirname(path) for path in includes)
     lines = {}
@@ -153,20 +141,21 @@ def main():
         print_sizes(options.root, includes)
         return 0
 
-    document = os.path.join(options.root, "docs", "ARCHITECTURE.md")
-    before, drawn, after = parts_of(document)
-    now = drawing(includes)
+    document = os.path.join(options.root, "scripts", "floors.md")
+    now = drawing(includes) + "\n"
     if options.write:
         with open(document, "w", encoding="utf-8") as text:
-            text.write(f"{before}{BEGIN}\n{now}\n{END}{after}")
+            text.write(now)
         return 0
+    with open(document, encoding="utf-8") as text:
+        drawn = text.read()
 
     units = graph_of(includes, lambda path: os.path.splitext(path)[0])
     folders = graph_of(includes, os.path.dirname)
     wrong = check("unit", units) + check("folder", folders)
     if now != drawn:
         wrong += 1
-        print("check_includes: the floors in docs/ARCHITECTURE.md are not those of the tree: "
+        print("check_includes: the floors in scripts/floors.md are not those of the tree: "
               "scripts/check_includes.py --write")
     print(f"check_includes: {len(includes)} files, {len(folders)} folders, {wrong} wrong")
     return 1 if wrong else 0

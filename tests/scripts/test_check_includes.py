@@ -5,7 +5,6 @@ import subprocess
 import pytest
 
 PROGRAM = os.path.join(os.path.dirname(__file__), "..", "..", "scripts", "check_includes.py")
-MARKS = "<!-- floors: begin (scripts/check_includes.py --write) -->\n<!-- floors: end -->\n"
 
 
 def run(root, *options):
@@ -26,8 +25,6 @@ def tree(tmp_path):
     write(tmp_path, "drivers/link.hpp", "estimator/types.hpp")
     write(tmp_path, "drivers/link.cpp", "drivers/link.hpp")
     write(tmp_path, "daemon/cycle.cpp", "drivers/link.hpp")
-    (tmp_path / "docs").mkdir()
-    (tmp_path / "docs" / "ARCHITECTURE.md").write_text(f"before\n{MARKS}after\n", encoding="utf-8")
     (tmp_path / "scripts").mkdir()
     assert run(tmp_path, "--write").returncode == 0
     return tmp_path
@@ -39,9 +36,8 @@ def test_a_tree_that_reads_downwards_passes(tree):
     assert "4 files, 3 folders, 0 wrong" in result.stdout
 
 
-def test_the_floors_are_drawn_highest_first_and_the_rest_of_the_document_stays(tree):
-    text = (tree / "docs" / "ARCHITECTURE.md").read_text(encoding="utf-8")
-    assert text.startswith("before\n") and text.endswith("after\n")
+def test_the_floors_are_drawn_highest_first(tree):
+    text = (tree / "scripts" / "floors.md").read_text(encoding="utf-8")
     rows = [line for line in text.splitlines() if line.startswith("| ") and "`" in line]
     assert rows == ["| 3 | `daemon` |", "| 2 | `drivers` |", "| 1 | `estimator` |"]
 
@@ -85,4 +81,4 @@ def test_a_drawing_that_is_not_current_is_found(tree):
     write(tree, "config/units.hpp", "estimator/types.hpp")
     result = run(tree)
     assert result.returncode == 1
-    assert "the floors in docs/ARCHITECTURE.md are not those of the tree" in result.stdout
+    assert "the floors in scripts/floors.md are not those of the tree" in result.stdout

@@ -64,10 +64,15 @@ def test_check_says_when_a_first_start_compensates_at_once(tmp_path):
         "check", "dry.toml", cwd=tmp_path).stdout
 
 
-def test_the_page_on_the_controllers_side_shows_what_the_command_prints():
+def test_the_function_block_has_the_registers_that_the_command_prints():
     answer = run("check", "--registers", EXAMPLES / "small_machine.toml")
     assert answer.returncode == 0, answer.stderr
-    assert answer.stdout in (SOURCE / "docs" / "controllers" / "plc.md").read_text()
+    block = (EXAMPLES / "thermal_offset.st").read_text()
+    for printed, read in (("  holding 4..5  int32 ABCD  offset of axis z  ", "holding 4, 5: int32, word order ABCD"),
+                          ("  holding 10    uint16      valid bits; bit 0: x, bit 1: y, bit 2: z", "holding 10; axis z is bit 2"),
+                          ("  holding 11    uint16      heartbeat", "holding 11 "),
+                          ("  input 4..5        int32 ABCD  applied offset of axis z", "input 4, 5: what is added")):
+        assert printed in answer.stdout and read in block, (printed, answer.stdout)
     assert "frame 0x200" in run("check", "--registers", EXAMPLES / "can.toml").stdout
 
 
