@@ -366,7 +366,7 @@ std::vector<SensorWeek> sensors_of(const ThinnedHistory& course) {
       if (!(alike > best)) continue;
       best = alike;
       sensor.neighbour = other.name.substr(0, other.name.size() - 5);
-      constexpr double day_s = 86400.0;  // a daily course must be told from a drift
+      constexpr double day_s = 86400.0;  // a daily course must be separated from a drift
       if (course.time_s.back() - course.time_s.front() < day_s) continue;
       const Line drift = drift_of(course.time_s, column.values, other.values);
       sensor.drift_K = drift.slope;

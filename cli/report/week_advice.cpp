@@ -13,13 +13,13 @@
 namespace thermocomp::cli {
 namespace {
 
-constexpr double drift_told_K = 0.5;
-constexpr double drift_told_sd = 4.0;
-constexpr double outage_told_s = 60.0;
-constexpr double bound_told_share = 0.01;
+constexpr double drift_listed_K = 0.5;
+constexpr double drift_listed_sd = 4.0;
+constexpr double outage_listed_s = 60.0;
+constexpr double bound_listed_share = 0.01;
 /// A model that leaves more of what it takes out than this at the tool is worth looking at.
-constexpr double left_told_share = 0.3;
-constexpr double left_told_um = 2.0;
+constexpr double left_listed_share = 0.3;
+constexpr double left_listed_um = 2.0;
 
 /// Of dry runs and of the rest alike: by both the model is judged.
 double rms_left_um(const MachineWeek& week, const std::string& axis, double& claimed_um,
@@ -38,8 +38,8 @@ double rms_left_um(const MachineWeek& week, const std::string& axis, double& cla
   return std::sqrt(squares / n);
 }
 
-bool is_told(const Outages::Kind& kind) {
-  return kind.lasted_s >= outage_told_s || kind.lasts || kind.count >= 5;
+bool is_listed(const Outages::Kind& kind) {
+  return kind.lasted_s >= outage_listed_s || kind.lasts || kind.count >= 5;
 }
 
 /// "2 times, 54 min 0 s in all, and still."
@@ -57,15 +57,15 @@ std::string what_to_do(const CodeText& text) {
   return text.remedy.empty() ? "" : " Do: " + with_command(text.remedy, text.command) + ".";
 }
 
-bool any_told(const MachineWeek& week, SubjectKind subject) {
+bool any_listed(const MachineWeek& week, SubjectKind subject) {
   return std::any_of(week.outages.begin(), week.outages.end(), [subject](const Outages& outages) {
     return outages.subject.kind == subject &&
-           is_told({outages.count, outages.lasted_s, outages.lasts});
+           is_listed({outages.count, outages.lasted_s, outages.lasts});
   });
 }
 
 /// Lines of sensors, axes and the controller say more.
-bool is_told_by_its_cause(const MachineWeek& week, Reason reason) {
+bool is_listed_by_its_cause(const MachineWeek& week, Reason reason) {
   switch (reason) {
     case Reason::sensor_suspected:
     case Reason::at_bound:
@@ -73,10 +73,10 @@ bool is_told_by_its_cause(const MachineWeek& week, Reason reason) {
     case Reason::block_lost:
     case Reason::block_estimated:
     case Reason::sensor_unconfirmed:
-      return any_told(week, SubjectKind::sensor);
+      return any_listed(week, SubjectKind::sensor);
     case Reason::controller_offline:
     case Reason::not_written:
-      return any_told(week, SubjectKind::controller);
+      return any_listed(week, SubjectKind::controller);
     default:
       return false;
   }
@@ -86,10 +86,10 @@ void add_reasons(const MachineWeek& week, std::vector<std::string>& lines) {
   for (const Outages& outages : week.outages) {
     const auto reason = reason_named(outages.last.code);
     if (outages.subject.kind != SubjectKind::reason || !reason) continue;
-    if (is_told_by_its_cause(week, *reason)) continue;
+    if (is_listed_by_its_cause(week, *reason)) continue;
     const Outages::Kind all{outages.count, outages.lasted_s, outages.lasts};
     const CodeText text = code_text(*reason);
-    if (is_told(all))
+    if (is_listed(all))
       lines.push_back(as_a_sentence(std::string(text.meaning)) + ", " + how_often(all) +
                       what_to_do(text));
   }
@@ -101,7 +101,7 @@ void add_devices(const MachineWeek& week, std::initializer_list<SubjectKind> kin
   for (const Outages& outages : week.outages) {
     if (std::find(kinds.begin(), kinds.end(), outages.subject.kind) == kinds.end()) continue;
     const Outages::Kind all{outages.count, outages.lasted_s, outages.lasts};
-    if (is_told(all))
+    if (is_listed(all))
       lines.push_back(as_a_sentence(subject_text(outages.subject)) + ": " +
                       what_text(outages.last) + ", " + how_often(all) +
                       " Look at its cable, its supply and its address.");
@@ -119,11 +119,11 @@ void add_sensor_faults(const MachineWeek& week, std::vector<std::string>& lines)
   for (const Outages& outages : week.outages) {
     if (outages.subject.kind != SubjectKind::sensor) continue;
     for (const auto& [code, kind] : outages.kinds) {
-      if (!is_told(kind)) continue;
+      if (!is_listed(kind)) continue;
       const auto alike = [&code = code, &kind = kind](const Group& group) {
         return group.code == code && group.kind.count == kind.count &&
                group.kind.lasts == kind.lasts &&
-               std::abs(group.kind.lasted_s - kind.lasted_s) < outage_told_s;
+               std::abs(group.kind.lasted_s - kind.lasted_s) < outage_listed_s;
       };
       auto group = std::find_if(groups.begin(), groups.end(), alike);
       if (group == groups.end()) group = groups.insert(group, {code, kind, {}});
@@ -162,8 +162,8 @@ bool is_suspected(const MachineWeek& week, const std::string& sensor) {
 
 void add_sensors(const MachineWeek& week, std::vector<std::string>& lines) {
   for (const SensorWeek& sensor : week.sensors) {
-    if (!(std::abs(sensor.drift_K) > drift_told_K &&
-          std::abs(sensor.drift_K) > drift_told_sd * sensor.drift_sd_K))
+    if (!(std::abs(sensor.drift_K) > drift_listed_K &&
+          std::abs(sensor.drift_K) > drift_listed_sd * sensor.drift_sd_K))
       continue;
     // Said already, and more exactly.
     if (is_suspected(week, sensor.name) || is_suspected(week, sensor.neighbour)) continue;
@@ -177,7 +177,7 @@ void add_sensors(const MachineWeek& week, std::vector<std::string>& lines) {
 void add_axes(const MachineWeek& week, std::vector<std::string>& lines) {
   for (const AxisWeek& axis : week.axes) {
     const std::string unit = axis.unit == "urad" ? " µrad" : " µm";
-    if (axis.sent.at_bound_share > bound_told_share)
+    if (axis.sent.at_bound_share > bound_listed_share)
       lines.push_back("Axis " + axis.name + " stood at its bound of " + figure_text(axis.bound_um) +
                       unit + " for " + figure_text(100.0 * axis.sent.at_bound_share) +
                       " % of the time: what lies beyond is not taken out. Find out why it is so "
@@ -185,10 +185,10 @@ void add_axes(const MachineWeek& week, std::vector<std::string>& lines) {
     double claimed_um = 0.0;
     std::size_t count = 0;
     const double left_um = rms_left_um(week, axis.name, claimed_um, count);
-    if (count > 0 && left_um > left_told_um && left_um > left_told_share * claimed_um)
+    if (count > 0 && left_um > left_listed_um && left_um > left_listed_share * claimed_um)
       lines.push_back("Probings of " + axis.name + " found " + figure_text(left_um) + unit +
                       " left (RMS of " + std::to_string(count) +
-                      "): export the week and let thermocomp diagnose say what the model lacks.");
+                      "): export the week and let thermocomp diagnose name what the model lacks.");
   }
 }
 
@@ -210,8 +210,8 @@ std::vector<std::string> advice(const MachineWeek& week) {
         "with measured displacement, then switch it on.");
   else if (week.probings.empty() && week.mode_s("compensating") > 0.0)
     lines.emplace_back(
-        "Nobody probed the tool in this time, so nothing says what is left at it: "
-        "measure once warm and tell it, thermocomp measured AXIS UM.");
+        "Nobody probed the tool in this time, so the error left at it is not known: "
+        "measure it once warm and enter it: thermocomp measured AXIS UM.");
   if (!week.damage.empty())
     lines.emplace_back("Parts of the history are damaged: thermocomp history check says which.");
   return lines;

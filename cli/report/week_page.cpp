@@ -136,7 +136,7 @@ std::string axes_part(const MachineWeek& week) {
 std::string probings_part(const MachineWeek& week) {
   std::string html = html_heading("Probings");
   if (week.probings.empty())
-    return html + html_paragraph("Nothing was probed, so nothing says what is left at the tool.");
+    return html + html_paragraph("Nothing was probed: the error left at the tool is not known.");
   std::vector<std::vector<std::string>> rows{{"when", "axis", "offset", "left at the tool"}};
   for (const ProbingWeek& probing : week.probings) {
     std::string unit = "µm";
@@ -290,8 +290,8 @@ std::string picture(const MachineWeek& week) {
     if (spell.mode != "compensating")
       spans.push_back(
           {"", spell.span.from_s - week.span.from_s, spell.span.to_s - week.span.from_s, true});
-  constexpr double days_told_s = 36.0 * 3600.0;
-  const bool by_days = week.span.length_s() > days_told_s;
+  constexpr double days_listed_s = 36.0 * 3600.0;
+  const bool by_days = week.span.length_s() > days_listed_s;
   const double mean_s = week.span.length_s() / static_cast<double>(week.course.time_s.size());
   return html_figure(
       panels_plot(since_s, all.panels, spans,
