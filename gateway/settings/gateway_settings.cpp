@@ -104,6 +104,11 @@ class SettingsReader {
     read_daemon(root_.table_or_empty("daemon"), settings);
     const TomlTable http = root_.table_or_empty("http");
     settings.http = gateway::read_http(http, folder_);
+    settings.http.enabled = http.flag("enabled", settings.http.enabled);
+    settings.http.body = existing_in(http, "body", folder_, [](const fs::path& file) {
+      static_cast<void>(read_text_file(file, HttpSettings::body_bytes_max));
+    });
+    settings.http.report = path(http, "report");  // made on a Monday
     settings.commands = read_commands(root_.table_or_empty("commands"), settings.http);
     settings.mqtt = read_mqtt(root_.table_or_empty("mqtt"));
     settings.shdr = read_shdr(root_.table_or_empty("shdr"));
@@ -216,7 +221,6 @@ bool is_loopback(const std::string& address) {
 
 HttpSettings read_http(const TomlTable& table, const fs::path& folder) {
   HttpSettings http;
-  http.enabled = table.flag("enabled", http.enabled);
   http.address = address_in(table, http.address);
   http.port = table.integer<std::uint16_t>("port", 0, 65535, http.port);
   http.names = table.texts("names", {});
@@ -224,10 +228,6 @@ HttpSettings read_http(const TomlTable& table, const fs::path& folder) {
   http.passwords = existing_in(table, "passwords", folder, [](const fs::path& file) {
     static_cast<void>(read_passwords(file));
   });
-  http.body = existing_in(table, "body", folder, [](const fs::path& file) {
-    static_cast<void>(read_text_file(file, HttpSettings::body_bytes_max));
-  });
-  http.report = path_in(table, "report", folder);  // made on a Monday
   http.connections_max = table.integer<unsigned>("connections_max", 4, 2000, http.connections_max);
   if (!http.passwords.empty() && !http.has_tls())
     table.problem("passwords",

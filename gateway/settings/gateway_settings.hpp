@@ -85,7 +85,7 @@ struct GatewaySettings {
 /// @throws ConfigurationError with every problem: file, line, key, value, rule
 [[nodiscard]] GatewaySettings load_gateway_settings(const std::filesystem::path& file);
 
-/// A table [http], of any program that serves a page.
+/// What every program that serves a page has in its table [http]: not `enabled`, `body`, `report`.
 /// @param folder  of the file, for paths that do not begin with a slash
 [[nodiscard]] HttpSettings read_http(const TomlTable& table, const std::filesystem::path& folder);
 

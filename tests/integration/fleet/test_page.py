@@ -55,6 +55,14 @@ class Page:
         assert self.process.wait(30) == 0
 
 
+def test_keys_of_the_gateways_page_are_refused(tmp_path):
+    config = tmp_path / "page.toml"
+    for key in ('body = "page.toml"', 'report = "week.html"', "enabled = false"):
+        config.write_text(f"format = 1\n[http]\nport = 0\n{key}\n")
+        done = subprocess.run([str(BIN / "thermocomp-fleet-page"), str(config)], capture_output=True, text=True, timeout=60)
+        assert done.returncode == 2 and f"{config}:4: http.{key.split()[0]}" in done.stderr, done.stderr
+
+
 @pytest.fixture(scope="module")
 def page(server, tmp_path_factory):
     from fleet_lab import Store
