@@ -196,6 +196,7 @@ DaemonActions Daemon::Parts::actions() {
       [this](const Command& asked) { return operations.command(asked); },
       [this](const auto& candidate) { return operations.reload(candidate); },
       {},
+      [this](const std::string& name) { operations.note_asked_for(name); },
       [this] {
         return json_of(EventsAnswer{{journal.events().begin(), journal.events().end()}});
       }};

@@ -53,14 +53,6 @@ bool is_done(Outcome outcome, const char* asked) {
                   asked));
 }
 
-Event command_event(std::string_view code, std::int64_t user) {
-  Event event;
-  event.kind = EventKind::command;
-  event.code = code;
-  event.user = user;
-  return event;
-}
-
 void add_recorder(CycleParts& parts, const DaemonConfig& config, HistoryWriter* history) {
   if (history != nullptr)
     parts.recorder = history->make_recorder({config.text, config.model_text, config.model_checksum},
@@ -158,7 +150,7 @@ bool Operations::is_settled(const Save& save, CommandKind kind) const {
 
 RpcPending Operations::reload(const std::optional<std::filesystem::path>& candidate) {
   begin_reload(candidate);
-  reload_->user = asking_user();
+  reload_->by = asking();
   reload_->is_asked = true;
   return [this, answer = reload_->answer,
           late = Clock::now() + CycleHandle::patience]() -> std::optional<json> {
@@ -263,7 +255,7 @@ void Operations::finish_reload() {
     candidate_ = reload_->candidate;
     set_log_level(parts_.config.log_level);
     note_reference(cycle_.estimator().persistent_state(cycle_.report()), ReferenceOrigin::reload);
-    if (parts_.journal != nullptr) parts_.journal->command(command_event("reload", reload_->user));
+    if (parts_.journal != nullptr) parts_.journal->command(command_event("reload", reload_->by));
     spdlog::info("reloaded: model {} (SHA-256 {})", parts_.config.model_file.string(),
                  parts_.config.model_checksum);
   } else {
@@ -308,20 +300,29 @@ void Operations::note_reference(const PersistentState& state, ReferenceOrigin or
 
 void Operations::note_asked(const Command& asked, const CycleHandle::Tracked& outcome) {
   std::erase_if(asked_, [](const Asked& old) { return *old.outcome == Outcome::withdrawn; });
-  asked_.push_back({asked, outcome, asking_user()});
+  asked_.push_back({asked, outcome, asking()});
 }
 
-/// User ID of the client that sent the command. @return -1: unknown
-std::int64_t Operations::take_asking(const Command& done) {
+Event Operations::command_event(std::string_view code, const Asking& by) {
+  Event event;
+  event.kind = EventKind::command;
+  event.code = code;
+  event.user = by.user;
+  event.asked_for = by.asked_for;
+  return event;
+}
+
+/// The client that sent the command.
+Operations::Asking Operations::take_asking(const Command& done) {
   const auto is_it = [&](const Asked& each) {
     return each.command.kind == done.kind && each.command.axis == done.axis &&
            each.command.value_um == done.value_um && *each.outcome != Outcome::withdrawn;
   };
   const auto found = std::find_if(asked_.begin(), asked_.end(), is_it);
-  if (found == asked_.end()) return -1;
-  const std::int64_t user = found->user;
+  if (found == asked_.end()) return {};
+  Asking by = found->by;
   asked_.erase(found);
-  return user;
+  return by;
 }
 
 void Operations::save_state(bool at_once) {

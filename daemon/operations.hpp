@@ -44,6 +44,8 @@ class Operations {
   Operations(const Operations&) = delete;
   Operations& operator=(const Operations&) = delete;
 
+  /// The person for whom the client gives the next command or reload.
+  void note_asked_for(const std::string& name) { asked_for_ = name; }
   /// @throws RpcError when the command cannot be queued
   [[nodiscard]] RpcPending command(const Command& asked);
   /// The pending result throws ConfigurationError, or RpcError if a restart is needed.
@@ -66,6 +68,10 @@ class Operations {
  private:
   using Clock = CycleHandle::Clock;
   struct Loaded;
+  struct Asking {
+    std::int64_t user{-1};
+    std::string asked_for{};
+  };
   /// Result of a reload, for the client that asked.
   struct ReloadAnswer {
     CycleHandle::Tracked outcome;  ///< none: the files are being read
@@ -79,7 +85,7 @@ class Operations {
     bool is_overdue_reported{false};
     std::optional<std::filesystem::path> candidate;
     bool is_asked{false};  ///< by a client, which gets the outcome
-    std::int64_t user{-1};
+    Asking by;
   };
 
   /// A command's change of the state, not yet on disk.
@@ -96,22 +102,24 @@ class Operations {
   void carried_out(const Command& done);
   void tell_saved(bool again);
   void note_reference(const PersistentState& state, ReferenceOrigin origin);
+  [[nodiscard]] static Event command_event(std::string_view code, const Asking& by);
   void note_asked(const Command& asked, const CycleHandle::Tracked& outcome);
-  [[nodiscard]] std::int64_t take_asking(const Command& done);
-  [[nodiscard]] std::int64_t asking_user() const {
-    return parts_.asking_user ? parts_.asking_user() : -1;
+  [[nodiscard]] Asking take_asking(const Command& done);
+  [[nodiscard]] Asking asking() const {
+    return {parts_.asking_user ? parts_.asking_user() : -1, asked_for_};
   }
 
   struct Asked {
     Command command;
     CycleHandle::Tracked outcome;
-    std::int64_t user{-1};
+    Asking by;
   };
   Parts parts_;
   CycleHandle cycle_;
   std::optional<Reload> reload_;
   std::optional<std::filesystem::path> candidate_;  ///< named by an operator; empty: none
   bool reload_again_{false};
+  std::string asked_for_;
   std::string reported_save_error_;
   std::uint64_t reported_serial_{0};  ///< newest state reported to the estimator as on disk
   CycleHandle::Tracked saved_notice_;

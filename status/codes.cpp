@@ -22,8 +22,10 @@ constexpr std::array<Entry<Mode>, 5> mode_table{{
     {Mode::starting, fault, "starting: waiting for the first good values", ""},
     {Mode::disabled, intended, "switched off: offsets at or on the way to zero", ""},
     {Mode::compensating, normal, "compensating", ""},
-    {Mode::holding, fault, "data lost: the offsets stand still, the machine may go on moving", ""},
-    {Mode::ramping_to_zero, fault, "data lost: offsets on the way to zero", ""},
+    {Mode::holding, fault, "data lost: offsets held",
+     "the correction is frozen and the tool may drift from here; finish no precise cut"},
+    {Mode::ramping_to_zero, fault, "data lost: offsets on the way to zero",
+     "the correction goes away; finish no precise cut"},
 }};
 constexpr CodeText dry_run_text{"dry_run", "dry run: nothing is written to the controller", "",
                                 intended};

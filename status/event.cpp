@@ -90,7 +90,8 @@ std::string user_text(const Event& event) {
   if (!(event.user >= 0 && event.user < 4294967295)) return "";
   const passwd* entry = getpwuid(static_cast<uid_t>(event.user));
   return ", by " +
-         (entry != nullptr ? std::string(entry->pw_name) : "user " + std::to_string(event.user));
+         (entry != nullptr ? std::string(entry->pw_name) : "user " + std::to_string(event.user)) +
+         (event.asked_for.empty() ? "" : " for " + event.asked_for);
 }
 
 /// To 0.1 s below a minute, for short outages.

@@ -87,10 +87,12 @@ struct Event {
   std::string detail{};  ///< text of a device, driver or signal; may be empty
   /// suspected: error of the sensor [K]; commands `measured` and `prove`: [um]; NaN: none
   double value{std::numeric_limits<double>::quiet_NaN()};
-  /// recovery: duration of the fault [s]; mode: duration of the previous one [s]; else NaN
+  /// recovery: duration of the fault [s]; mode: duration of the previous one [s]; "started", from a
+  /// history: time without a daemon before it [s]; else NaN
   double duration_s{std::numeric_limits<double>::quiet_NaN()};
   bool comes_and_goes{false};  ///< fault: intermittent, returned soon after its end
   std::int64_t user{-1};       ///< command: user ID from the kernel; -1: none, or SIGHUP
+  std::string asked_for{};     ///< command: the person that this user named; empty: none
   /// command `measured`: the candidate's score, including this probing
   std::optional<CandidateStatus> candidate{};
 };

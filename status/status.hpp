@@ -491,6 +491,7 @@ struct ReferenceStatus {
   double wall_s{not_a_number};      ///< time when it was taken, s since 1970
   bool lost{false};
   std::map<std::string, double> temps_degC{};
+  std::vector<std::string> objections{};  ///< why none should be taken now, one sentence each
 
   template <class Self, class Visitor>
   static void fields(Self& self, Visitor& visit) {
@@ -498,6 +499,7 @@ struct ReferenceStatus {
     visit("wall_s", self.wall_s);
     visit("lost", self.lost);
     visit("temps_degC", self.temps_degC);
+    visit("objections", self.objections);
   }
 };
 

@@ -103,6 +103,7 @@ json value_of(const Event& event) {
                 // Text:
                 {"subject", subject_text(event.subject)},
                 {"what", what_text(event)}};
+  if (!event.asked_for.empty()) value["for"] = event.asked_for;
   if (event.candidate) value["candidate"] = value_of(*event.candidate);
   return value;
 }
@@ -203,6 +204,7 @@ void take(const json& value, Event& event) {
   read("comes_and_goes", event.comes_and_goes);
   read("duration_s", event.duration_s);
   read("user", event.user);
+  read("for", event.asked_for);
   read("candidate", event.candidate);
 }
 template <class T>

@@ -277,17 +277,15 @@ bool is_compensating(const Status& status) {
 }
 
 Verdict verdict(const Status& status) {
-  const std::string words = std::string(code_text(status.mode, false).meaning) + ", for " +
-                            duration_text(status.mode_since_s);
+  const CodeText mode = code_text(status.mode, false);
   if (status.dry_run) {
-    const std::string does =
-        status.mode == Mode::compensating
-            ? "all is read and computed, for " + duration_text(status.mode_since_s)
-            : words;
-    return {false, true, "no: DRY RUN", "nothing is written to the controller (" + does + ")"};
+    const bool computes = status.mode == Mode::compensating;
+    return {false, true, "no: DRY RUN",
+            "nothing is written to the controller; " +
+                std::string(computes ? "all is read and computed" : mode.meaning),
+            status.mode_since_s};
   }
-  if (is_compensating(status))
-    return {true, true, "yes", "for " + duration_text(status.compensating_s)};
+  if (is_compensating(status)) return {true, true, "yes", "", status.compensating_s};
   if (status.mode == Mode::compensating) {
     const auto idle = axes_not_driven(status);
     return {false, false, "no",
@@ -295,12 +293,24 @@ Verdict verdict(const Status& status) {
             : !status.model.moves ? std::string(moves_nothing)
                                   : "the controller takes no offsets"};
   }
-  return {false, status.mode == Mode::disabled, "no", words};
+  return {false,
+          status.mode == Mode::disabled,
+          "no",
+          std::string(mode.meaning),
+          status.mode_since_s,
+          std::string(mode.remedy)};
+}
+
+std::string detail_of(const Verdict& verdict) {
+  std::string text = verdict.meaning;
+  if (text.empty() || std::isfinite(verdict.for_s))
+    text += (text.empty() ? "for " : ", for ") + duration_text(verdict.for_s);
+  return verdict.advice.empty() ? text : text + ": " + verdict.advice;
 }
 
 std::string verdict_text(const Verdict& verdict) {
-  return verdict.answer == "no" ? "no (" + verdict.detail + ")"
-                                : verdict.answer + ", " + verdict.detail;
+  return verdict.answer == "no" ? "no (" + detail_of(verdict) + ")"
+                                : verdict.answer + ", " + detail_of(verdict);
 }
 
 std::vector<std::string> why_not(const Status& status, bool strict) {

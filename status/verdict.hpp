@@ -18,9 +18,13 @@ struct Verdict {
   bool compensating{false};
   bool intended{false};  ///< not compensating on purpose: switched off, dry run
   std::string answer;    ///< "yes", "no", "no: DRY RUN"
-  std::string detail;    ///< "for 2 h 10 min", "data lost: the offsets stand still ..., for 3 s"
+  std::string meaning;   ///< "data lost: offsets held"; may be empty
+  double for_s{not_a_number};
+  std::string advice{};  ///< may be empty
 };
 [[nodiscard]] Verdict verdict(const Status& status);
+/// "for 2 h 10 min", "data lost: offsets held, for 3 s: the correction is frozen ..."
+[[nodiscard]] std::string detail_of(const Verdict& verdict);
 /// Answer and detail in one line: "yes, for 2 h 10 min", "no (data lost: ...)".
 [[nodiscard]] std::string verdict_text(const Verdict& verdict);
 

@@ -88,7 +88,15 @@ constexpr double watched_enough_s = 1800.0;
 int run_reference(const GlobalOptions& global, bool force) {
   json params = json::object();
   if (force) params["force"] = true;
-  const json answer = ask_daemon(global.socket, "reference", params);
+  json answer;
+  try {
+    answer = ask_daemon(global.socket, "reference", params);
+  } catch (const Failure& refusal) {
+    if (force || refusal.status() != exit_no) throw;
+    throw Failure(refusal.what() + std::string(". thermocomp reference --force takes it all the "
+                                               "same, unless a sensor is lost"),
+                  exit_no);
+  }
   std::cout << "reference: the present temperatures\n";
   if (const std::string although = text_of(answer, "although"); !although.empty())
     std::cout << "taken although " << although << '\n';

@@ -15,14 +15,6 @@
 
 namespace thermocomp {
 
-/// Checks whether a new reference may be taken: the machine must be thermally at rest and without
-/// an offset. Unknown quantities do not count against it.
-/// @return why not (an axis is being proved or offset, the machine warms or cools), or empty
-[[nodiscard]] std::string why_no_reference(const StatusView& view);
-
-/// Time for which all temperatures have been watched [s]; slow warming needs half an hour.
-[[nodiscard]] double watched_s(const StatusView& view);
-
 /// The daemon's functions behind the methods.
 struct DaemonActions {
   std::function<StatusView()> view;
@@ -35,6 +27,8 @@ struct DaemonActions {
   std::function<RpcPending(const std::optional<std::filesystem::path>& candidate)> reload;
   /// A bridge's report and its answer; empty if the controller is not a bridge. @throws RpcError
   std::function<nlohmann::json(const nlohmann::json&)> controller_state{};
+  /// Called before each command: the person the client gives it for; empty: not named.
+  std::function<void(const std::string&)> asked_for{};
   /// The events of this run, for `events`.
   std::function<nlohmann::json()> events{};
 };

@@ -11,92 +11,12 @@
 
 #include "config/text/problems.hpp"
 #include "daemon/methods/methods.hpp"
-#include "daemon/status/warm_up.hpp"
+#include "daemon/status/reference_rules.hpp"
 #include "estimator/estimator_config.hpp"
 #include "estimator/learning/probings.hpp"
 #include "status/status_json.hpp"
 
 namespace thermocomp {
-namespace {
-
-/// Offsets up to this count as zero (as in AxisChannel) [um].
-constexpr double at_nothing_um = 0.3;
-
-void add(std::string& why, const std::string& reason) {
-  why.append(why.empty() ? "" : "; ").append(reason);
-}
-
-/// The larger of sent offset and read-back [um]; in a dry run the offset shown by the controller.
-double in_effect_um(const StatusView& view, std::size_t i) {
-  if (view.config.dry_run) {
-    const auto& shown_um = view.controller_health.shown_um;
-    return shown_um && std::isfinite((*shown_um)[i]) ? (*shown_um)[i] : 0.0;
-  }
-  const AxisReport& axis = view.report.axes[i];
-  const bool is_read = std::isfinite(axis.applied_um);
-  return is_read && std::abs(axis.applied_um) > std::abs(axis.offset_um) ? axis.applied_um
-                                                                         : axis.offset_um;
-}
-
-std::string duration_min(double span_s) {
-  return span_s < 120.0 ? fmt::format("{:.0f} s", span_s)
-                        : fmt::format("{:.0f} min", span_s / 60.0);
-}
-
-void add_axes(const StatusView& view, std::string& why) {
-  for (std::size_t i = 0; i < view.report.axes.size(); ++i) {
-    const std::string& name = view.config.estimator.axes[i].name;
-    if (view.report.axes[i].proving) {
-      add(why, fmt::format("axis {} is being proved: wait until it has come back", name));
-      continue;
-    }
-    const double um = in_effect_um(view, i);
-    if (std::abs(um) > at_nothing_um)
-      add(why, fmt::format("axis {} has an offset of {:+.2f}: the machine does not stand as it "
-                           "would without one; `thermocomp disable`, and wait until it is zero",
-                           name, um));
-  }
-}
-
-/// Names the column that changes fastest; the others mostly follow it.
-void add_warming(const StatusView& view, std::string& why) {
-  if (view.trend == nullptr) return;
-  const auto columns = view.config.model.temperature_columns();
-  TemperatureTrend::Change fastest;
-  std::string name;
-  for (std::size_t i = 0; i < columns.size(); ++i) {
-    const auto change = view.trend->change(i, view.report.now, view.report.inputs[i].temp_degC);
-    if (!change.is_uneven()) continue;
-    if (!name.empty() && std::abs(change.rate_K_per_h) <= std::abs(fastest.rate_K_per_h)) continue;
-    fastest = change;
-    name = columns[i];
-  }
-  if (name.empty()) return;
-  add(why, fmt::format("{} changes by {:+.1f} K/h (over {}), more than {:.0f} K/h: the machine is "
-                       "{}; wait until it is even",
-                       name, fastest.rate_K_per_h, duration_min(fastest.span_s),
-                       TemperatureTrend::even_rate_K_per_h_max,
-                       fastest.rate_K_per_h > 0.0 ? "warming" : "cooling"));
-}
-
-}  // namespace
-
-std::string why_no_reference(const StatusView& view) {
-  std::string why;
-  add_axes(view, why);
-  add_warming(view, why);
-  return why;
-}
-
-double watched_s(const StatusView& view) {
-  if (view.trend == nullptr) return 0.0;
-  double shortest_s = to_seconds(TemperatureTrend::window);
-  for (std::size_t i = 0; i < view.report.inputs.size(); ++i)
-    shortest_s = std::min(
-        shortest_s, view.trend->change(i, view.report.now, view.report.inputs[i].temp_degC).span_s);
-  return shortest_s;
-}
-
 namespace {
 
 using nlohmann::json;
@@ -186,14 +106,10 @@ bool flag_in(const json& params, const char* key) {
 RpcPending take_reference(const DaemonActions& actions, const json& params) {
   const auto view = actions.view();
   const bool forced = flag_in(params, "force");
-  const auto columns = view.config.model.temperature_columns();
-  for (std::size_t i = 0; i < columns.size(); ++i)
-    refuse_unless(view.report.inputs[i].good,
-                  "no reference can be taken: " + columns[i] + " has no good sensor now");
-  const std::string why = why_no_reference(view);
-  refuse_unless(
-      why.empty() || forced,
-      "no reference is taken: " + why + ". To take it all the same: thermocomp reference --force");
+  const auto lost = fmt::to_string(fmt::join(lost_for_reference(view), "; "));
+  refuse_unless(lost.empty(), "no reference can be taken: " + lost);
+  const auto why = fmt::to_string(fmt::join(against_reference(view), "; "));
+  refuse_unless(why.empty() || forced, "no reference is taken: " + why);
   return then(actions.command({CommandKind::reference, 0, 0.0}), [why, watched = watched_s(view)] {
     return json{{"done", true}, {"watched_s", watched}, {"although", why}};
   });
@@ -382,6 +298,15 @@ RpcPending reload(const DaemonActions& actions,
   };
 }
 
+/// The person behind a client that serves many: noted beside the client's own user, which counts.
+std::string asked_for(const json& params) {
+  constexpr std::size_t bytes_max = 64;
+  if (!params.contains("for")) return {};
+  if (!params["for"].is_string() || params["for"].get_ref<const std::string&>().size() > bytes_max)
+    throw RpcError(rpc::invalid_params, "params.for must be a name of at most 64 bytes");
+  return params["for"].get<std::string>();
+}
+
 RpcPending candidate(const DaemonActions& actions, const json& params) {
   const auto file = params.find("file");
   if (file == params.end() || !file->is_string())
@@ -395,7 +320,10 @@ void add_operator_methods(StatusServer& server, const DaemonActions& actions) {
   add_reads(server, actions);
   const auto add = [&](const char* name, RpcSlowHandler handler,
                        AccessClass access = AccessClass::operate) {
-    server.add_slow_method(name, access, std::move(handler));
+    server.add_slow_method(name, access, [actions, handler](const json& params) {
+      if (actions.asked_for) actions.asked_for(asked_for(params));
+      return handler(params);
+    });
   };
   const auto simple = [&](const char* name, CommandKind kind) {
     add(name, [actions, kind](const json&) { return actions.command({kind, 0, 0.0}); });

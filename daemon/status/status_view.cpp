@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <iterator>
 #include <utility>
 
 #include <nlohmann/json.hpp>
 
+#include "daemon/status/reference_rules.hpp"
 #include "status/codes.hpp"
 
 namespace thermocomp {
@@ -280,6 +282,8 @@ bool is_of_model_file(const StatusView& view) {
 
 ReferenceStatus reference_of(const StatusView& view) {
   ReferenceStatus status;
+  status.objections = lost_for_reference(view);
+  std::ranges::move(against_reference(view), std::back_inserter(status.objections));
   status.lost = view.reference_lost;
   const auto columns = view.config.model.temperature_columns();
   for (std::size_t i = 0; i < columns.size(); ++i)

@@ -1,6 +1,7 @@
 #include "daemon/history/reading/history_reader.hpp"
 
 #include <algorithm>
+#include <map>
 #include <optional>
 #include <string>
 #include <utility>
@@ -44,6 +45,30 @@ std::string query_of_events(Database& database, const std::string& condition) {
          " ORDER BY run, number";
 }
 
+/// When each run recorded last, by the wall clock.
+std::map<std::int64_t, double> run_ends_s(Database& database) {
+  Statement rows(database, "SELECT run, max(last_wall_ns) FROM segment GROUP BY run");
+  std::map<std::int64_t, double> ends_s;
+  while (rows.step()) ends_s[rows.number(0)] = 1e-9 * static_cast<double>(rows.number(1));
+  return ends_s;
+}
+
+/// A run that was stopped ends with that event, any other one with what it recorded last.
+void note_absences(std::vector<RecordedEvent>& events, Database& database) {
+  const std::map<std::int64_t, double> ends_s = run_ends_s(database);
+  for (std::size_t i = 1; i < events.size(); ++i) {
+    RecordedEvent& event = events[i];
+    const RecordedEvent& before = events[i - 1];
+    if (event.kind != EventKind::daemon || event.code != "started" || event.run == before.run)
+      continue;
+    const auto recorded = ends_s.find(before.run);
+    const bool is_known = before.code == "stopping" || recorded != ends_s.end();
+    double end_s = before.wall_s;
+    if (recorded != ends_s.end()) end_s = std::max(end_s, recorded->second);
+    if (is_known) event.duration_s = std::max(0.0, event.wall_s - end_s);
+  }
+}
+
 }  // namespace
 
 std::vector<RecordedEvent> read_events(const std::filesystem::path& history,
@@ -63,6 +88,7 @@ std::vector<RecordedEvent> read_events(const std::filesystem::path& history,
     if (to && !is_before(since_first_s, wall_ns, *to)) continue;
     events.push_back(event_from(rows));
   }
+  note_absences(events, database);
   return events;
 }
 

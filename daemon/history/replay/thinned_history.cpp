@@ -39,13 +39,19 @@ class Means {
   std::vector<std::uint32_t> count_;
 };
 
+/// NaN: nothing is recorded.
+double begins_s(const HistoryReader& reader) {
+  constexpr double wander_s = 1.0;  // possible clock drift before the first commit
+  double first_s = not_a_number;
+  for (const SegmentInfo& segment : reader.segments())
+    first_s = std::fmin(first_s, 1e-9 * static_cast<double>(segment.wall_ns) - wander_s);
+  return first_s;
+}
+
 /// The later of `from_s` and the history's beginning, if that is before `to_s`.
 double stretch_from(const HistoryReader& reader, double from_s, double to_s) {
-  constexpr double wander_s = 1.0;  // possible clock drift before the first commit
-  double begins_s = to_s;
-  for (const SegmentInfo& segment : reader.segments())
-    begins_s = std::min(begins_s, 1e-9 * static_cast<double>(segment.wall_ns) - wander_s);
-  return begins_s < to_s ? std::max(from_s, begins_s) : from_s;
+  const double first_s = begins_s(reader);
+  return first_s < to_s ? std::max(from_s, first_s) : from_s;
 }
 
 /// Chunks of a segment within the stretch: [first, end) of their numbers.
@@ -74,6 +80,7 @@ class Thinning {
         points_(points) {
     result_.damage = reader_.damage();
     result_.from_s = from_s_;
+    result_.begins_s = begins_s(reader_);
   }
 
   ThinnedHistory run(std::uint64_t chunks_max) {

@@ -28,8 +28,9 @@ struct Probing {
 };
 
 struct ThinnedHistory {
-  double from_s{0.0};          ///< as requested, or the history's beginning
-  std::vector<double> time_s;  ///< centre of each point's interval, wall clock since 1970
+  double from_s{0.0};             ///< as requested, or the history's beginning
+  double begins_s{not_a_number};  ///< the history's beginning
+  std::vector<double> time_s;     ///< centre of each point's interval, wall clock since 1970
   std::vector<ThinnedColumn> columns;
   std::vector<Probing> probings;      ///< in the stretch, and of each axis the last one before it
   std::vector<RecordedEvent> events;  ///< in the stretch and the day before, oldest first

@@ -164,6 +164,26 @@ TEST_CASE("the next commit writes events, by run, and keeps the newest", "[histo
   CHECK(read_events(config.file, HistoryTime{{}, 1'290'000'000'000}).size() == 11);
 }
 
+TEST_CASE("a start is told from when on no daemon had run", "[history][events]") {
+  const TempFolder folder;
+  const HistoryConfig config = history_config(folder / "h.db");
+  const auto run = [&](double began_s, std::optional<double> stopped_s) {
+    HistoryWriter writer(config, {std::chrono::hours(7), std::chrono::milliseconds(10)}, "test");
+    writer.start();
+    writer.note({.number = 1, .wall_s = began_s, .code = "started"});
+    if (stopped_s) writer.note({.number = 2, .wall_s = *stopped_s, .code = "stopping"});
+    writer.stop();
+  };
+  run(1000.0, 1100.0);
+  run(1160.0, std::nullopt);
+  run(1300.0, std::nullopt);
+  const std::vector<RecordedEvent> read = read_events(config.file);
+  REQUIRE(read.size() == 4);
+  CHECK(std::isnan(read[0].duration_s));
+  CHECK(read[2].duration_s == 60.0);
+  CHECK(std::isnan(read[3].duration_s));  // a run without records that was not stopped
+}
+
 TEST_CASE("times are seconds or wall times, and anything else is refused", "[history][export]") {
   CHECK(*parse_history_time("12.5").seconds == 12.5);
   CHECK(*parse_history_time("1970-01-02T00:00:00Z").wall_ns == 86'400'000'000'000);

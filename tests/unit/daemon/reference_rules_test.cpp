@@ -1,8 +1,10 @@
 // Conditions for taking a reference.
+#include "daemon/status/reference_rules.hpp"
+
 #include <catch2/catch.hpp>
 
-#include "daemon/methods/methods.hpp"
 #include "estimator/checks.hpp"
+#include "status/figures.hpp"
 
 using namespace thermocomp;
 using namespace std::chrono_literals;
@@ -46,7 +48,7 @@ struct Machine {
     all.trend = &trend;
     return all;
   }
-  [[nodiscard]] std::string why() const { return why_no_reference(view()); }
+  [[nodiscard]] std::string why() const { return joined(against_reference(view())); }
 
   DaemonConfig config;
   Report report;
@@ -84,12 +86,31 @@ TEST_CASE("a reference is refused with an offset, sent or applied", "[reference]
   axis.applied_um = -0.25;
   CHECK(machine.why().empty());
   axis.offset_um = -6.0;
-  CHECK_THAT(machine.why(), Contains("axis z has an offset of -6.00") && Contains("disable"));
+  CHECK_THAT(machine.why(), Contains("axis z has an offset of -6.00: switch the compensation off"));
   axis.offset_um = 0.0;
   axis.applied_um = 2.0;
   CHECK_THAT(machine.why(), Contains("axis z has an offset of +2.00"));
   axis.applied_um = not_a_number;  // no read-back
   CHECK(machine.why().empty());
+}
+
+TEST_CASE("of many offsets the largest is named", "[reference]") {
+  Machine machine;
+  machine.config.estimator.axes = {{"x", "x_um", 1.0, {}}, {"z", "z_um", 1.0, {}}};
+  machine.report.axes.resize(2);
+  machine.report.axes[0].offset_um = 2.0;
+  machine.report.axes[1].offset_um = -6.0;
+  CHECK_THAT(machine.why(), Contains("axis z has an offset of -6.00 (the largest of 2 axes)"));
+}
+
+TEST_CASE("no reference while cutting, nor without a sensor", "[reference]") {
+  Machine machine;
+  machine.report.reasons = static_cast<std::uint32_t>(Reason::cutting);
+  CHECK_THAT(machine.why(), Contains("cutting"));
+  CHECK(lost_for_reference(machine.view()).empty());
+  machine.report.inputs[1].good = false;
+  CHECK(lost_for_reference(machine.view()) ==
+        std::vector<std::string>{"spindle_degC has no good sensor now"});
 }
 
 TEST_CASE("in a dry run only the controller's own offset counts", "[reference]") {
@@ -156,5 +177,5 @@ TEST_CASE("unknown quantities do not prevent a reference", "[reference]") {
   CHECK(std::isnan(machine.trend.change(0, machine.now, 20.0).rate_K_per_h));
   StatusView nobody = machine.view();
   nobody.trend = nullptr;
-  CHECK(why_no_reference(nobody).empty());
+  CHECK(against_reference(nobody).empty());
 }

@@ -38,6 +38,8 @@ TEST_CASE("each kind of event has its text", "[status][events]") {
   CHECK(event_text(command) == "measured z 3 um");
   command.user = 0;
   CHECK(event_text(command) == "measured z 3 um, by root");
+  command.asked_for = "maria";
+  CHECK(event_text(command) == "measured z 3 um, by root for maria");
   CHECK(event_text({.kind = EventKind::fault,
                     .subject = {SubjectKind::reason, "controller_offline"},
                     .code = "controller_offline"}) == "the controller cannot be read");

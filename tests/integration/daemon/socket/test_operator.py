@@ -130,12 +130,26 @@ def test_a_new_reference_makes_the_present_state_the_straight_one(machine):
     assert_slewed(machine.controller.orders())
 
 
+def test_a_command_is_noted_with_whom_it_is_for(machine):
+    daemon = machine.start()
+    daemon.call("disable", **{"for": "maria"})
+    daemon.call("enable")
+    events = [each for each in daemon.call("events")["events"] if each["kind"] == "command"]
+    assert [each.get("for") for each in events] == ["maria", None]
+    assert " for maria\n" in daemon.cli("events")[1]
+    for name in ("m" * 65, 7):
+        with pytest.raises(Refused, match="params.for must be a name"):
+            daemon.call("disable", **{"for": name})
+    assert daemon.status()["enabled"]
+
+
 def test_a_reference_is_refused_without_good_sensors(machine):
     daemon = machine.start()
     machine.module.stop()
     daemon.wait_for_mode("holding")
     status, _, said = daemon.cli("reference")
     assert status == 1 and "column_degC" in said
+    assert "column_degC has no good sensor now" in daemon.status()["reference"]["objections"]
 
 
 def test_the_switch_at_the_controller_works_without_a_terminal(machine):
