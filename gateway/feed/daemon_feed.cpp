@@ -1,5 +1,6 @@
 #include "gateway/feed/daemon_feed.hpp"
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -12,7 +13,9 @@
 #include <nlohmann/json.hpp>
 #include <spdlog/spdlog.h>
 
+#include "daemon/history/reading/history_reader.hpp"
 #include "daemon/socket/status_client.hpp"
+#include "daemon/threads/side_thread.hpp"
 #include "gateway/feed/snapshot.hpp"
 #include "status/status_json.hpp"
 
@@ -26,6 +29,7 @@ constexpr double period_s = 0.5;
 constexpr std::chrono::milliseconds silence_max(1500);
 constexpr std::chrono::seconds events_every(5);
 constexpr std::size_t events_max = 200;
+constexpr double earlier_s = 7.0 * 86400.0;
 constexpr std::chrono::seconds again_after(1);
 
 double wall_s() {
@@ -62,6 +66,8 @@ struct DaemonFeed::Parts {
   void follow();
   void take_sensors(StatusClient& client);
   void renew_slow_answers(StatusClient& client);
+  void renew_events(StatusClient& client);
+  void take_earlier_events(const Event& own);
   void publish();
   void be_away(const std::string& why);
   /// @return false when the gateway stops
@@ -82,6 +88,12 @@ struct DaemonFeed::Parts {
   TrendWatch trends;
   bool has_status{false};
   std::string model_checksum;  ///< of `next.model`
+  /// Of the runs before this one, from the history; read on a thread, for the disk may stand still.
+  std::vector<Event> earlier;
+  double absent_s{not_a_number};  ///< between the last of them and this one no daemon ran
+  std::shared_ptr<std::vector<RecordedEvent>> recorded;  ///< the thread's while it is busy
+  bool is_run_recorded{false};  ///< the history has this run too: `earlier` is complete
+  SideThread history_thread{"history"};
   Clock::time_point events_at{};
   Happened happened;  ///< when events were asked for last
 };
@@ -143,15 +155,50 @@ void DaemonFeed::Parts::renew_slow_answers(StatusClient& client) {
     next.trends.clear();
     events_at = {};
   }
+  if (!next.is_here) is_run_recorded = false;
   Happened now = happened_in(next.status);
   if (now == happened && Clock::now() - events_at < events_every) return;
   happened = std::move(now);
   events_at = Clock::now();
-  std::vector<Event> all =
+  renew_events(client);
+}
+
+void DaemonFeed::Parts::renew_events(StatusClient& client) {
+  std::vector<Event> own =
       part_from<EventsAnswer>(client.call("events", json::object(), silence_max)).events;
+  if (own.empty()) return;
+  if (next.status.history.enabled && !is_run_recorded) take_earlier_events(own.front());
+  if (own.front().number == 1) own.front().duration_s = absent_s;
+  std::vector<Event> all = earlier;
+  all.insert(all.end(), own.begin(), own.end());
   if (all.size() > events_max)
     all.erase(all.begin(), all.end() - static_cast<std::ptrdiff_t>(events_max));
   next.events = std::make_shared<const std::vector<Event>>(std::move(all));
+}
+
+/// @param own  the oldest of this run that the daemon has
+void DaemonFeed::Parts::take_earlier_events(const Event& own) {
+  constexpr std::chrono::milliseconds mostly_enough(200);
+  if (!history_thread.is_busy()) {
+    recorded = std::make_shared<std::vector<RecordedEvent>>();
+    std::filesystem::path file = settings.history;
+    if (file.empty()) file = next.status.history.file;
+    const HistoryTime from{.seconds = {}, .wall_ns = std::llround(1e9 * (wall_s() - earlier_s))};
+    history_thread.start([file, from, found = recorded] {
+      try {
+        *found = read_events(file, from);
+      } catch (const std::exception&) {  // the page asks for charts too, and is told why not
+        found->clear();
+      }
+    });
+  }
+  if (!history_thread.wait(mostly_enough)) return;
+  const auto first = std::find_if(recorded->begin(), recorded->end(), [&own](const Event& event) {
+    return event.number == own.number && std::abs(event.wall_s - own.wall_s) < 0.001;
+  });
+  is_run_recorded = first != recorded->end();
+  absent_s = is_run_recorded ? first->duration_s : not_a_number;
+  earlier.assign(recorded->begin(), first);
 }
 
 void DaemonFeed::Parts::publish() {

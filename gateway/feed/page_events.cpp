@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -51,7 +52,17 @@ Rank rank_of(const Event& event) {
   }
 }
 
-/// From the first fault of a subject until it is well again; of all else a moment.
+bool is_start(const Event& event) {
+  return event.kind == EventKind::daemon && event.code == "started";
+}
+
+/// The end of the run before a start; where that is not known, the start.
+double absent_since_s(const Event& start) {
+  return start.wall_s - (std::isfinite(start.duration_s) ? start.duration_s : 0.0);
+}
+
+/// From the first fault of a subject until it is well again, or the daemon ends; of all else a
+/// moment.
 struct Outage {
   const Event* first{nullptr};
   Rank rank{Rank::alone};
@@ -65,6 +76,10 @@ std::vector<Outage> outages_of(const std::vector<Event>& events,
   std::vector<Outage> outages;
   std::map<Subject, std::size_t> open;
   for (const Event& event : events) {
+    if (is_start(event)) {  // what was wrong is reported anew
+      for (const auto& [subject, known] : open) outages[known].to_s = absent_since_s(event);
+      open.clear();
+    }
     const bool ends = event.kind == EventKind::recovery;
     const auto known = open.find(event.subject);
     if ((ends || event.kind == EventKind::fault) && known != open.end()) {
@@ -114,13 +129,14 @@ bool is_same(const Event& a, const Event& b) {
   return is_outage(a) ? is_outage(b) : a.kind == EventKind::mode && b.kind == a.kind;
 }
 
-std::string text_of(const Group& group) {
-  std::string text = event_text(*group.newest);
+/// @param lasts  the outage has not ended
+std::string text_of(const Group& group, bool lasts) {
+  std::string text = page_event_text(*group.newest);
   if (group.times > 1) {
     if (group.newest->kind == EventKind::recovery) text.erase(text.rfind(": over"));
     text += ": " + std::to_string(group.times) + " times";
     if (group.lasted_s > 0.0) text += ", " + duration_text(group.lasted_s) + " in all";
-    if (group.newest->kind == EventKind::fault) text += ", and still";
+    if (lasts && group.newest->kind == EventKind::fault) text += ", and still";
   }
   return group.idle_s > 0.0 ? text + "; not compensated for " + duration_text(group.idle_s) : text;
 }
@@ -135,6 +151,25 @@ double idle_s(const Event& event) {
 
 }  // namespace
 
+std::string_view command_name(std::string_view method) {
+  constexpr std::array<std::pair<std::string_view, std::string_view>, 5> names{
+      {{"enable", "switch on"},
+       {"disable", "switch off"},
+       {"reference", "take the reference"},
+       {"prove", "prove axis"},
+       {"accept", "accept sensor"}}};
+  for (const auto& [known, name] : names)
+    if (known == method) return name;
+  return method;
+}
+
+std::string page_event_text(const Event& event) {
+  std::string text = event_text(event);
+  if (event.kind == EventKind::command && text.starts_with(event.code))
+    text.replace(0, event.code.size(), command_name(event.code));
+  return text;
+}
+
 json page_events(const Snapshot& snapshot, std::size_t most) {
   const std::vector<Event>& events = *snapshot.events;
   std::vector<std::size_t> of_event;
@@ -147,6 +182,8 @@ json page_events(const Snapshot& snapshot, std::size_t most) {
   std::vector<std::pair<const Event*, double>> idle;  // of which event how long
   for (std::size_t i = events.size(); i-- > 0;) {
     const Event& event = events[i];
+    const bool is_next_start = i + 1 < events.size() && is_start(events[i + 1]);
+    if (event.kind == EventKind::daemon && event.code == "stopping" && is_next_start) continue;
     if (const Outage* cause = cause_of(outages[of_event[i]], outages)) {
       idle.emplace_back(cause->first, idle_s(event));
       continue;
@@ -164,10 +201,19 @@ json page_events(const Snapshot& snapshot, std::size_t most) {
   json list = json::array();
   for (const Group& group : groups) {
     if (list.size() == most) break;
-    list.push_back({{"number", group.newest->number},
-                    {"wall_s", group.newest->wall_s},
-                    {"kind", to_string(group.newest->kind)},
-                    {"text", text_of(group)}});
+    const Event& event = *group.newest;
+    const auto place = static_cast<std::size_t>(&event - events.data());
+    const bool lasts = outages[of_event[place]].to_s == unknown_end_s;
+    json entry = {{"number", event.number},
+                  {"wall_s", event.wall_s},
+                  {"kind", to_string(event.kind)},
+                  {"text", text_of(group, lasts)}};
+    if (is_start(event) && std::isfinite(event.duration_s)) {
+      const bool was_stopped = place > 0 && events[place - 1].code == "stopping";
+      entry["text"] = was_stopped ? "daemon stopped" : "daemon killed, or the power failed";
+      entry["from_s"] = absent_since_s(event);
+    }
+    list.push_back(std::move(entry));
   }
   return list;
 }

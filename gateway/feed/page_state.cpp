@@ -22,15 +22,23 @@ json verdict_of(const Snapshot& snapshot, const json& problems) {
     return {{"compensating", false},
             {"intended", false},
             {"answer", "not known"},
-            {"detail", "the daemon does not answer"},
+            {"meaning", "the daemon does not answer"},
+            {"since_s", std::round(snapshot.since_s)},
+            {"advice", ""},
             {"level", "bad"}};
   const Verdict now = verdict(snapshot.status);
-  const bool is_bad = !now.compensating && !now.intended;
-  const char* level = is_bad ? "bad" : now.compensating && problems.empty() ? "good" : "warning";
+  const bool is_good = now.compensating && problems.empty();
+  const char* level = is_good            ? "good"
+                      : now.compensating ? "warning"
+                      : now.intended     ? "off"
+                                         : "bad";
   return {{"compensating", now.compensating},
           {"intended", now.intended},
           {"answer", now.answer},
-          {"detail", now.detail},
+          {"meaning", now.meaning},
+          {"since_s",
+           std::isfinite(now.for_s) ? json(std::round(snapshot.wall_s - now.for_s)) : json()},
+          {"advice", now.compensating && !is_good ? "not all is well, see below" : now.advice},
           {"level", level}};
 }
 
@@ -119,7 +127,8 @@ json problems_json(const Snapshot& snapshot) {
   json list = json::array();
   if (!snapshot.is_here) {
     list.push_back({{"what", "the program thermocompd does not run, or does not answer"},
-                    {"remedy", "start it" + last_offsets(snapshot.status)},
+                    {"remedy", "ask maintenance to start the service thermocompd" +
+                                   last_offsets(snapshot.status)},
                     {"detail", snapshot.why}});
     return list;
   }

@@ -25,7 +25,7 @@ struct Snapshot {
   SensorsAnswer sensors;
   std::shared_ptr<const nlohmann::json> model{
       std::make_shared<nlohmann::json>()};  ///< null: not known yet
-  /// The newest of the answer of `events`, oldest first.
+  /// The newest of the last week, by the history, and of the answer of `events`; oldest first.
   std::shared_ptr<const std::vector<Event>> events{std::make_shared<std::vector<Event>>()};
   std::map<std::string, double> trends;  ///< [K/h] by sensor; NaN where not known yet
 };

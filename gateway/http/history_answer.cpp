@@ -12,6 +12,7 @@
 
 #include "daemon/history/replay/thinned_history.hpp"
 #include "estimator/pipeline/mode.hpp"
+#include "gateway/feed/page_state.hpp"
 #include "status/event.hpp"
 
 namespace thermocomp::gateway {
@@ -65,7 +66,7 @@ json probings_json(const std::vector<Probing>& probings) {
   return list;
 }
 
-/// When nothing was compensated though a daemon ran.
+/// When nothing was compensated: the mode, or "no_daemon".
 json modes_json(const std::vector<RecordedEvent>& events, const HistoryRequest& request) {
   json list = json::array();
   std::string mode;  // empty: not known, or none
@@ -79,8 +80,13 @@ json modes_json(const std::vector<RecordedEvent>& events, const HistoryRequest& 
     const bool ends = event.kind == EventKind::mode ||
                       (event.kind == EventKind::daemon && event.code != "history");
     if (!ends) continue;
-    // A run that was killed has no end; what it did after its last event is not known.
-    if (event.code != "started") end_at(event.wall_s);
+    if (event.code == "started") {
+      // How long the mode of a run lasted whose end is not known is not known either.
+      if (std::isfinite(event.duration_s)) end_at(event.wall_s - event.duration_s);
+      mode = event.duration_s > 0.0 ? "no_daemon" : "";
+      since_s = event.wall_s - event.duration_s;
+    }
+    end_at(event.wall_s);
     mode = event.kind == EventKind::mode ? event.code : "";
     since_s = event.wall_s;
   }
@@ -99,7 +105,7 @@ json events_json(const std::vector<RecordedEvent>& events, const HistoryRequest&
     const bool counts = event->kind == EventKind::command || event->kind == EventKind::daemon ||
                         (event->kind == EventKind::fault && is_link);
     if (counts && event->wall_s >= request.from_s)
-      list.push_back({{"time_s", event->wall_s}, {"text", event_text(*event)}});
+      list.push_back({{"time_s", event->wall_s}, {"text", page_event_text(*event)}});
   }
   return list;
 }
@@ -119,6 +125,7 @@ JsonAnswer history_answer(const DaemonFeed& feed, const HistoryRequest& request)
     for (const ThinnedColumn& column : history.columns)
       append_column(text, column.name, column.values);
     json rest = {{"from_s", history.from_s},
+                 {"recorded_since_s", number(history.begins_s)},
                  {"to_s", request.to_s},
                  {"span_s", span_s},
                  {"probings", probings_json(history.probings)},

@@ -7,8 +7,8 @@
 
 namespace thermocomp::gateway {
 
-/// To /api/history: {"from_s", "to_s", "span_s", "columns": {"time_s": [...], "bed_degC": [...],
-/// "z_offset_um":
+/// To /api/history: {"from_s", "recorded_since_s", "to_s", "span_s", "columns": {"time_s": [...],
+/// "bed_degC": [...], "z_offset_um":
 /// [...]}, "probings": [{"axis", "time_s", "left_um", "needed_um"}], "modes": [{"mode", "from_s",
 /// "to_s"}], "events": [{"time_s", "text"}], "chunks", "chunks_read", "damage": [...]}; null: not
 /// known. The modes are those in which nothing is compensated.

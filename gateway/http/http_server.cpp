@@ -32,8 +32,8 @@ json broker_is_away(const MqttSettings& mqtt) {
   return {{"what", "the MQTT broker on " + mqtt.host + ", port " + std::to_string(mqtt.port) +
                        ", is away: nobody gets values or alarms from it"},
           {"remedy",
-           "start the broker; if it runs, journalctl -u thermocomp-gateway says why it "
-           "refuses. The newest messages are kept, and sent when it is back"}};
+           "start the broker; if it runs, the log of thermocomp-gateway says why it refuses. "
+           "The newest messages are kept, and sent when it is back"}};
 }
 
 }  // namespace

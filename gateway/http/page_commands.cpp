@@ -11,6 +11,7 @@
 
 #include "config/text/outer_json.hpp"
 #include "daemon/socket/status_client.hpp"
+#include "gateway/feed/page_state.hpp"
 #include "status/figures.hpp"
 
 namespace thermocomp::gateway {
@@ -54,6 +55,13 @@ const AxisStatus& axis_named(const Status& status, const std::string& name) {
   for (const AxisStatus& axis : status.axes)
     if (axis.name == name) return axis;
   throw std::invalid_argument("there is no axis " + name);
+}
+
+void require_waiting(const SensorsAnswer& sensors, const std::string& name) {
+  for (const SensorStatus& sensor : sensors.sensors)
+    if (sensor.name == name && sensor.fault == Fault::unconfirmed) return;
+  throw std::invalid_argument("there is no sensor " + name +
+                              " with a value that waits to be confirmed");
 }
 
 /// "z from +1.2 um to -3.4 um, y ..."
@@ -105,7 +113,9 @@ json PageCommands::offered(const std::string& user) const {
   json methods = json::array();
   for (const std::string& method : settings_.commands.methods)
     if (may(user, method)) methods.push_back(method);
-  return {{"user", user}, {"commands", std::move(methods)}};
+  json names = json::object();
+  for (const std::string method : methods) names[method] = command_name(method);
+  return {{"user", user}, {"commands", std::move(methods)}, {"names", std::move(names)}};
 }
 
 JsonAnswer PageCommands::take(const std::string& user, const std::string& body,
@@ -129,10 +139,11 @@ JsonAnswer PageCommands::confirm(const std::string& user, const CommandRequest& 
   const std::string& method = asked.method;
   if (!may(user, method)) return error(403, "this command is not for this user");
   if (!snapshot.is_here) return error(503, "the daemon does not answer");
+  if (method == "accept") require_waiting(snapshot.sensors, asked.sensor);
   const std::string text = confirmation_text(asked, snapshot.status);
-  json params = json::object();
-  if (method == "accept") params = {{"sensor", asked.sensor}};
-  if (method == "prove") params = {{"axis", asked.axis}, {"value_um", asked.value_um}};
+  json params = {{"for", user}};
+  if (method == "accept") params["sensor"] = asked.sensor;
+  if (method == "prove") params.update({{"axis", asked.axis}, {"value_um", asked.value_um}});
   const auto now = std::chrono::steady_clock::now();
   const std::string token = random_token();
   const std::lock_guard lock(mutex_);

@@ -13,7 +13,8 @@ let range = ranges[1];
 let columns = [];        // names, time first
 let table = [];          // rows: Date, then values by column
 let probings = [];       // [{axis, time_s, left_um, needed_um}], oldest first
-let modes = [];          // [{mode, from_s, to_s}]: nothing was compensated
+let modes = [];          // [{mode, from_s, to_s}]: nothing was compensated; mode no_daemon too
+let recordedSince_s = null;
 let marks = [];          // [{time_s, text}], newest first
 let spacing_s = 10;      // of the rows
 let zoomed = null;       // [from, to] in ms where the eye has chosen a part
@@ -35,17 +36,23 @@ function wholeWindow() {
 
 const timeWindow = () => zoomed || wholeWindow();
 
+const absences = () => modes.filter(each => each.mode === 'no_daemon');
+const middle_ms = each => 500 * (each.from_s + each.to_s);
+
 // null joins what is recorded seldom, NaN parts it: a gap is longer than a minute and than three of
-// the column's own steps.
+// the column's own steps, or no daemon ran.
 function withGaps(index) {
   const known = [];
   table.forEach((row, i) => { if (isNumber(row[index])) known.push(i); });
   const steps = known.slice(1).map((row, i) => table[row][0] - table[known[i]][0]).sort((a, b) => a - b);
   const gap_ms = Math.max(60000, 3000 * spacing_s, 3 * (steps[Math.floor(steps.length / 2)] || 0));
   const values = table.map(row => isNumber(row[index]) ? row[index] : null);
-  for (let k = 1; k < known.length; ++k)
-    if (known[k] - known[k - 1] > 1 && table[known[k]][0] - table[known[k - 1]][0] > gap_ms)
-      values[known[k] - 1] = NaN;
+  const parts = absences().map(middle_ms);
+  for (let k = 1; k < known.length; ++k) {
+    const [from, to] = [table[known[k - 1]][0], table[known[k]][0]];
+    const isGap = to - from > gap_ms || parts.some(ms => ms >= from && ms <= to);
+    if (known[k] - known[k - 1] > 1 && isGap) values[known[k] - 1] = NaN;
+  }
   return values;
 }
 
@@ -310,7 +317,7 @@ async function loadHistory() {
   const mine = ++asked;
   try {
     const points = Math.max(200, Math.min(900, Math.round(window.innerWidth)));
-    const answer = await fetch('/api/history?from=-' + range.seconds + '&points=' + points);
+    const answer = await fetch(api('history?from=-' + range.seconds + '&points=' + points));
     const history = await answer.json();
     if (mine !== asked) return;
     if (!answer.ok) throw new Error(history.error);
@@ -321,6 +328,9 @@ async function loadHistory() {
     while (table.length > 2 && table[table.length - 1].every((value, c) => c === 0 || value === null)) table.pop();
     probings = history.probings;
     modes = history.modes;
+    recordedSince_s = history.recorded_since_s;
+    for (const each of absences()) addEmptyRow(middle_ms(each));
+    table.sort((a, b) => a[0] - b[0]);
     marks = history.events;
     spacing_s = history.span_s;
     setText(place('history-note'), recordedSince(history.to_s - range.seconds));
@@ -328,6 +338,20 @@ async function loadHistory() {
   } catch (error) {
     setText(place('history-note'), 'no history: ' + error.message);
   }
+}
+
+const addEmptyRow = ms => table.push(columns.map((name, c) => c === 0 ? new Date(ms) : null));
+
+// The time without a daemon goes on; the history has it later.
+function addAbsence(now) {
+  let last = modes[modes.length - 1];
+  if (!last || last.from_s !== now.since_s) {
+    last = {mode: 'no_daemon', from_s: now.since_s};
+    modes.push(last);
+    if (columns.length > 0) addEmptyRow(1000 * now.since_s);
+  }
+  last.to_s = now.time_s;
+  if (performance.now() - drawnAt > drawEveryMs && !document.hidden) drawAll();
 }
 
 // Between two loads of the history the newest values come from the states.

@@ -19,6 +19,8 @@ const setText = (element, text) => {
 const isNumber = value => typeof value === 'number' && isFinite(value);
 const fixed = (value, digits) => isNumber(value) ? value.toFixed(digits).replace('-', '\u2212') : '\u2013';
 const signed = (value, digits) => isNumber(value) && value >= 0 ? '+' + fixed(value, digits) : fixed(value, digits);
+// A bookmark may have user and password in its address, which fetch() refuses.
+const api = path => location.origin + '/api/' + path;
 const unitText = unit => unit === 'urad' ? '\u00b5rad' : '\u00b5m';
 const withUnits = text => text.replace(/ u(m|rad)\b/g, ' \u00b5$1').replace(/ degC\b/g, ' \u00b0C');
 
@@ -39,6 +41,8 @@ function clockText(wall_s, parts = {hour: '2-digit', minute: '2-digit', second: 
   return sameDay ? time : at.toLocaleDateString([], {day: 'numeric', month: 'short'}) + ', ' + time;
 }
 
+// Of something young with its seconds.
+const shortTime = wall_s => Date.now() / 1000 - wall_s < 120 ? clockText(wall_s) : minuteText(wall_s);
 const minuteText = wall_s => clockText(wall_s, {hour: '2-digit', minute: '2-digit'});
 
 // ------------------------------------------------------------------ state
@@ -49,7 +53,7 @@ let source = null;
 
 function listen() {
   if (source) source.close();
-  source = new EventSource('/api/events');
+  source = new EventSource(api('events'));
   source.addEventListener('state', event => {
     heardAt = performance.now();
     state = JSON.parse(event.data);
@@ -75,26 +79,24 @@ function change(target, changes) {
 function watchGateway() {
   const silent = performance.now() - heardAt > silentAfterMs;
   if (silent) {
-    showVerdict({level: 'unknown', answer: 'not known',
-                 detail: 'The gateway does not answer for ' + duration((performance.now() - heardAt) / 1000) +
-                         '; the values below are old.'});
+    showVerdict({level: 'unknown', answer: 'not known', meaning: 'the gateway does not answer',
+                 since_s: (Date.now() - performance.now() + heardAt) / 1000, advice: 'old values below'});
     document.body.classList.add('stale');
+    showCommands({here: false});
   }
   if (source === null || source.readyState === EventSource.CLOSED) listen();
 }
 
 function show(now) {
   setText(place('machine'), now.machine);
-  document.title = now.machine + ': ' + now.verdict.answer;
   setText(place('clock'), clockText(now.time_s));
   document.body.classList.toggle('stale', !now.here);
-  let detail = now.verdict.detail;
-  if (!now.here) detail += ' for ' + duration(now.time_s - now.since_s) + (now.axes ? '; the values below are the last known' : '');
-  showVerdict({level: now.verdict.level, answer: now.verdict.answer, detail: detail});
+  showVerdict(now.here || !now.axes ? now.verdict : {...now.verdict, advice: 'last known values below'});
   showProblems(now);
+  showCommands(now);
   if (!now.axes) return;
   showAxes(now.axes);
-  showHottest(now.sensors);
+  showHottest(now);
   showSensors(now.sensors);
   showBuses(now);
   showModel(now);
@@ -103,6 +105,7 @@ function show(now) {
           fixed(now.cycle.rate_hz, 0) + ' Hz, ' + (now.cycle.missed || 0) + ' cycles missed' +
           (now.history.enabled ? ', history ' + fixed(now.history.size_MB, 1) + ' MB' : ', no history'));
   if (now.here) addLiveRow(now);
+  else addAbsence(now);
   followEvents(now.events);
 }
 
@@ -110,7 +113,10 @@ function showVerdict(verdict) {
   const element = place('verdict');
   if (element.className !== verdict.level) element.className = verdict.level;
   setText(place('answer'), verdict.answer);
-  setText(place('detail'), verdict.detail);
+  const since = isNumber(verdict.since_s) ? 'since ' + shortTime(verdict.since_s) : '';
+  setText(place('detail'), [verdict.meaning, since].filter(Boolean).join(' ') +
+                           (verdict.advice ? ': ' + verdict.advice : ''));
+  document.title = place('machine').textContent + ': ' + verdict.answer;
 }
 
 function showProblems(now) {
@@ -163,6 +169,7 @@ function axisMarks(axis) {
     marks.push('the controller applies ' + signed(axis.applied, 1) + ' ' + unitText(axis.unit));
   if (axis.at_bound) marks.push('at its bound');
   if (axis.proving) marks.push('proving its sign');
+  if (state.model.compared === false && !lastProbing(axis)) marks.push('model never compared with a measurement');
   if (state.probe_due && state.probe_due[axis.name]) marks.push('time to probe');
   const warm = (state.warm || {})[axis.name];
   if (warm && warm.minutes > 0)
@@ -176,12 +183,17 @@ function axisMarks(axis) {
 function axisSentence(axis, now_s) {
   const unit = '\u00a0' + unitText(axis.unit);
   const of = isNumber(axis.offset_max) ? ' of at most ' + axis.offset_max : '';
-  const taken = axis.proving ? 'moved to show its sign, ' + fixed(Math.abs(axis.offset), 1) + of + unit
-                             : 'taken out ' + fixed(Math.abs(axis.offset), 1) + of + unit;
-  const last = probings.filter(each => each.axis === axis.name && isNumber(each.left_um)).pop();
-  return taken + '; ' + (last ? fixed(Math.abs(last.left_um), 1) + unit + ' left at the last probing, ' +
-    duration(now_s - last.time_s) + ' ago' : 'not probed in the last 30 days');
+  const is = !state.here ? 'last known: ' : axis.proving ? 'moved to show its sign, '
+    : state.mode === 'holding' ? 'held since ' + shortTime(state.verdict.since_s) + ' at '
+    : axis.driven ? 'taken out ' : 'not driven, last ';
+  const last = lastProbing(axis);
+  return is + fixed(Math.abs(axis.offset), 1) + of + unit + (last ?
+    '; ' + fixed(Math.abs(last.left_um), 1) + unit + ' left at the last probing, ' + duration(now_s - last.time_s) + ' ago'
+    : !isNumber(recordedSince_s) ? '' : now_s - recordedSince_s > 30 * 86400
+    ? '; not probed in the last 30 days' : '; not probed since the records begin, ' + shortTime(recordedSince_s));
 }
+
+const lastProbing = axis => probings.filter(each => each.axis === axis.name && isNumber(each.left_um)).pop();
 
 function showAxes(axes) {
   const cards = axes.map(axis => axisCard(axis.name).card);
@@ -216,13 +228,31 @@ function followEvents(events) {
 // Of a sensor with a fault what it shows now, to be compared with a thermometer.
 const temperatureOf = sensor => isNumber(sensor.raw_degC) ? sensor.raw_degC : sensor.smoothed_degC;
 
-function showHottest(sensors) {
+const lastGood = new Map();  // by sensor: {value, time_s}; at first from the history
+
+// A hot place whose sensor is lost keeps its place in the list.
+function showHottest(now) {
   const list = place('hottest');
-  const top = sensors.filter(sensor => sensor.fault === 'none').sort((a, b) => temperatureOf(b) - temperatureOf(a)).slice(0, 3);
+  for (const sensor of now.sensors) {
+    if (now.here && sensor.fault === 'none')
+      lastGood.set(sensor.name, {value: temperatureOf(sensor), time_s: now.time_s});
+    else if (!lastGood.has(sensor.name)) {
+      const column = columns.indexOf(sensor.name + '_degC');
+      const row = table.filter(each => isNumber(each[column])).pop();
+      if (row) lastGood.set(sensor.name, {value: row[column], time_s: row[0] / 1000});
+    }
+  }
+  const top = now.sensors.filter(sensor => lastGood.has(sensor.name))
+    .sort((a, b) => lastGood.get(b.name).value - lastGood.get(a.name).value).slice(0, 3);
   while (list.children.length < top.length) list.append(make('li'));
   while (list.children.length > top.length) list.lastChild.remove();
-  top.forEach((sensor, i) => setText(list.children[i],
-    sensor.name + ' ' + fixed(temperatureOf(sensor), 1) + ' \u00b0C ' + arrow(sensor.trend_K_per_h)));
+  top.forEach((sensor, i) => {
+    const {value, time_s} = lastGood.get(sensor.name);
+    const isGood = sensor.fault === 'none';
+    list.children[i].className = isGood ? '' : 'old';
+    setText(list.children[i], sensor.name + ' ' + fixed(value, 1) + ' \u00b0C ' + (isGood ?
+      arrow(sensor.trend_K_per_h) : (sensor.jump ? 'in doubt since ' : 'lost since ') + shortTime(time_s)));
+  });
 }
 
 function arrow(rate) {
@@ -336,7 +366,9 @@ function showEvents(events) {
   list.dataset.key = key;
   list.replaceChildren(...events.map(event => {
     const item = make('li');
-    item.append(make('time', minuteText(event.wall_s)), make('span', withUnits(event.text)));
+    const clock = event.wall_s - event.from_s < 120 ? clockText : minuteText;
+    item.append(make('time', minuteText(event.wall_s)), make('span', withUnits(event.text) +
+      (isNumber(event.from_s) ? ', ' + clock(event.from_s) + ' to ' + clock(event.wall_s) : '')));
     return item;
   }));
   if (events.length === 0) list.append(make('li', 'nothing has happened'));
@@ -345,7 +377,7 @@ function showEvents(events) {
 // ------------------------------------------------------------------ commands
 
 async function post(body) {
-  const answer = await fetch('/api/command', {method: 'POST', body: JSON.stringify(body),
+  const answer = await fetch(api('command'), {method: 'POST', body: JSON.stringify(body),
                                               headers: {'Content-Type': 'application/json'}});
   const told = await answer.json();
   if (!answer.ok) throw new Error(told.error);
@@ -370,9 +402,9 @@ async function command(request) {
     if (!await confirmed(asked.text)) return;
     setText(answer, 'sent');
     await post({token: asked.token});
-    setText(answer, commandNames[request.method] + ': done');
+    setText(answer, offered.names[request.method] + ': done');
   } catch (error) {
-    setText(answer, request.method + ': ' + error.message);
+    setText(answer, offered.names[request.method] + ': ' + error.message);
   }
 }
 
@@ -383,30 +415,58 @@ function proveRequest() {
   return isNumber(value_um) ? {method: 'prove', axis: axis, value_um: value_um} : null;
 }
 
-function acceptRequest() {
-  const jumped = (state ? state.sensors : []).filter(each => each.jump).map(each => each.name);
-  const sensor = prompt('Accept the reading of which sensor?', jumped[0] || '');
-  return sensor ? {method: 'accept', sensor: sensor} : null;
+let offered = {commands: [], names: {}};
+
+// A button for each command that can be given now; `why` one cannot.
+function buttonsOf(now) {
+  const jumped = (now.sensors || []).filter(each => each.jump);
+  return offered.commands.flatMap(method => {
+    const button = {method: method, text: offered.names[method], why: now.here ? '' : 'not now'};
+    if (method === 'accept') return jumped.map(({name}) => ({...button, sensor: name, text: button.text + ' ' + name}));
+    if (method === 'reference' && now.here) {
+      const [first, ...more] = now.reference.objections;
+      button.why = (first || '') + (more.length ? '; and ' + more.length + ' more' : '');
+    }
+    return [button];
+  });
 }
 
-const commandNames = {enable: 'Switch on', disable: 'Switch off', reference: 'Take the reference',
-                      prove: 'Prove an axis', accept: 'Accept a reading'};
-const requests = {prove: proveRequest, accept: acceptRequest};
+function showCommands(now) {
+  const buttons = buttonsOf(now);
+  const holder = place('command-buttons');
+  const key = JSON.stringify([now.here, buttons]);
+  if (holder.dataset.key === key) return;
+  if (holder.dataset.here !== String(now.here)) setText(place('command-answer'), '');
+  Object.assign(holder.dataset, {key: key, here: now.here});
+  place('commands').hidden = buttons.length === 0;
+  rebuild(holder, buttons);
+  setText(place('command-why'), buttons.filter(each => now.here && each.why)
+    .map(each => each.text + ', not now: ' + withUnits(each.why)).join('. '));
+}
 
-async function offerCommands() {
-  try {
-    const told = await (await fetch('/api/commands')).json();
-    place('commands').hidden = told.commands.length === 0;
-    place('body').hidden = !told.body;
-    place('report').hidden = !told.report;
-    place('command-buttons').replaceChildren(...told.commands.map(method => {
-      const button = make('button', commandNames[method]);
+// Kept where the same commands are offered, so that nothing jumps under a finger.
+function rebuild(holder, buttons) {
+  const names = buttons.map(each => each.text).join();
+  if (holder.dataset.names !== names)
+    holder.replaceChildren(...buttons.map(({method, sensor, text}) => {
+      const button = make('button', text);
       button.addEventListener('click', () => {
-        const request = requests[method] ? requests[method]() : {method: method};
+        const request = method === 'prove' ? proveRequest() : {method: method, sensor: sensor};
         if (request) command(request);
       });
       return button;
     }));
+  holder.dataset.names = names;
+  buttons.forEach((each, i) => { holder.children[i].disabled = each.why !== ''; });
+}
+
+async function offerCommands() {
+  try {
+    offered = await (await fetch(api('commands'))).json();
+    for (const [method, name] of Object.entries(offered.names)) offered.names[method] = name[0].toUpperCase() + name.slice(1);
+    place('body').hidden = !offered.body;
+    place('report').hidden = !offered.report;
+    if (state) showCommands(state);
   } catch (error) {
     place('commands').hidden = true;
   }

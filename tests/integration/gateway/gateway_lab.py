@@ -136,6 +136,17 @@ def password_line(user, password):
                           check=True).stdout
 
 
+def guarded_gateway(lab, daemon, passwords, commands):
+    """With TLS. @param passwords  by user @param commands  lines of [commands]"""
+    certificate, key = make_certificate(lab.folder)
+    file = lab.folder / "passwords"
+    file.write_text("".join(password_line(*each) for each in passwords.items()))
+    made = lab.also_end(Gateway(lab, daemon, f'certificate = "{certificate}"\nkey = "{key}"\npasswords = "{file}"',
+                                "[commands]\n" + commands))
+    made.context = trusting(certificate)
+    return made.start()
+
+
 class Broker:
     """A real mosquitto."""
 

@@ -7,6 +7,7 @@ import json
 import subprocess
 import time
 
+import pytest
 
 from gateway_lab import Gateway, make_certificate, password_line
 from lab import eventually, run_tool
@@ -81,6 +82,28 @@ def test_a_daemon_that_is_away_is_told_and_found_again(machine, gateway):
     gateway.wait_for(lambda s: s["here"], "the daemon is found again")
 
 
+@pytest.mark.parametrize("end, text", [("end", "daemon stopped"), ("kill", "daemon killed, or the power failed")])
+def test_a_restart_keeps_what_happened_and_names_the_time_without_a_daemon(machine, gateway, end, text):
+    machine.module.stop()
+    gateway.wait_for(lambda s: s["here"] and s["mode"] == "holding", "it holds")
+    machine.module.start()
+    machine.module.show(20.0, 20.0)
+    gateway.wait_for(lambda s: any("lasted" in event["text"] for event in s["events"]), "it is over")
+    began_s = time.time()
+    getattr(machine.daemon, end)()
+    ended_s = time.time()
+    machine.daemon.start()
+    entry, = gateway.wait_for(lambda s: s["here"] and s["events"][0]["text"] == text and "from_s" in s["events"][0],
+                              "the restart")["events"][:1]
+    assert began_s - 10.0 < entry["from_s"] <= ended_s <= entry["wall_s"]
+    assert any("lasted" in event["text"] for event in gateway.wait_for(lambda s: s["here"], "a state")["events"])
+    told = gateway.json("/api/history?from=-600")
+    absent, = [mode for mode in told["modes"] if mode["mode"] == "no_daemon"]
+    assert (absent["from_s"], absent["to_s"]) == pytest.approx((entry["from_s"], entry["wall_s"]), abs=0.01)
+    assert told["recorded_since_s"] == told["from_s"]
+    assert gateway.json("/api/history?from=-0.5")["recorded_since_s"] == told["recorded_since_s"]
+
+
 def test_history_is_that_of_the_export(machine, gateway, lab):
     machine.warm_by(6.0)
     machine.daemon.wait_for_offset(6.0)
@@ -134,7 +157,7 @@ def test_a_machine_at_rest_costs_little_to_watch(machine, gateway):
 
 
 def test_metrics_are_clean_and_have_every_sensor_axis_and_bus(machine, gateway):
-    gateway.wait_for(lambda s: s["here"], "a state")
+    gateway.wait_for(lambda s: s["verdict"]["level"] == "good", "nothing is wrong")
     text = gateway.text("/metrics")
     checked = subprocess.run(["promtool", "check", "metrics"], input=text, text=True,
                              capture_output=True)

@@ -9,7 +9,7 @@ import time
 import pytest
 
 from chromium import accessibility_problems, headless
-from gateway_lab import Broker, Gateway, stretch_history
+from gateway_lab import Broker, Gateway, guarded_gateway, stretch_history
 from lab import eventually, run_tool
 
 
@@ -114,6 +114,8 @@ def test_it_says_what_is_wrong_and_recovers(machine, gateway, browser):
     entry, = browser.find_elements("css selector", "#problem-list li")  # one, not four
     assert "2 sensors, inputs column, spindle" in entry.text
     assert not re.search("thermocomp |systemctl", entry.text), "a command on the page"
+    assert "the correction is frozen and the tool may drift from here; finish no precise cut" in text(browser, "detail")
+    assert re.search(r"held since \d\d:\d\d:\d\d at 0.0 of at most 60", text(browser, "axes"))
     assert is_on_first_screen(browser, "#problem-list li")
     entry.find_element("css selector", "a").click()
     assert browser.execute_script("return document.querySelector('.row:target .name').textContent"
@@ -127,7 +129,7 @@ def test_it_says_what_is_wrong_and_recovers(machine, gateway, browser):
                                    "the daemon is away")
     assert "the last offsets stay at the controller: z " in text(browser, "problem-list")
     assert "systemctl" not in text(browser, "problem-list")
-    assert "taken out" in text(browser, "axes"), "the last known values"
+    assert "last known: 0.0 of" in text(browser, "axes")
     assert "grayscale" in browser.execute_script(
         "return getComputedStyle(document.getElementById('axes-section')).filter")
     machine.daemon.start()
@@ -135,6 +137,7 @@ def test_it_says_what_is_wrong_and_recovers(machine, gateway, browser):
     gateway.end()
     took["gateway gone"] = within_s(lambda: "gateway does not answer" in text(browser, "detail"),
                                     "the gateway is away")
+    assert browser.title == "mill_3: not known"
     gateway.config.write_text(gateway.config.read_text().replace("port = 0",
                                                                  f"port = {gateway.port}"))
     gateway.start()
@@ -155,9 +158,11 @@ def test_the_axis_card_says_what_is_taken_out_and_what_was_left(machine, gateway
     machine.daemon.wait_for_offset(9.0)
     show(browser, gateway, PHONE)
     eventually(lambda: "taken out 9.0 of at most 60 µm" in text(browser, "axes"), "what is taken out")
-    assert "not probed" in text(browser, "axes")
+    assert re.search(r"not probed since the records begin, \d\d:\d\d", text(browser, "axes"))
+    assert "never compared with a measurement" in text(browser, "axes")
     machine.daemon.call("measured", axis="z", value_um=1.2, confirm=True)
     eventually(lambda: "1.2 µm left at the last probing, " in text(browser, "axes"), "what was left")
+    assert "never compared" not in text(browser, "axes")
     assert browser.execute_script(
         "return document.querySelector('.meter').getAttribute('aria-valuenow')") == "15"
     machine.warm_by(75.0)
@@ -224,6 +229,52 @@ def test_a_gap_stays_open(machine, gateway, browser):
     assert values == ["1", "null", "1", "1", "NaN", "1", "1"]
 
 
+def test_the_time_without_a_daemon_parts_the_curve(machine, gateway, browser):
+    parted = ("return [modes.filter(each => each.mode === 'no_daemon').length,"
+              " withGaps(columns.indexOf('z_offset_um')).filter(Number.isNaN).length]")
+    show(browser, gateway, WALL)
+    drawn(browser)
+    machine.daemon.end()
+    eventually(lambda: browser.execute_script(parted) == [1, 0], "it is shaded while it lasts")
+    machine.daemon.start()
+    eventually(lambda: browser.execute_script(parted) == [1, 1], "the curve goes on beyond it")
+    eventually(lambda: "daemon stopped, " in text(browser, "events"), "it is what happened")
+    show(browser, gateway, WALL)
+    eventually(lambda: browser.execute_script(parted) == [1, 1], "the same from the history")
+    assert console(browser) == []
+    picture(browser, "restarted")
+
+
+def test_commands_are_offered_while_they_can_be_given(lab, machine):
+    gateway = guarded_gateway(lab, machine.daemon, {"maria": "long-and-secret"},
+                              'users = ["maria"]\nmethods = ["enable", "disable", "reference", "accept"]')
+    buttons = ("return [...document.querySelectorAll('#command-buttons button')]"
+               ".map(each => [each.textContent, each.disabled])")
+    with headless(lab.folder, "ignore-certificate-errors") as browser:
+        resize(browser, PHONE)
+        browser.get(f"https://maria:long-and-secret@localhost:{gateway.port}/")  # as a bookmark has it
+        eventually(lambda: text(browser, "history-note"), "an answer about the history")
+        assert "recorded since" in text(browser, "history-note")
+        machine.warm_by(12.0)
+        eventually(lambda: browser.execute_script(buttons) == [
+            ["Switch on", False], ["Switch off", False], ["Take the reference", True]], "no reference now")
+        assert "Take the reference, not now: axis z has an offset of +" in text(browser, "command-why")
+        picture(browser, "commands")
+        assert browser.execute_script(
+            "const jumped = structuredClone(state); jumped.sensors[0].jump = {size_K: 9, since: 0};"
+            "showCommands(jumped);" + buttons)[-1] == ["Accept sensor column", False]
+        browser.execute_script("document.querySelectorAll('#command-buttons button')[1].click()")
+        eventually(lambda: browser.find_element("id", "confirm-yes").is_displayed(), "it is asked back")
+        browser.find_element("id", "confirm-yes").click()
+        eventually(lambda: "off" in browser.find_element("id", "verdict").get_attribute("class"), "it is off")
+        eventually(lambda: re.search("switch off, by .* for maria", text(browser, "events")), "who did it")
+        assert text(browser, "command-answer") == "Switch off: done"
+        picture(browser, "off")
+        machine.daemon.kill()
+        eventually(lambda: {off for _, off in browser.execute_script(buttons)} == {True}, "nobody would do it")
+        assert text(browser, "command-answer") == ""
+
+
 def test_a_week_of_history_is_a_curve_of_a_week(lab, machine, browser):
     machine.warm_by(9.0)
     machine.daemon.wait_for_offset(9.0)
@@ -247,6 +298,8 @@ def test_on_the_wall_a_cause_is_whole_and_the_charts_fill_the_rest(machine, gate
     assert "spindle 20.0 °C" in text(browser, "hottest")
     machine.module.stop()
     eventually(lambda: "not connected" in text(browser, "problem-list"), "the cause")
+    eventually(lambda: "spindle 20.0 °C lost since" in text(browser, "hottest"), "its last value")
+    assert browser.find_elements("css selector", "#hottest .old")
     whole = browser.execute_script(
         "const list = document.getElementById('problems');"
         "return list.scrollHeight <= list.clientHeight + 1 && list.getBoundingClientRect().bottom <= innerHeight")

@@ -179,12 +179,13 @@ TEST_CASE("the page is reported in the words of thermocomp status", "[gateway][p
   Snapshot snapshot = snapshot_of_two_axes();
   json state = page_state(snapshot, "mill");
   CHECK(state["verdict"]["answer"] == "yes");
-  CHECK(state["verdict"]["detail"] == "for -");
+  CHECK(state["verdict"]["since_s"].is_null());
   CHECK(state["verdict"]["level"] == "good");
   snapshot.status.mode = Mode::holding;
   snapshot.status.reasons = static_cast<std::uint32_t>(Reason::block_lost);
   state = page_state(snapshot, "mill");
   CHECK(state["verdict"]["level"] == "bad");
+  CHECK_THAT(state["verdict"]["advice"].get<std::string>(), Catch::Contains("no precise cut"));
   CHECK(state["problems"][0]["what"] == "an input of the model has no good sensor left");
   CHECK_FALSE(state["problems"][0]["remedy"].get<std::string>().empty());
   snapshot.is_here = false;
@@ -193,7 +194,22 @@ TEST_CASE("the page is reported in the words of thermocomp status", "[gateway][p
   CHECK(state["axes"].size() == 2);  // the last known
   CHECK_THAT(state["problems"][0]["remedy"].get<std::string>(),
              Catch::Contains("the last offsets stay at the controller: "));
+  CHECK(state["verdict"]["since_s"] == std::round(snapshot.since_s));
   CHECK_FALSE(page_state(Snapshot(), "mill").contains("axes"));
+}
+
+TEST_CASE("switched off and degraded are two levels", "[gateway][page]") {
+  Snapshot snapshot = snapshot_of_two_axes();
+  snapshot.status.mode_since_s = 90.0;
+  snapshot.status.compensating_s = 60.0;
+  snapshot.status.reasons = static_cast<std::uint32_t>(Reason::outside_domain);
+  json said = page_state(snapshot, "mill")["verdict"];
+  CHECK(said["level"] == "warning");
+  CHECK(said["since_s"] == std::round(snapshot.wall_s - 60.0));
+  snapshot.status.mode = Mode::disabled;
+  said = page_state(snapshot, "mill")["verdict"];
+  CHECK(said["level"] == "off");
+  CHECK(said["since_s"] == std::round(snapshot.wall_s - 90.0));
 }
 
 TEST_CASE("a change holds what a receiver of the state before lacks", "[gateway][page]") {
@@ -248,8 +264,7 @@ TEST_CASE("what a fault or a command does to the mode is no line of its own", "[
   const Event enable = event(260.0, EventKind::command, {}, "enable");
   CHECK(texts_of({disable, mode(200.1, "compensating", "disabled", 70.0), enable,
                   mode(260.1, "disabled", "compensating", 60.0)}) ==
-        std::vector<std::string>{event_text(enable) + "; not compensated for 1 min 0 s",
-                                 event_text(disable)});
+        std::vector<std::string>{"switch on; not compensated for 1 min 0 s", "switch off"});
 
   // Long before or after the fault it is news of its own.
   const Event later = mode(300.0, "compensating", "holding", 170.0);
@@ -273,4 +288,37 @@ TEST_CASE("what happens again and again is one line, without what it explains", 
   CHECK(list[0]["text"] == "sensor head: sensor wire broken");
   CHECK(list[1]["text"] == "device bed_module: not_connected: 3 times, 6 s in all");
   CHECK(list[1]["wall_s"] == 202.0);
+}
+
+TEST_CASE("the time without a daemon is one line, and ends the outages before it",
+          "[gateway][page]") {
+  const Subject sensor{SubjectKind::sensor, "head"};
+  const auto broken = [&](double wall_s) {
+    return event(wall_s, EventKind::fault, sensor, "open_circuit");
+  };
+  const auto over = [&](double wall_s) {
+    return event(wall_s, EventKind::recovery, sensor, "open_circuit");
+  };
+  Event start = event(160.0, EventKind::daemon, {}, "started");
+  start.duration_s = 60.0;
+  const auto lines_of = [](std::vector<Event> events) {
+    Snapshot snapshot;
+    snapshot.events = std::make_shared<const std::vector<Event>>(std::move(events));
+    return page_events(snapshot, 10);
+  };
+  const json stopped = lines_of({broken(10.0), over(12.0), broken(90.0),
+                                 event(99.0, EventKind::daemon, {}, "stopping"), start});
+  REQUIRE(stopped.size() == 2);
+  CHECK(stopped[0]["text"] == "daemon stopped");
+  CHECK(stopped[0]["from_s"] == 100.0);
+  CHECK(stopped[0]["wall_s"] == 160.0);
+  CHECK(stopped[1]["text"] == "sensor head: sensor wire broken: 2 times, 2 s in all");
+  const json killed = lines_of({broken(10.0), over(12.0), start, broken(170.0)});
+  CHECK(killed[0]["text"] == "sensor head: sensor wire broken: 2 times, 2 s in all, and still");
+  CHECK(killed[1]["text"] == "daemon killed, or the power failed");
+  start.duration_s = not_a_number;
+  start.detail = "1.2";
+  CHECK(
+      lines_of({start})[0] ==
+      json{{"kind", "daemon"}, {"number", 0}, {"text", "started, version 1.2"}, {"wall_s", 160.0}});
 }
