@@ -66,9 +66,8 @@ class BankEquations {
   BankEquations(const MeasuredTests& tests, const BankColumns& columns);
 
   /// Gains [um per unit], shape (columns, outputs), from all folds but `left_out` (none: past the
-  /// last): the mean of a ridge and an L1 regression at fixed penalties. Neither kind is better
-  /// than the other on measured machines, and stretches of a record do not predict which penalty is
-  /// best on another day (docs/measurements.md).
+  /// last): one regression with an L1 and a small L2 penalty. Both are fixed, since stretches of a
+  /// record do not predict which is best on another day (docs/measurements.md).
   [[nodiscard]] Eigen::MatrixXd fit(std::size_t left_out) const;
 
   [[nodiscard]] const std::vector<Eigen::MatrixXd>& rows() const noexcept { return rows_; }

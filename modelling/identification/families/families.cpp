@@ -26,7 +26,9 @@ constexpr double correlation_of_one = 0.98;
 /// noise alone in 60 sets of four to seven simulated runs, three in 30 sets whose noise wanders for
 /// hours.
 constexpr double less_than_none = 0.1;
-constexpr double less_than_simpler = 0.01;
+/// What the bank may leave more than few sensors: on 68 of 86 splits of measured machines it left
+/// less on the rows to come, and where few sensors left less of the stretches on 8 of 12.
+constexpr double more_than_few = 0.1;
 /// What is left of a fold counts as at least so much of what no model leaves of all: below, a
 /// family is as good as another.
 constexpr double least_share = 0.01;
@@ -257,9 +259,8 @@ std::string worse_than_none(const std::vector<Judgement>& judgements, std::size_
   return "";
 }
 
-/// One rule for all families: the one that leaves least, of those alike to 1 % the simplest; no
-/// model unless it leaves a tenth less. Out is what does worse than no model anywhere it was
-/// judged.
+/// No model unless a family leaves a tenth less; the bank unless few sensors leave a tenth less than
+/// it. Out is what does worse than no model anywhere it was judged.
 void choose(const std::vector<Judgement>& judgements, FamiliesFit& fit) {
   std::size_t chosen = 0;
   std::vector<double> left_um{left_by(judgements, 0)};
@@ -275,7 +276,7 @@ void choose(const std::vector<Judgement>& judgements, FamiliesFit& fit) {
       worse.append("; ").append(to_string(all_families[i])).append(" is worse than no model on ");
       worse += where;
     } else if (left_um[i] <
-               (1.0 - (chosen == 0 ? less_than_none : less_than_simpler)) * left_um[chosen]) {
+               (chosen == 0 ? 1.0 - less_than_none : 1.0 + more_than_few) * left_um[chosen]) {
       chosen = i;
     }
   }
