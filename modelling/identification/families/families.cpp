@@ -259,8 +259,8 @@ std::string worse_than_none(const std::vector<Judgement>& judgements, std::size_
   return "";
 }
 
-/// No model unless a family leaves a tenth less; the bank unless few sensors leave a tenth less than
-/// it. Out is what does worse than no model anywhere it was judged.
+/// No model unless a family leaves a tenth less; the bank unless few sensors leave a tenth less
+/// than it. Out is what does worse than no model anywhere it was judged.
 void choose(const std::vector<Judgement>& judgements, FamiliesFit& fit) {
   std::size_t chosen = 0;
   std::vector<double> left_um{left_by(judgements, 0)};

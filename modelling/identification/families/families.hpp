@@ -50,8 +50,8 @@ struct FamiliesFit {
 
 /// One rule for none, static_few and lag_bank, on what is left out: whole runs; of one run
 /// stretches and halves; of two or three runs stretches too. Out is what does worse than no model
-/// anywhere it was judged; the bank stays unless few sensors leave a tenth less, and no model unless
-/// one leaves a tenth less. lagged_few and physical are judged where they are forced.
+/// anywhere it was judged; the bank stays unless few sensors leave a tenth less, and no model
+/// unless one leaves a tenth less. lagged_few and physical are judged where they are forced.
 /// @param forced    instead of it
 /// @param progress  is told the share of the work done
 /// @throws std::runtime_error when the forced family has no answer

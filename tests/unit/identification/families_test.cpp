@@ -80,7 +80,7 @@ TEST_CASE("a machine of two static places gets their gains, and lags of little",
 
 TEST_CASE("few sensors are taken where they leave a tenth less than the bank", "[families]") {
   const MeasuredTests tests =
-      machine_tests(4, [](double, double slow, double, double) { return 3.0 * slow; });
+      machine_tests(4, [](double, double slow, double, double) { return -3.0 * slow; });
   const FamiliesFit fit = fitted(tests);
   CHECK(fit.chosen == Family::static_few);
   CHECK(fit.few.has_value());
