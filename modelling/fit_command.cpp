@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <cstdio>
 #include <memory>
 #include <optional>
@@ -27,6 +28,7 @@ using namespace identification;
 
 constexpr std::size_t terms_of_any_equation = 8;
 constexpr std::size_t blocks_of_one_run = 8;
+constexpr double doubted_from = 0.9;  ///< as cleaned() does
 
 struct Options {
   std::vector<std::string> runs;
@@ -160,6 +162,15 @@ void leave_out_room(const std::vector<RunFile>& runs, TestOptions& options) {
   }
 }
 
+/// Readings that `inspect` doubts are fitted to all the same: to mend them is for their owner.
+void note_doubtful_readings(const std::vector<RunFile>& runs, MeasuredTests& tests) {
+  for (const inspection::Finding& each : inspection::inspect(runs, doubted_from).findings)
+    if (std::find(tests.places.begin(), tests.places.end(), each.column) != tests.places.end())
+      tests.notes.push_back(runs[each.run].name + ": " + each.text + " (thermocomp inspect, " +
+                            std::to_string(std::lround(100.0 * each.probability)) +
+                            " %); taken as it is");
+}
+
 int run(const Options& options) {
   FitOptions fit_options;
   read_terms(options.terms, fit_options);
@@ -179,7 +190,8 @@ int run(const Options& options) {
     test_options.signals = true;
     test_options.folds_of_one_run = std::max(test_options.folds_of_one_run, blocks_of_one_run);
   }
-  const MeasuredTests tests = measured_tests(runs, test_options);
+  MeasuredTests tests = measured_tests(runs, test_options);
+  note_doubtful_readings(runs, tests);
   for (const std::string& note : tests.notes) std::fprintf(stderr, "%s\n", note.c_str());
   return few ? run_few(options, tests, fit_options) : run_families(options, tests, fit_options);
 }

@@ -99,9 +99,13 @@ void ask_for_module(InitDraft& draft, std::size_t bus, int unit, Questions& ques
         InitModule form = module;
         parse_form(text, form);
         InitModule asked = form;
-        const std::vector<std::string> lines = eyes.try_module(draft, asked);
-        for (const std::string& line : lines) questions.say("    " + line);
-        offer_word_order(draft, form, asked, questions, eyes);
+        if (eyes.try_module) {
+          for (const std::string& line : eyes.try_module(draft, asked))
+            questions.say("    " + line);
+          offer_word_order(draft, form, asked, questions, eyes);
+        } else {
+          refuse_unnamed_channels(asked);
+        }
         if (asked.channels.empty()) throw Failure("no channel gives a temperature");
         module = asked;
       });
@@ -124,10 +128,13 @@ void ask_for_module(InitDraft& draft, std::size_t bus, int unit, Questions& ques
 void ask_for_modules(InitDraft& draft, Questions& questions, const InitEyes& eyes) {
   for (std::size_t bus = 0; bus < draft.buses.size();) {
     const std::string name = bus_text(draft.buses[bus]);
-    std::vector<int> units = eyes.find_units(draft.buses[bus]);
+    std::vector<int> units;
+    if (eyes.find_units) units = eyes.find_units(draft.buses[bus]);
     if (units.empty())
-      questions.ask_until("No unit answers on " + name + ". Units to use all the same", "1",
-                          [&](const std::string& text) { units = parse_numbers(text); });
+      questions.ask_until(eyes.find_units
+                              ? "No unit answers on " + name + ". Units to use all the same"
+                              : "Units of the modules on " + name,
+                          "1", [&](const std::string& text) { units = parse_numbers(text); });
     const std::size_t before = draft.modules.size();
     for (const int unit : units) ask_for_module(draft, bus, unit, questions, eyes);
     if (draft.modules.size() > before) {
@@ -262,6 +269,12 @@ std::string sensor_name(const InitDraft& draft, const InitModule& module, int nu
   if (draft.buses.size() > 1) name.append("b").append(std::to_string(module.bus + 1));
   name.append("m").append(std::to_string(module.unit));
   return name.append("_").append(std::to_string(number));
+}
+
+void refuse_unnamed_channels(const InitModule& module) {
+  if (module.channels.empty())
+    throw Failure(module.preset + ": with --no-scan the channels must be named, such as " +
+                  module.preset + ":1-4");
 }
 
 void ask_for_rest(InitDraft& draft, bool has_controller, Questions& questions,

@@ -120,9 +120,7 @@ void try_modules(InitDraft& draft, const InitOptions& options, const fs::path& f
   for (InitModule& module : draft.modules) {
     const bool are_chosen = !module.channels.empty();
     if (are_chosen) continue;
-    if (options.no_scan)
-      throw Failure(module.preset + ": with --no-scan the channels must be named, such as " +
-                    module.preset + ":1-4");
+    if (options.no_scan) refuse_unnamed_channels(module);
     const std::vector<std::string> lines = try_module(draft, module, folder);
     std::cout << module.name << ", unit " << module.unit << ", " << module.preset << ":\n";
     for (const std::string& line : lines) std::cout << "    " << line << '\n';
@@ -249,7 +247,9 @@ int run_init(const InitOptions& options) {
   }
   const bool are_asked_for = given.modules.empty();
   if (!are_asked_for) settle_modules(given);  // from options: cannot be asked again
-  const InitEyes eyes = eyes_of(folder);
+  InitEyes eyes = eyes_of(folder);
+  if (options.no_scan) eyes.find_units = nullptr;
+  if (options.no_scan) eyes.try_module = nullptr;
   questions.interview([&] {
     draft = given;
     if (!is_complete_draft) ask_for_rest(draft, !options.controller.empty(), questions, eyes);

@@ -100,7 +100,7 @@ std::string inspection_html(const std::vector<RunFile>& runs, const Inspection& 
   html += runs_table(inspection);
   const std::vector<std::string> groups = alike(inspection);
   html += groups.empty() ? html_paragraph(none_alike)
-                         : html_heading("Places that move alike") + html_list(groups);
+                         : html_heading("Places that correlate above 0.98") + html_list(groups);
   if (!inspection.experiments.empty())
     html += html_heading("Experiments that would show more") + html_list(inspection.experiments);
   return html + html_end();

@@ -174,7 +174,9 @@ std::string inspection_text(const Inspection& inspection) {
     text += line + inspection.runs[finding.run].file + ": " + finding.text + "\n";
   }
   const std::vector<std::string> groups = alike(inspection);
-  text.append("\n").append(groups.empty() ? none_alike : "Places that move alike:").append("\n");
+  text.append("\n")
+      .append(groups.empty() ? none_alike : "Places that correlate above 0.98:")
+      .append("\n");
   for (const std::string& group : groups) text.append("  ").append(group).append("\n");
   if (!inspection.experiments.empty()) text += "\nWhat would tell more:\n";
   for (const std::string& experiment : inspection.experiments) text += "  " + experiment + "\n";

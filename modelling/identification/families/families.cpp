@@ -462,8 +462,8 @@ void add_warnings(const MeasuredTests& tests, FamiliesFit& fit) {
     std::string names;
     for (const std::string& name : group) names += (names.empty() ? "" : ", ") + name;
     fit.warnings.push_back(names +
-                           " always moved together: their gains are shared out. Where they can "
-                           "move apart, record that once");
+                           " always moved together: nothing recorded tells which of them a gain "
+                           "belongs to. Where they can move apart, record that once");
   }
   for (std::size_t o = 0; o < tests.outputs.size(); ++o)
     for (std::size_t f = 0; f < tests.folds.size(); ++f)

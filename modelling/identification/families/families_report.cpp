@@ -53,21 +53,11 @@ std::string about(double value) {
 /// What another day will show, as far as so many runs can tell. One run has seen no other day; two
 /// judge one another, each by a model of the other alone, which may be far worse than that of both.
 std::string claim_text(std::size_t runs, const std::string& name, const MadeFrom::Output& output) {
-  const char* of = name.c_str();
-  const std::string left_out = about(output.left_out_rms_um);
-  const std::string no_model = about(output.no_model_rms_um);
-  if (runs == 1)
-    return printed(
-        "%s: another day is not known; on it expect about %s um (each half of this run by a model "
-        "of the other; rows fitted %s, no model %s)\n",
-        of, left_out.c_str(), about(output.remainder_rms_um).c_str(), no_model.c_str());
-  if (runs == 2)
-    return printed(
-        "%s: on a third run expect between %s um (rows fitted) and %s (each run by a model of the "
-        "other), without a model %s; with three runs there would be a figure\n",
-        of, about(output.remainder_rms_um).c_str(), left_out.c_str(), no_model.c_str());
-  return printed("%s: RMS left out %.3f um, fitted %.3f, without a model %.3f\n", of,
-                 output.left_out_rms_um, output.remainder_rms_um, output.no_model_rms_um);
+  const char* how = runs == 1   ? "on another day (each half of this run by a model of the other)"
+                    : runs == 2 ? "on a third run (each run by a model of the other alone)"
+                                : "on another run (runs left out)";
+  return printed("%s: expect about %s um RMS %s\n", name.c_str(),
+                 about(output.left_out_rms_um).c_str(), how);
 }
 
 /// The largest RMS of a fold.

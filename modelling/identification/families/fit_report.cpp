@@ -100,17 +100,19 @@ std::string page(const MeasuredTests& tests, const Fit& fit, const std::vector<L
   std::string text = html_begin("Model of the thermal displacement");
   const char* judged_on = tests.runs.size() < 2 ? "stretches of the run" : "runs";
   for (std::size_t o = 0; o < tests.outputs.size(); ++o) {
-    std::string verdict = tests.outputs[o] + ": on " + judged_on + " that it was not fitted to, ";
-    verdict += left_out[o].with_um < left_out[o].without_um
-                   ? "the model leaves " + figure_text(left_out[o].with_um) + " µm RMS of " +
-                         figure_text(left_out[o].without_um) + " µm."
-                   : "no model does better than none, which leaves " +
-                         figure_text(left_out[o].without_um) + " µm RMS.";
+    std::string verdict = tests.outputs[o] + ": ";
+    if (!(left_out[o].with_um < left_out[o].without_um))
+      verdict += "no model does better than none, which leaves " +
+                 figure_text(left_out[o].without_um) + " µm RMS.";
+    else if (left_out[o].other_day_um > 0.0)
+      verdict += "expect about " + figure_text(left_out[o].other_day_um) +
+                 " µm RMS on another day, none of which was measured.";
+    else
+      verdict += std::string("on ") + judged_on + " that it was not fitted to, the model leaves " +
+                 figure_text(left_out[o].with_um) + " µm RMS of " +
+                 figure_text(left_out[o].without_um) + " µm.";
     if (is_unfit(left_out[o].with_um, left_out[o].without_um))
       verdict += " Half or more is left: not fit for use. Next: thermocomp diagnose.";
-    if (left_out[o].other_day_um > 0.0)
-      verdict += " Another day is not known: expect about " +
-                 figure_text(left_out[o].other_day_um) + " µm.";
     text += html_paragraph(verdict);
   }
   for (std::size_t o = 0; o < tests.outputs.size(); ++o)

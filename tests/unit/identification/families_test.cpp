@@ -174,19 +174,19 @@ TEST_CASE("a model judged within one run says so", "[families]") {
   const std::string said = families_text(tests, fit);
   CHECK(said.find("judged within one run: not valid for other days") != std::string::npos);
   CHECK(said.find("Next: a run of another day") != std::string::npos);
-  CHECK(said.find("another day is not known") != std::string::npos);
-  CHECK(said.find("RMS left out") == std::string::npos);
+  CHECK(said.find("on another day (each half of this run by a model of the other)") !=
+        std::string::npos);
 }
 
-TEST_CASE("two runs, each judged by the other alone, give a range and three a figure",
-          "[families]") {
+TEST_CASE("fit says one error to expect, and on what", "[families]") {
   const auto follows = [](double quick, double slow, double, double) { return 5.0 * quick - slow; };
   const MeasuredTests two = machine_tests(2, follows);
   const std::string said = families_text(two, fitted(two));
-  CHECK(said.find("on a third run expect between") != std::string::npos);
-  CHECK(said.find("RMS left out") == std::string::npos);
+  CHECK(said.find("um RMS on a third run (each run by a model of the other alone)") !=
+        std::string::npos);
   const MeasuredTests three = machine_tests(3, follows);
-  CHECK(families_text(three, fitted(three)).find("z_um: RMS left out") != std::string::npos);
+  CHECK(families_text(three, fitted(three)).find("um RMS on another run (runs left out)") !=
+        std::string::npos);
 }
 
 TEST_CASE("what few runs have not shown widens what a prediction may be off by", "[families]") {

@@ -136,9 +136,9 @@ TEST_CASE("a module's outage is a gap, not a step of its sensors", "[inspection]
 TEST_CASE("single places do not form a group", "[inspection]") {
   Inspection inspection;
   inspection.groups = {{"t1_degC"}, {"t2_degC"}};
-  CHECK_THAT(inspection_text(inspection), Catch::Contains("No two places move alike."));
+  CHECK_THAT(inspection_text(inspection), Catch::Contains("No two places correlate above 0.98."));
   CHECK_THAT(inspection_html({recording()}, inspection),
-             Catch::Contains("No two places move alike."));
+             Catch::Contains("No two places correlate above 0.98."));
   inspection.groups = {{"t1_degC", "t2_degC"}, {"t3_degC"}};
   CHECK_THAT(inspection_text(inspection), Catch::Contains("alike:\n  t1_degC, t2_degC\n"));
   CHECK_THAT(inspection_text(inspection), !Catch::Contains("t3_degC"));
