@@ -21,18 +21,19 @@ constexpr int hinges_a_signal = 8;
 constexpr std::size_t values_of_a_switch_max = 6;
 /// A hinge counts as half of what it moves: nothing but the recording says that it is there.
 constexpr double weight_of_hinge = 0.5;
-/// A lag as well: of two columns that explain as much, the one that acts at once stays.
+/// A lag too counts as this share of what it moves: of two columns that explain the same, the one
+/// that acts at once stays.
 constexpr double weight_of_lag = 0.7;
 /// A place that moved by less than this share of the usual one is not believed more for it.
 constexpr double usual_share = 0.05;
 /// Of columns of standard deviation 1: added to a mean square; and of the correlation with the
-/// output. These four were set on spindle, printer, one telescope, one cell and one probe; on the
-/// other measured machines they leave as little (docs/measurements.md).
+/// output. Set, as the two above, on spindle, printer, one telescope, one cell and one probe; the
+/// other measured machines were kept for judging (docs/measurements.md).
 constexpr double ridge_penalty = 3e-4;
 constexpr double l1_price = 1.5e-3;
 /// Of the price: what a column would help by less is rounding.
 constexpr double l1_tolerance = 1e-6;
-/// More columns join and leave only where rounding lets them do so for ever; 2 are usual.
+/// Rounding could let columns join and leave for ever; less than one join a column is usual.
 constexpr Eigen::Index joins_a_column_max = 10;
 
 bool is_switch(const MeasuredTests& tests, Eigen::Index signal) {

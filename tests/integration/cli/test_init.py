@@ -289,6 +289,21 @@ def test_what_is_not_there_is_named(foreign, folder):
     assert answer.stderr.rstrip().endswith("missing: --bus --module --controller")
 
 
+def test_no_scan_looks_at_no_bus_while_it_asks(folder):
+    config = folder / "thermocompd.toml"
+    with socket.create_server(("127.0.0.1", 0)) as device:
+        bus = f"tcp:127.0.0.1:{device.getsockname()[1]}"
+        status, shown = converse(["init", config, "--no-scan", "--controller", "none", "--axes", "z"],
+                                 [bus, "", "3", "wago_750_458", "wago_750_458:1-2", "bed column"])
+        device.setblocking(False)
+        with pytest.raises(BlockingIOError):
+            device.accept()
+    assert status == 0, shown
+    assert "Units of the modules on" in shown and "No unit answers" not in shown
+    assert "with --no-scan the channels must be named" in shown
+    assert run("check", config).returncode == 0
+
+
 @pytest.mark.parametrize("option, value, named", [
     ("--bus", "tcp:", "tcp:HOST"), ("--bus", "rtu:/dev/x:0", "baud"),
     ("--bus", "rtu:/dev/x:9600:maybe", "parity"), ("--bus", "tcp:h:99999", "port"),
