@@ -10,8 +10,8 @@ intervals: coverage, mean width relative to split-conformal intervals around rid
 lags, the coverage of those, and the ratio of the interval scores (width plus 40 times the excess).
 Both kinds are also widened, by one factor each for all splits, to a mean coverage of 95 %, and
 compared again. Then ours relative to the best peer of the split: median, maximum, geometric mean;
-relative to no model; rows that are worse than no model without being called outside; and the number of claimed
-errors that are right within 0.7 to 1.5.
+relative to no model; rows that are worse than no model without being called outside; and the number
+of claimed errors that are right within 0.7 to 1.5.
 """
 
 import argparse
