@@ -21,7 +21,7 @@ constexpr const char* style =
     "table{border-collapse:collapse;margin:.5em 0}"
     "td,th{border:1px solid #cbd5e0;padding:.25em .6em;text-align:right;vertical-align:top}"
     "td:first-child,th:first-child{text-align:left}th{background:#edf2f7;font-weight:600}"
-    ".line{white-space:nowrap}.long{min-width:11em}.text td{text-align:left}figure{margin:.6em 0}"
+    ".line{white-space:nowrap}.long{min-width:9em}.text td{text-align:left}figure{margin:.6em 0}"
     "figcaption{color:#4a5568;font-size:.9em}svg{width:100%;min-width:680px;height:auto}"
     ".small{font-size:.85em;color:#4a5568}.good{color:#22543d}.bad{color:#9b2c2c}"
     "@media print{@page{size:A4;margin:12mm}body{font-size:8.5pt;line-height:1.25;margin:0;"
@@ -34,7 +34,7 @@ std::string row(const std::vector<std::string>& cells, const char* tag) {
   // On a phone neither a figure with its unit is broken, nor a sentence after each word.
   constexpr std::size_t line_max = 24;
   for (const std::string& cell : cells) {
-    const bool is_figure = cell.find_first_of("0123456789") < 2;
+    const bool is_figure = cell.find_first_of("0123456789") != std::string::npos;
     html.append("<").append(tag);
     html.append(cell.size() > line_max ? " class=\"long\">" : is_figure ? " class=\"line\">" : ">");
     html.append(xml_text(cell));
