@@ -158,7 +158,8 @@ def test_the_axis_card_says_what_is_taken_out_and_what_was_left(machine, gateway
     machine.daemon.wait_for_offset(9.0)
     show(browser, gateway, PHONE)
     eventually(lambda: "taken out 9.0 of at most 60 µm" in text(browser, "axes"), "what is taken out")
-    assert re.search(r"not probed since the records begin, \d\d:\d\d", text(browser, "axes"))
+    eventually(lambda: re.search(r"not probed since the records begin, \d\d:\d\d", text(browser, "axes")),
+               "the history is read")
     assert "never compared with a measurement" in text(browser, "axes")
     machine.daemon.call("measured", axis="z", value_um=1.2, confirm=True)
     eventually(lambda: "1.2 µm left at the last probing, " in text(browser, "axes"), "what was left")
