@@ -89,6 +89,7 @@ def test_a_restart_keeps_what_happened_and_names_the_time_without_a_daemon(machi
     machine.module.start()
     machine.module.show(20.0, 20.0)
     gateway.wait_for(lambda s: any("lasted" in event["text"] for event in s["events"]), "it is over")
+    eventually(lambda: "lasted" in run_tool("events", machine.daemon.history)[1], "it is committed")
     began_s = time.time()
     getattr(machine.daemon, end)()
     ended_s = time.time()
