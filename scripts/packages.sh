@@ -56,4 +56,4 @@ packages_test=(
 )
 
 # Peers of bench/run.sh measured, and the cluster of fleet_slurm; too large for the tests.
-packages_bench=("${packages_test[@]}" python3-sklearn slurm-wlm munge)
+packages_bench=("${packages_test[@]}" python3-sklearn python3-scipy slurm-wlm munge)

@@ -13,6 +13,7 @@
 #include "config/model/model_file.hpp"
 #include "config/runs/run_file.hpp"
 #include "config/text/problems.hpp"
+#include "modelling/diagnosis/rank/search.hpp"
 #include "modelling/diagnosis/report/diagnosis_report.hpp"
 
 using namespace thermocomp;
@@ -56,6 +57,30 @@ template <class Hidden>
 Diagnosis diagnosis_of(Hidden hidden) {
   return diagnose(one_input(), {run_with(1, 600, hidden)}, {"train.csv"},
                   {run_with(2, 400, hidden)}, {"test.csv"});
+}
+
+struct FoundGain {
+  double value;
+  double sd;
+  double reach;  ///< to both ends of its interval
+};
+
+/// Of the first finding in one run.
+template <class Hidden>
+FoundGain found_gain(Hidden hidden) {
+  std::vector<RunFile> runs = {run_with(1, 600, hidden)};
+  // Without the speed, whose heat would be as good a name.
+  runs[0].columns.erase(runs[0].columns.begin() + 2);
+  runs[0].values.erase(runs[0].values.begin() + 2);
+  const MeasuredData data = measured_data(one_input(), runs, {"train.csv"},
+                                          shared_columns(one_input(), runs), Purpose::search);
+  const StackedRows rows = stacked_rows(data);
+  const std::vector<Hypothesis> all = hypotheses(data, rows);
+  const SearchResult result = search(data, rows, all, Rules{});
+  REQUIRE_FALSE(result.findings.empty());
+  const Finding& found = result.findings.front();
+  const Interval& of = found.gains_ci[0][0];
+  return {found.explanation.gains[0][0], found.explanation.gain_sd[0][0], 0.5 * (of.high - of.low)};
 }
 
 /// A day that begins at `start_degC`; z = 5 t1 + hidden(start_degC, rise, late), late being the
@@ -251,6 +276,15 @@ TEST_CASE("of many sensors that one output cannot tell apart the faulty one is n
     CHECK(answer.findings[0].subject ==
           std::string("t").append(std::to_string(sensor + 1)).append("_degC"));
   }
+}
+
+TEST_CASE("a gain errs by two deviations and a fifth of itself, a jump by its deviation",
+          "[diagnosis]") {
+  const FoundGain wrong = found_gain([](double, double rise_K, int) { return 1.0 * rise_K; });
+  CHECK(wrong.value == Approx(1.0).margin(0.1));
+  CHECK(wrong.reach == Approx(1.96 * std::hypot(2.0 * wrong.sd, 0.2 * wrong.value)));
+  const FoundGain jump = found_gain([](double, double, int row) { return row < 300 ? 0.0 : 4.0; });
+  CHECK(jump.reach < 0.2 * jump.value);
 }
 
 TEST_CASE("a jump of the datum in one run is a fault of that run and no term", "[diagnosis]") {
