@@ -72,14 +72,15 @@ std::vector<Candidate> candidates_of(const std::vector<Explanation>& weighed,
     Candidate candidate{of.cause, of.subject, {}, each.probability, share_of_remainder(each)};
     if (of.run) candidate.run = train.runs[*of.run].name;
     candidate.score = each.score;
-    candidate.witness = each.witness;
-    candidate.left_out = each.left_out;
-    candidate.left_out_of_best = each.left_out_of_best;
-    candidate.parameters = free_parameters(of);
     std::vector<std::string> outputs;
     for (std::size_t output = 0; output < each.gains.size(); ++output)
       if (each.gains[output].size() > 0) outputs.push_back(train.model.outputs[output]);
-    candidate.outputs = outputs.size();
+    candidate.figures = {{"score", each.score},
+                         {"witness", each.witness},
+                         {"left_out", each.left_out},
+                         {"left_out_of_best", each.left_out_of_best},
+                         {"parameters", free_parameters(of)},
+                         {"outputs", outputs.size()}};
     if (all.size() < candidates_tried) {
       Finding alone{each};
       alone.shape_ci.resize(each.shape.size());

@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "estimator/thermal_model.hpp"
@@ -51,13 +52,9 @@ struct Candidate {
   /// Alone in the model, on test rows, which decide nothing; empty where no term carries it.
   std::map<std::string, TestGain> test{};
   std::string would_decide{};  ///< the experiment that tells it from the likeliest other one
-  // What the probability comes from (rank/explanation.hpp):
-  double score{0.0};
-  double witness{0.0};
-  double left_out{0.0};
-  double left_out_of_best{0.0};
-  std::size_t parameters{0};  ///< that were free: of its shape, and gains of an output
-  std::size_t outputs{0};     ///< on which it acts
+  double score{0.0};           ///< ln L over that of nothing
+  /// What the probability comes from (rank/posterior.hpp), by name.
+  std::vector<std::pair<const char*, double>> figures{};
 };
 
 /// RMS of training rows that were left out in turn.

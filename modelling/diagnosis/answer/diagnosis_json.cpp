@@ -99,12 +99,7 @@ Json candidate_json(const Candidate& of, const std::string& unit, bool in_full) 
                {"would_decide", of.would_decide}};
   if (of.run) json["run"] = *of.run;
   if (!in_full) return json;
-  json["score"] = number(of.score);
-  json["witness"] = number(of.witness);
-  json["left_out"] = number(of.left_out);
-  json["left_out_of_best"] = number(of.left_out_of_best);
-  json["parameters"] = of.parameters;
-  json["outputs"] = of.outputs;
+  for (const auto& [name, value] : of.figures) json[name] = number(value);
   return json;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <iterator>
 #include <random>
 #include <utility>
 
@@ -151,12 +152,18 @@ std::vector<BlockSquares> squares_by_block(const Residuals& before, const Residu
   return blocks;
 }
 
-double peak(const Residuals& residuals) {
-  double largest = not_a_number;
+/// The finite values of all runs.
+Column present(const Residuals& residuals) {
+  std::vector<double> values;
   for (const Column& run : residuals.by_run)
-    for (const double value : run)
-      if (std::isfinite(value) && !(std::abs(value) <= largest)) largest = std::abs(value);
-  return largest;
+    std::copy_if(run.begin(), run.end(), std::back_inserter(values),
+                 [](double value) { return std::isfinite(value); });
+  return Eigen::Map<const Column>(values.data(), std::ssize(values));
+}
+
+double peak(const Residuals& residuals) {
+  const Column values = present(residuals);
+  return values.size() > 0 ? values.cwiseAbs().maxCoeff() : not_a_number;
 }
 
 }  // namespace
@@ -194,16 +201,9 @@ std::vector<Residuals> residuals(const Extended& extended, const MeasuredData& d
 }
 
 double root_mean_square(const Residuals& residuals) {
-  double sum = 0.0;
-  double count = 0.0;
-  for (const Column& run : residuals.by_run) {
-    for (const double value : run) {
-      if (!std::isfinite(value)) continue;
-      sum += value * value;
-      count += 1.0;
-    }
-  }
-  return count > 0 ? std::sqrt(sum / count) : not_a_number;
+  const Column values = present(residuals);
+  return values.size() > 0 ? std::sqrt(values.squaredNorm() / static_cast<double>(values.size()))
+                           : not_a_number;
 }
 
 OutputFigures output_figures(const Residuals& train, const Residuals& test,

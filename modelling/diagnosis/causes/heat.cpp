@@ -22,18 +22,10 @@ std::vector<Hypothesis> missing_heat_source_hypotheses(const Material& material,
   heat.columns = [&material, values = material.values_of(subject)](const Shapes& shapes,
                                                                    std::size_t) {
     return material.stacked([&](const MeasuredRun& run) {
-      const Column& u = values(run);
       Panel all(run.rows(), std::ssize(shapes));
-      for (const double exponent : {power.low, power.high}) {
-        std::vector<double> taus_s;
-        std::vector<Eigen::Index> places;
-        for (std::size_t i = 0; i < shapes.size(); ++i) {
-          if (shapes[i][1] != exponent) continue;
-          taus_s.push_back(shapes[i][0]);
-          places.push_back(static_cast<Eigen::Index>(i));
-        }
-        all(Eigen::all, places) = lagged(run.time_s, u.array().pow(exponent), taus_s);
-      }
+      for (std::size_t i = 0; i < shapes.size(); ++i)
+        all.col(static_cast<Eigen::Index>(i)) =
+            lagged(run.time_s, values(run).array().pow(shapes[i][1]), shapes[i][0]);
       return all;
     });
   };

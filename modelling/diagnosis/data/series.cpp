@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 namespace thermocomp::diagnosis {
 
@@ -100,6 +101,12 @@ Column slope(const Column& time_s, const Column& values, double tau_s) {
     out[row] = (smooth[after] - smooth[before]) / (time_s[after] - time_s[before]);
   }
   return out;
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + std::ssize(values) / 2;
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
 }
 
 std::vector<double> logarithmic_grid(double low, double high, std::size_t count) {

@@ -62,19 +62,15 @@ constexpr double discrepancy = 0.1;
 constexpr double never_known = 1e-9;
 constexpr double least_variance = 1e-9;
 
-/// From second differences, which neither offsets nor slopes reach.
+}  // namespace
+
 double noise_of(const Column& values, const std::vector<Block>& runs) {
   std::vector<double> bends;
   for (const Block& run : runs)
     for (Eigen::Index row = run.begin + 1; row + 1 < run.end; ++row)
       bends.push_back(std::abs(values[row + 1] - 2.0 * values[row] + values[row - 1]));
-  if (bends.empty()) return 0.0;
-  const auto middle = bends.begin() + std::ssize(bends) / 2;
-  std::nth_element(bends.begin(), middle, bends.end());
-  return *middle / (0.6745 * std::sqrt(6.0));
+  return bends.empty() ? 0.0 : median(std::move(bends)) / (0.6745 * std::sqrt(6.0));
 }
-
-}  // namespace
 
 double log_mean_exp(const Eigen::VectorXd& values) {
   const double most = values.maxCoeff();

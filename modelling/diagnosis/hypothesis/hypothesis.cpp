@@ -73,10 +73,7 @@ double median_step_s(const MeasuredData& data) {
   for (const MeasuredRun& run : data.runs)
     for (Eigen::Index row = run.begin + 1; row < run.rows(); ++row)
       steps.push_back(run.time_s[row] - run.time_s[row - 1]);
-  if (steps.empty()) return 1.0;
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle;
+  return steps.empty() ? 1.0 : median(std::move(steps));
 }
 
 bool moves(const Column& column) {

@@ -357,38 +357,34 @@ std::vector<Explanation> Fits::trials(const Hypothesis& hypothesis, const Shapes
 
 namespace {
 
-/// The likeliest of the trials that are worth about the most.
-std::size_t best_of(const std::vector<Explanation>& trials) {
-  std::vector<double> worth;
-  worth.reserve(trials.size());
-  for (const Explanation& trial : trials) worth.push_back(utility(trial));
-  const double most = *std::max_element(worth.begin(), worth.end());
+/// Of the trials that are about as good as the best by `first` the best by `second`.
+template <class First, class Second>
+std::size_t best_of(const std::vector<Explanation>& trials, First first, Second second) {
+  double most = -unknown;
+  for (const Explanation& trial : trials) most = std::max(most, first(trial));
   std::size_t best = trials.size();
   for (std::size_t i = 0; i < trials.size(); ++i)
-    if (worth[i] >= most - as_much &&
-        (best == trials.size() || trials[i].score > trials[best].score))
+    if (first(trials[i]) >= most - as_much &&
+        (best == trials.size() || second(trials[i]) > second(trials[best])))
       best = i;
   return best;
 }
 
-/// Of those that are about as likely as the likeliest, as an effect that is only nearly of its form
-/// makes them, the one that leaves least.
+double score_of(const Explanation& explanation) {
+  return explanation.score;
+}
+
+/// An effect that is only nearly of its form makes several values about as likely: the one counts
+/// that leaves least.
 std::size_t likeliest_of(const std::vector<Explanation>& trials) {
-  double most = -unknown;
-  for (const Explanation& trial : trials) most = std::max(most, trial.score);
-  std::size_t best = trials.size();
-  for (std::size_t i = 0; i < trials.size(); ++i)
-    if (trials[i].score >= most - as_much &&
-        (best == trials.size() || trials[i].left_out > trials[best].left_out))
-      best = i;
-  return best;
+  return best_of(trials, score_of, [](const Explanation& each) { return each.left_out; });
 }
 
 }  // namespace
 
 Explanation Fits::weigh(const Hypothesis& hypothesis) const {
   const std::vector<Explanation> all = trials(hypothesis, grid_of(hypothesis));
-  return all[best_of(all)];
+  return all[best_of(all, utility, score_of)];
 }
 
 void Fits::refine(Explanation& explanation, By by) const {
@@ -411,7 +407,8 @@ void Fits::refine(Explanation& explanation, By by) const {
         shapes.back()[parameter] = value;
       }
       const std::vector<Explanation> all = trials(hypothesis, shapes);
-      const std::size_t best = by == By::worth ? best_of(all) : likeliest_of(all);
+      const std::size_t best =
+          by == By::worth ? best_of(all, utility, score_of) : likeliest_of(all);
       const double probability = explanation.probability;
       explanation = all[best];
       explanation.probability = probability;

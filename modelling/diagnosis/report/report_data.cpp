@@ -5,6 +5,7 @@
 #include "config/runs/run_file.hpp"
 #include "config/text/units.hpp"
 #include "modelling/diagnosis/data/series.hpp"
+#include "modelling/diagnosis/fit/output_fit.hpp"
 #include "modelling/diagnosis/report/diagnosis_report.hpp"
 
 namespace thermocomp::diagnosis {
@@ -64,36 +65,25 @@ std::vector<Phase> phases_of(const MeasuredRun& run, const MeasuredData& data) {
 }
 
 Whiteness whiteness_of(const Column& time_s, const Column& residual) {
-  std::vector<double> values;
-  std::vector<double> times_s;
-  for (Eigen::Index row = 0; row < residual.size(); ++row) {
-    if (!std::isfinite(residual[row])) continue;
-    values.push_back(residual[row]);
-    times_s.push_back(time_s[row]);
-  }
+  std::vector<Eigen::Index> present;
+  for (Eigen::Index row = 0; row < residual.size(); ++row)
+    if (std::isfinite(residual[row])) present.push_back(row);
   Whiteness white;
-  const std::size_t n = values.size();
+  const Eigen::Index n = std::ssize(present);
   if (n < 8) return white;
-  double mean = 0.0;
-  for (const double value : values) mean += value / static_cast<double>(n);
-  double variance = 0.0;
-  for (double& value : values) {
-    value -= mean;
-    variance += value * value / static_cast<double>(n);
-  }
-  std::vector<double> bends;
-  for (std::size_t i = 1; i + 1 < n; ++i)
-    bends.push_back(std::abs(values[i + 1] - 2.0 * values[i] + values[i - 1]));
-  const auto middle = bends.begin() + static_cast<std::ptrdiff_t>(bends.size() / 2);
-  std::nth_element(bends.begin(), middle, bends.end());
-  white.noise_um = *middle / (0.6745 * std::sqrt(6.0));
+  Column values = residual(present);
+  white.noise_um = noise_of(values, {{0, n}});
+  values.array() -= values.mean();
+  const double variance = values.squaredNorm() / static_cast<double>(n);
   if (!(variance > 0)) return white;
   white.noise_share = std::min(1.0, white.noise_um * white.noise_um / variance);
-  for (std::size_t lag = 1; lag < n / 2; ++lag) {
-    double product = 0.0;
-    for (std::size_t i = 0; i + lag < n; ++i) product += values[i] * values[i + lag];
-    if (product / static_cast<double>(n - lag) > variance / std::exp(1.0)) continue;
-    white.correlation_time_s = lag == 1 ? 0.0 : times_s[lag] - times_s[0];
+  for (Eigen::Index lag = 1; lag < n / 2; ++lag) {
+    if (values.head(n - lag).dot(values.tail(n - lag)) / static_cast<double>(n - lag) >
+        variance / std::exp(1.0))
+      continue;
+    if (lag > 1)
+      white.correlation_time_s =
+          time_s[present[static_cast<std::size_t>(lag)]] - time_s[present.front()];
     break;
   }
   return white;
