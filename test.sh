@@ -53,9 +53,9 @@ case $preset in
     ;;
 esac
 
-# Results of the tests and of the repeated ones (counted by .ci/run).
-results=$PWD/build/$preset/results.xml
-repeated=$PWD/build/$preset/results_repeated.xml
+# Results of each part of the tests: results_PART.xml, of the repeated ones repeated_PART.xml (counted by
+# .ci/run).
+folder=$PWD/build/$preset
 failed_names=build/$preset/Testing/Temporary/LastTestsFailed.log  # written by ctest
 
 # Skipped tests with their reasons, so that they do not look passed.
@@ -90,7 +90,7 @@ show_sanitizer_reports() {
 # Failed tests run once more, alone: other load must not decide. Those that then pass are named, since a
 # test that fails by chance is a defect too.
 repeat_failed() {
-  local status=0
+  local status=0 repeated=$folder/repeated_$part.xml
   [[ -s $failed_names ]] || return 1
   echo "== repeating alone what failed"
   "$@" ctest --preset "$preset" --no-tests=error --rerun-failed -j 1 --output-junit "$repeated" ||
@@ -100,17 +100,18 @@ repeat_failed() {
   return "$status"
 }
 
+# run_tests PART CTEST_OPTION...
 run_tests() {
-  local runner=() status=0
+  local part=$1 runner=() status=0
+  shift
   export PYTEST_ADDOPTS=-rs  # pytest names what it skips
   if [[ $preset == tsan || $preset == asan-ubsan* ]]; then
     runner=(run_as_sanitizers_need)
     collect_sanitizer_reports
   fi
-  if [[ $preset == coverage ]]; then find "build/$preset" -name '*.gcda' -delete; fi
   # Two places per CPU: a test that computes takes both (cmake/ThermocompTargets.cmake).
   "${runner[@]}" ctest --preset "$preset" --no-tests=error -j "$((2 * $(nproc)))" \
-    "${ctest_options[@]}" --output-junit "$results" || status=$?
+    "$@" --output-junit "$folder/results_$part.xml" || status=$?
   if ((status != 0)); then
     status=0
     repeat_failed "${runner[@]}" || status=$?
@@ -127,26 +128,55 @@ coverage_report() {
     echo "line by line: build/$preset/coverage.html"
 }
 
-build_options=()
+# build TARGET...
+build() {
+  cmake --build --preset "$preset" -j "$(build_jobs)" --target "$@"
+}
+
+# test_part PART CTEST_OPTION...: notes whether one failed.
+test_part() {
+  local part=$1
+  stage "tests $preset $part" run_tests "$@" || failed=1
+  say_what_was_skipped
+}
+
+# Tests of processes wait for devices half of their time: what only the others need is built behind them.
+test_processes_while_building() {
+  local labels='^(attack|integration|linuxcnc|real_time|service|vm)$' behind
+  stage "build $preset, programs" build process_tests
+  nice -n 19 ninja -C "$folder" -j "$(build_jobs)" "${targets[@]}" >"$folder/behind.log" 2>&1 &
+  behind=$!
+  trap 'kill "$behind" 2>/dev/null || true' EXIT
+  test_part processes --label-regex "$labels" "${left_out[@]}"
+  wait "$behind" || true  # what failed is built again, where it is seen
+  trap - EXIT
+  left_out=(--label-exclude "${labels%)\$}|${left_out_labels})\$")
+}
+
+targets=(all) left_out_labels='nightly|planted'
 case $extent in
-  quick)
-    ctest_options=(--label-regex '^quick$' "${ctest_options[@]}")
-    build_options=(--target quick_tests)
-    ;;
-  usual | build-only) ctest_options=(--label-exclude '^planted$' "${ctest_options[@]}") ;;
-  all) build_options=(--target all planted_tests) ;;
+  quick) targets=(quick_tests) ;;
+  all) targets=(all planted_tests) left_out_labels=none ;;
 esac
+left_out=(--label-exclude "^($left_out_labels)\$")
 stage "packages" scripts/setup.sh test
 stage "configure $preset" cmake --preset "$preset"
-stage "build $preset" cmake --build --preset "$preset" -j "$(build_jobs)" "${build_options[@]}"
-if [[ $extent == build-only ]]; then exit 0; fi
+if [[ $extent == build-only ]]; then
+  stage "build $preset" build "${targets[@]}"
+  exit 0
+fi
 # The guest for sanitizer builds. Without it the tests on CAN fail with a message; all others run.
 if [[ $extent != quick && ($preset == asan-ubsan* || $preset == tsan) ]]; then
   stage "kernel of the guest" scripts/guest-kernel.sh || true
 fi
-rm -f "$results" "$repeated" "$failed_names"
-status=0
-stage "tests $preset" run_tests || status=$?
-say_what_was_skipped
+rm -f "$folder"/results_*.xml "$folder"/repeated_*.xml "$failed_names"
+if [[ $preset == coverage ]]; then find "$folder" -name '*.gcda' -delete; fi
+failed=0
+if [[ $extent != quick && ${#ctest_options[@]} -eq 0 ]]; then test_processes_while_building; fi
+stage "build $preset" build "${targets[@]}"
+case $extent in
+  quick) test_part quick --label-regex '^quick$' "${ctest_options[@]}" ;;
+  *) test_part others "${left_out[@]}" "${ctest_options[@]}" ;;
+esac
 if [[ $preset == coverage ]]; then stage "coverage" coverage_report; fi
-exit "$status"
+exit "$failed"
