@@ -3,7 +3,7 @@
 # static checks.
 #   ./test.sh [--quick | --all | --build-only] [--preset PRESET] [-- CTEST_OPTION...]
 #   --quick: for daily work: only test programs, without packages, processes, guests or campaigns
-#   --all: also tests that plant bugs in copies of the sources and check that they are found
+#   --all: also the longest tests, and those that plant bugs in copies of the sources
 #   --build-only: no tests
 #   --preset: debug, release (default), asan-ubsan, asan-ubsan-all (with the modelling), tsan, coverage
 set -euo pipefail
