@@ -68,7 +68,7 @@ def test_a_new_machine_with_one_hour_is_better_with_its_sisters(series, tmp_path
     assert answer["machines"] == 5 and 0 < answer["outputs"]["z_um"]["settled"] < 1
     assert run("fit", f"{train}@:3600", "--outputs", "z_um", "-o", own).returncode == 0
     left = left_um(model, test, tmp_path)
-    assert left < 0.6 * left_um(own, test, tmp_path)
+    assert left < 0.8 * left_um(own, test, tmp_path)
     stated = tomllib.loads(model.read_text())["made_from"]["output"]["z_um"]["left_out_rms_um"]
     assert 0.4 < stated / left < 4
     again = run("fit", test, "--outputs", "z_um", "--prior", model, "--drift-percent", 10,
