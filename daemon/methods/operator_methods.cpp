@@ -9,6 +9,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "config/text/printable_text.hpp"
 #include "config/text/problems.hpp"
 #include "daemon/methods/methods.hpp"
 #include "daemon/status/reference_rules.hpp"
@@ -301,10 +302,12 @@ RpcPending reload(const DaemonActions& actions,
 /// The person behind a client that serves many: noted beside the client's own user, which counts.
 std::string asked_for(const json& params) {
   constexpr std::size_t bytes_max = 64;
-  if (!params.contains("for")) return {};
-  if (!params["for"].is_string() || params["for"].get_ref<const std::string&>().size() > bytes_max)
-    throw RpcError(rpc::invalid_params, "params.for must be a name of at most 64 bytes");
-  return params["for"].get<std::string>();
+  const auto found = params.find("for");
+  if (found == params.end()) return {};
+  const std::string* name = found->get_ptr<const std::string*>();
+  if (name == nullptr || name->size() > bytes_max || !is_printable(*name))
+    throw RpcError(rpc::invalid_params, "params.for must be a printable name of at most 64 bytes");
+  return *name;
 }
 
 RpcPending candidate(const DaemonActions& actions, const json& params) {

@@ -137,8 +137,8 @@ def test_a_command_is_noted_with_whom_it_is_for(machine):
     events = [each for each in daemon.call("events")["events"] if each["kind"] == "command"]
     assert [each.get("for") for each in events] == ["maria", None]
     assert " for maria\n" in daemon.cli("events")[1]
-    for name in ("m" * 65, 7):
-        with pytest.raises(Refused, match="params.for must be a name"):
+    for name in ("m" * 65, 7, "maria\ndaemon stopped"):
+        with pytest.raises(Refused, match="params.for must be a printable name"):
             daemon.call("disable", **{"for": name})
     assert daemon.status()["enabled"]
 
