@@ -201,6 +201,7 @@ function nearestRow(ms) {
 }
 
 function moveCursor(step) {
+  drawAll();  // the newest rows may not be drawn yet, and the line would be outside
   const [from, to] = timeWindow();
   const seen = table.map(row => row[0].getTime()).filter(ms => ms >= from && ms <= to);
   if (seen.length === 0) return;
