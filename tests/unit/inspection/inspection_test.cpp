@@ -140,7 +140,8 @@ TEST_CASE("single places do not form a group", "[inspection]") {
   CHECK_THAT(inspection_html({recording()}, inspection),
              Catch::Contains("No two places correlate above 0.98."));
   inspection.groups = {{"t1_degC", "t2_degC"}, {"t3_degC"}};
-  CHECK_THAT(inspection_text(inspection), Catch::Contains("alike:\n  t1_degC, t2_degC\n"));
+  CHECK_THAT(inspection_text(inspection),
+             Catch::Contains("correlate above 0.98:\n  t1_degC, t2_degC\n"));
   CHECK_THAT(inspection_text(inspection), !Catch::Contains("t3_degC"));
 }
 
