@@ -41,7 +41,7 @@ class BridgeState {
   /// Takes the answer to the request made from `reported`.
   void take(const Answer& answer, const MachineView& reported, nanoseconds now);
   void fault() noexcept { ++outputs_.faults; }
-  /// Outputs for now. An offset is present only once after each change.
+  /// Returns the outputs at time `now`. Each change of an offset is returned once.
   [[nodiscard]] Outputs show(const MachineView& view, nanoseconds now);
 
  private:

@@ -5,14 +5,14 @@
 packages_machine=(
   cmake ninja-build g++ pkg-config
   libeigen3-dev libmodbus-dev libspdlog-dev libtomlplusplus-dev nlohmann-json3-dev
-  libsqlite3-dev libsystemd-dev libssl-dev libcli11-dev
+  libsqlite3-dev libsystemd-dev libssl-dev libcrypt-dev libcli11-dev
 )
 
 # All programs that run on the machine's computer.
 packages_build=(
   "${packages_machine[@]}" ccache
   # thermocomp-gateway; the last is for the charts of its page.
-  libmicrohttpd-dev libmosquitto-dev libcrypt-dev zlib1g-dev libjs-dygraphs
+  libmicrohttpd-dev libmosquitto-dev zlib1g-dev libjs-dygraphs
   # thermocomp-fleet and thermocomp-uplink.
   libpqxx-dev
 )

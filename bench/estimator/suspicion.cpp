@@ -171,7 +171,7 @@ class Fold {
       tally.in_time = since_s <= jump_aim_s ? 1 : 0;
       tally.delay_s = since_s;
       tally.size_K = std::abs(temps_degC[sensor] - temps_degC_[row][sensor]);
-      if (end_s > times_s_.back()) break;  // of a long error only the detection counts
+      if (end_s > times_s_.back()) break;  // a long error: only its detection counts
     }
     return tally;
   }

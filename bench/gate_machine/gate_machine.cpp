@@ -192,7 +192,7 @@ CorrectionConfig recursive(bool sides_apart, double gain_drift, double bias_drif
   CorrectionConfig config = two_phase(false);
   config.form = CorrectionForm::recursive;
   if (sides_apart) config.groups = {{"a_degC"}, {"b_degC"}, {"c_degC"}};
-  config.noise_um = 2 * probing_noise_um;  // of the probing and of the concurrent readings
+  config.noise_um = 2 * probing_noise_um;  // noise of the probing plus that of the readings
   config.gain_drift_per_sqrt_h = gain_drift;
   config.bias_drift_um_per_sqrt_h = bias_drift;
   return config;

@@ -115,7 +115,7 @@ class ModbusScan {
   const std::function<void(const std::string&)>& progress_;
   ModbusConnection connection_;
   std::optional<ModbusPoller> poller_;  ///< none: no devices configured
-  // Of the device being scanned, by channel.
+  // Answers of the device being scanned, one per channel.
   std::vector<Answer> values_;
   std::vector<std::optional<Answer>> statuses_;
 };

@@ -24,16 +24,18 @@ constexpr double weight_of_hinge = 0.5;
 /// A lag too counts as this share of what it moves: of two columns that explain the same, the one
 /// that acts at once stays.
 constexpr double weight_of_lag = 0.7;
-/// A place that moved by less than this share of the usual one is not believed more for it.
+/// Share of the places' usual deviation that is added, in quadrature, to each place's own before it
+/// is scaled to 1, so that a place that hardly moved is not magnified.
 constexpr double usual_share = 0.05;
-/// Of columns of standard deviation 1: added to a mean square; and of the correlation with the
-/// output. Set, as the two above, on spindle, printer, one telescope, one cell and one probe; the
+/// Penalties for columns of standard deviation 1: ridge_penalty is added to their mean square,
+/// l1_price subtracted from their correlation with the output. Both, weight_of_lag and usual_share
+/// were set on spindle, printer, one telescope, one cell and one probe; the
 /// other measured machines were kept for judging (docs/measurements.md).
 constexpr double ridge_penalty = 3e-4;
 constexpr double l1_price = 1.5e-3;
-/// Of the price: what a column would help by less is rounding.
+/// Share of l1_price below which an improvement by one more column is rounding.
 constexpr double l1_tolerance = 1e-6;
-/// Rounding could let columns join and leave for ever; less than one join a column is usual.
+/// Limit of the iteration, which rounding could make endless; usual is less than one join a column.
 constexpr Eigen::Index joins_a_column_max = 10;
 
 bool is_switch(const MeasuredTests& tests, Eigen::Index signal) {
