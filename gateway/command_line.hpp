@@ -1,4 +1,4 @@
-/// The command line of `thermocomp-gateway`; `--help` and manual page are made from it.
+/// Command line of `thermocomp-gateway`, the source of `--help` and the manual page.
 #pragma once
 
 #include <string>
@@ -11,11 +11,11 @@ namespace thermocomp::gateway {
 
 struct GatewayOptions {
   std::string config_file{"/etc/thermocomp/gateway.toml"};
-  std::string password_user;  ///< --password-line; empty: not asked for
+  std::string password_user;  ///< --password-line; empty: not given
   bool device_file{false};    ///< --device-file
 };
 
-/// @param options  outlives the parsing; its values are the defaults
+/// @param options  must outlive the parsing; its values are the defaults
 void declare_gateway_command_line(CLI::App& app, GatewayOptions& options);
 
 }  // namespace thermocomp::gateway

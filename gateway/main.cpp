@@ -1,4 +1,4 @@
-// thermocomp-gateway: what thermocompd does, for browsers, Prometheus, MQTT and MTConnect.
+// thermocomp-gateway: publishes thermocompd's status to browsers, Prometheus, MQTT and MTConnect.
 #include <chrono>
 #include <csignal>
 #include <cstdio>
@@ -44,8 +44,8 @@ sigset_t ending_signals() {
   return signals;
 }
 
-/// Whatever others do not answer (a name server, a disk, a broker), the process ends. What can be
-/// closed in order is closed by then.
+/// Ends the process after `time`, even if a name server, disk or broker does not answer. An orderly
+/// shutdown is finished by then.
 void end_within(std::chrono::seconds time) {
   std::thread([time] {
     std::this_thread::sleep_for(time);
@@ -70,24 +70,24 @@ class Gateway {
     feed_.listen([this](const SnapshotPointer& snapshot) { show(snapshot); });
     feed_.start();
   }
-  ~Gateway() { feed_.stop(); }  // before those who listen
+  ~Gateway() { feed_.stop(); }  // before its listeners
   Gateway(const Gateway&) = delete;
   Gateway& operator=(const Gateway&) = delete;
 
-  /// A line for whoever started it: which ports it has.
+  /// One line with the ports, for the caller.
   [[nodiscard]] std::string ready_line() const {
     nlohmann::json ready = {{"ready", true}};
     if (http_) ready["http"] = http_->port();
     if (shdr_) ready["shdr"] = shdr_->port();
     return ready.dump();
   }
-  /// Each second.
+  /// Called every second.
   void tick() {
     if (http_) http_->end_slow_connections();
   }
 
  private:
-  /// On the feed's thread.
+  /// Called on the feed's thread.
   void show(const SnapshotPointer& snapshot) {
     if (http_) http_->show(snapshot);
     if (mqtt_) mqtt_->show(snapshot);
@@ -95,7 +95,7 @@ class Gateway {
     watch_alarms(*snapshot);
   }
 
-  /// Judged by a clock that nobody sets; printed with the time of day.
+  /// Durations use the monotonic clock; published times are wall clock.
   void watch_alarms(const Snapshot& snapshot) {
     const double now_s =
         std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
@@ -120,7 +120,7 @@ class Gateway {
 
   DaemonFeed feed_;
   AlarmWatch alarms_;
-  bool alarms_told_{false};  ///< also that there are none
+  bool alarms_told_{false};  ///< alarms were published once, even if there were none
   std::optional<MqttPublisher> mqtt_;
   std::optional<ShdrAdapter> shdr_;
   std::optional<HookRunner> hooks_;
@@ -128,8 +128,8 @@ class Gateway {
   std::optional<HttpServer> http_;
 };
 
-/// The device file for the MTConnect agent, from what the running daemon has.
-/// @throws ClientError where it does not answer
+/// Device file for the MTConnect agent, from the running daemon.
+/// @throws ClientError if it does not answer
 std::string ask_device_file(const GatewaySettings& settings) {
   StatusClient client(settings.socket);
   Snapshot snapshot;
@@ -140,10 +140,9 @@ std::string ask_device_file(const GatewaySettings& settings) {
   return device_file(snapshot, settings.machine);
 }
 
-/// Until a signal ends it. @throws std::exception when a port cannot be had or a file cannot be
-/// used
+/// Runs until a signal. @throws std::exception if a port or file cannot be used
 void run_gateway(const GatewaySettings& settings) {
-  // Blocked before the first thread, so that only the wait below gets them.
+  // Blocked before the first thread starts, so that only sigtimedwait() receives them.
   const sigset_t signals = ending_signals();
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   Gateway gateway(settings);
@@ -163,7 +162,7 @@ void run_gateway(const GatewaySettings& settings) {
   end_within(end_max);
 }
 
-/// The journal when systemd started us, else standard error.
+/// Logs to the journal under systemd, else to standard error.
 void set_up_log(const std::string& level) {
   const char* name = "thermocomp-gateway";
   std::shared_ptr<spdlog::logger> logger;

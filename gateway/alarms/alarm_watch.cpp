@@ -12,9 +12,9 @@ namespace {
 void add_compensation(const Status& status, std::vector<AlarmCondition>& wrong) {
   const Verdict now = verdict(status);
   if (now.compensating) return;
-  // At a start values must last before they count.
+  // Normal at start-up, while the values are not yet valid for long enough.
   if (status.mode == Mode::starting && status.sensors_bad.empty()) return;
-  // A dry run that computes is wanted, for days.
+  // A dry run that computes is intended and may last for days.
   if (status.dry_run && status.mode == Mode::compensating) return;
   AlarmCondition condition{"compensation", "compensating: " + verdict_text(now), ""};
   const std::vector<Reason> reasons = by_severity(status.reasons);
@@ -22,8 +22,8 @@ void add_compensation(const Status& status, std::vector<AlarmCondition>& wrong) 
   wrong.push_back(std::move(condition));
 }
 
-/// One a bus or module that is away, in the place of its sensors.
-/// @return their names
+/// Adds one alarm per disconnected bus or silent module, in place of one per sensor.
+/// @return the sensors on it
 std::set<std::string> add_buses(const Status& status, std::vector<AlarmCondition>& wrong) {
   std::set<std::string> away;
   for (const BusStatus& bus : status.buses) {
@@ -44,7 +44,7 @@ std::set<std::string> add_buses(const Status& status, std::vector<AlarmCondition
   return away;
 }
 
-/// @param away  sensors whose bus or module has an alarm of its own
+/// @param away  sensors whose bus or module has its own alarm
 void add_sensors(const SensorsAnswer& answer, const std::set<std::string>& away,
                  std::vector<AlarmCondition>& wrong) {
   for (const SensorStatus& sensor : answer.sensors) {

@@ -1,5 +1,5 @@
-/// What is worth waking somebody for, with hysteresis: raised when it has been wrong for a while,
-/// cleared when it has been right for a while. Pure; time is an argument.
+/// Alarms, raised `raise_after_s` after a condition begins and cleared `clear_after_s` after it
+/// ends. Pure; time is an argument.
 #pragma once
 
 #include <deque>
@@ -11,20 +11,19 @@
 
 namespace thermocomp::gateway {
 
-/// One thing that may be wrong now.
 struct AlarmCondition {
-  std::string name;    ///< "compensation", "sensor/bed_front", "suspected/bed_front", "bound/z",
-                       ///< "domain", "bus/cabinet", "daemon"
-  std::string text;    ///< what is wrong
-  std::string remedy;  ///< what to do; empty: nothing that is known
+  std::string name;  ///< "compensation", "sensor/bed_front", "suspected/bed_front", "bound/z",
+                     ///< "domain", "bus/cabinet", "unit/bed", "daemon"
+  std::string text;
+  std::string remedy;  ///< what to do; empty: unknown
 };
 
-/// What is wrong in a snapshot. While the daemon is away nothing is known of the rest.
+/// Conditions present in a snapshot. While the daemon is away: that condition only.
 [[nodiscard]] std::vector<AlarmCondition> wrong_now(const Snapshot& snapshot);
 
 struct Alarm {
   AlarmCondition condition;
-  double since_s{0.0};  ///< of the clock of update()
+  double since_s{0.0};  ///< on the clock of update()
 };
 struct AlarmChange {
   bool is_raised{false};
@@ -36,8 +35,8 @@ class AlarmWatch {
   AlarmWatch(double raise_after_s, double clear_after_s)
       : raise_after_s_(raise_after_s), clear_after_s_(clear_after_s) {}
 
-  /// @param is_known  false: only what is listed is known; the rest stays as it is
-  /// @return what was raised or cleared by this
+  /// @param is_known  false: conditions that are not listed keep their state, except "daemon"
+  /// @return alarms that this call raised or cleared
   std::vector<AlarmChange> update(double now_s, const std::vector<AlarmCondition>& wrong,
                                   bool is_known);
   [[nodiscard]] std::vector<Alarm> active() const;
@@ -47,18 +46,18 @@ class AlarmWatch {
     Alarm alarm;
     bool is_wrong{false};
     bool is_raised{false};
-    double turned_s{0.0};  ///< when is_wrong changed last
+    double turned_s{0.0};  ///< last change of is_wrong
   };
   double raise_after_s_;
   double clear_after_s_;
-  std::map<std::string, Place> places_;  ///< by name; those that are right and cleared are dropped
+  std::map<std::string, Place> places_;  ///< by name; erased once neither wrong nor raised
 };
 
-/// Not more than so many an hour, whatever happens. Pure.
+/// Limits alarm commands to `per_hour_max` in any hour. Pure.
 class HookLimit {
  public:
   explicit HookLimit(unsigned per_hour_max) : per_hour_max_(per_hour_max) {}
-  /// Whether one more may begin now; if so it is counted.
+  /// Returns true, and counts the command, if it may start now.
   [[nodiscard]] bool take(double now_s) {
     constexpr double hour_s = 3600.0;
     while (!begun_s_.empty() && now_s - begun_s_.front() >= hour_s) begun_s_.pop_front();

@@ -39,7 +39,7 @@ std::vector<char*> pointers(std::vector<std::string>& texts) {
   return list;
 }
 
-/// In a process group of its own, with nothing of ours but standard error. @return -1: not begun
+/// Starts the command in a new process group that inherits only standard error. @return -1: failed
 pid_t spawn(const std::vector<std::string>& command, std::vector<std::string> environment) {
   std::vector<std::string> arguments = command;
   posix_spawn_file_actions_t files;

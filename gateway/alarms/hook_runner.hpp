@@ -1,5 +1,5 @@
-/// Runs the command of a site for each alarm that is raised or cleared: one at a time, not more
-/// than so many an hour, and ended when it takes too long.
+/// Runs the site's command for each raised or cleared alarm: one at a time, with limits on its
+/// duration and on commands per hour.
 #pragma once
 
 #include <memory>
@@ -12,11 +12,11 @@ namespace thermocomp::gateway {
 class HookRunner {
  public:
   explicit HookRunner(const GatewaySettings& settings);
-  ~HookRunner();  ///< ends a command that runs
+  ~HookRunner();  ///< kills a running command
   HookRunner(const HookRunner&) = delete;
   HookRunner& operator=(const HookRunner&) = delete;
 
-  /// Never waits. Beyond what may wait or run in an hour it is left out, and a warning logged.
+  /// Never blocks. Beyond the queue or hourly limit the command is dropped with a warning.
   void offer(const AlarmChange& change);
 
  private:

@@ -1,4 +1,4 @@
-/// The thread that makes answers that take their time.
+/// Thread for slow answers.
 #pragma once
 
 #include <cstddef>
@@ -13,8 +13,7 @@ struct JsonAnswer {
   std::string text;
 };
 
-/// Made one after the other on a thread of its own: a long one makes no page wait for its live
-/// values.
+/// Makes answers one after the other, so that a slow one does not delay the live values of pages.
 class AnswerThread {
  public:
   using Work = std::function<JsonAnswer()>;  ///< must not throw
@@ -22,11 +21,11 @@ class AnswerThread {
   static constexpr std::size_t waiting_max = 16;
 
   AnswerThread();
-  ~AnswerThread();  ///< those that wait are answered 503
+  ~AnswerThread();  ///< jobs still queued are answered with 503
   AnswerThread(const AnswerThread&) = delete;
   AnswerThread& operator=(const AnswerThread&) = delete;
 
-  /// `done` is called on a thread of its own. @return false: too many wait; nothing is called
+  /// Calls `done` on this thread. @return false: the queue is full or stopped; `done` is not called
   [[nodiscard]] bool ask(Work work, Done done);
   void stop() noexcept;
 

@@ -13,19 +13,19 @@ struct EventStreams::Parts {
   struct Stream {
     Parts* parts{nullptr};
     MHD_Connection* connection{nullptr};
-    StreamFramePointer frame;          ///< being sent; nullptr: none yet
-    const std::string* text{nullptr};  ///< of it: whole, or its change
+    StreamFramePointer frame;          ///< in transmission; nullptr: none yet
+    const std::string* text{nullptr};  ///< text of `frame`: whole or change
     std::size_t sent{0};
   };
 
   static ssize_t read(void* stream, std::uint64_t position, char* out, std::size_t size);
   static void close(void* stream);
-  /// Takes the newest frame, if there is one that this stream has not had.
+  /// Takes the newest frame if this stream has not sent it. @return true if taken
   bool take_newer(Stream& stream) const;
 
   mutable std::mutex mutex;
   StreamFramePointer newest;
-  std::set<MHD_Connection*> sleeping;  ///< suspended until there is a newer frame
+  std::set<MHD_Connection*> sleeping;  ///< suspended until the next frame
   std::size_t open{0};
   bool stops{false};
 };
@@ -39,8 +39,8 @@ bool EventStreams::Parts::take_newer(Stream& stream) const {
   return true;
 }
 
-/// libmicrohttpd asks for more content. Under the lock from looking to suspending, so that no frame
-/// comes in between and is waited for in vain.
+/// libmicrohttpd's request for content. The lock covers check and suspension, so that a frame
+/// published in between is not missed.
 ssize_t EventStreams::Parts::read(void* cls, std::uint64_t /*position*/, char* out,
                                   std::size_t size) {
   Stream& stream = *static_cast<Stream*>(cls);
@@ -88,7 +88,7 @@ MHD_Response* EventStreams::open(MHD_Connection* connection) {
   MHD_Response* response = MHD_create_response_from_callback(
       MHD_SIZE_UNKNOWN, block_bytes, &Parts::read, stream.get(), &Parts::close);
   if (response != nullptr) {
-    static_cast<void>(stream.release());  // close() has it now
+    static_cast<void>(stream.release());  // close() owns it
     return response;
   }
   const std::lock_guard lock(parts_->mutex);

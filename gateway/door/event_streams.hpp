@@ -1,5 +1,5 @@
-/// Server-sent events to any number of pages: each gets the newest state there is when it has taken
-/// the one before, so a slow page misses states and costs no memory.
+/// Server-sent events to any number of pages. Each page gets the newest state once it has taken the
+/// previous one: a slow page skips states and costs no memory.
 #pragma once
 
 #include <cstddef>
@@ -12,11 +12,11 @@ struct MHD_Response;    // NOLINT(readability-identifier-naming)
 
 namespace thermocomp::gateway {
 
-/// What is sent to all pages at one time.
+/// One state, sent to all pages.
 struct StreamFrame {
-  std::uint64_t number{0};  ///< rises with each
-  std::string text;         ///< one event, in the form of the protocol: the whole state
-  std::string change;       ///< to whom has had the frame before; empty: the whole state to all
+  std::uint64_t number{0};  ///< increases by one per frame
+  std::string text;         ///< the whole state as one event of the protocol
+  std::string change;       ///< for a receiver of the previous frame; empty: `text` for all
 };
 using StreamFramePointer = std::shared_ptr<const StreamFrame>;
 
@@ -28,9 +28,9 @@ class EventStreams {
   EventStreams& operator=(const EventStreams&) = delete;
 
   void show(StreamFramePointer frame);
-  /// A response whose content is a stream; nullptr: memory is short, or the gateway stops.
+  /// Response whose content is a stream; nullptr: out of memory, or stopped.
   [[nodiscard]] MHD_Response* open(MHD_Connection* connection);
-  /// Ends all streams; open() gives none after it.
+  /// Ends all streams; from then on open() returns nullptr.
   void stop() noexcept;
   [[nodiscard]] std::size_t count() const;
 

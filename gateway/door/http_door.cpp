@@ -24,16 +24,16 @@ constexpr std::size_t body_bytes_max = 4096;
 constexpr std::size_t header_bytes_max = std::size_t{16} * 1024;
 constexpr unsigned silence_s_max = 10;
 
-/// Nothing but what this gateway serves itself, in nobody's frame, and without a referrer.
+/// Content policy: files of this gateway only, no frames.
 constexpr const char* own_files_only =
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' "
     "data:; connect-src 'self'; manifest-src 'self'; base-uri 'none'; form-action 'none'; "
     "frame-ancestors 'none'";
-/// For a page with its scripts inside, from a file that the administrator named.
+/// Policy for a page with inline scripts, from a file named by the administrator.
 constexpr const char* own_scripts =
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; connect-src "
     "'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
-constexpr std::size_t gzip_bytes_min = 1400;  // a packet
+constexpr std::size_t gzip_bytes_min = 1400;  // about one packet
 constexpr std::array<std::array<const char*, 2>, 5> headers_of_all{
     {{"X-Content-Type-Options", "nosniff"},
      {"X-Frame-Options", "DENY"},
@@ -82,18 +82,18 @@ int socket_of(MHD_Connection* connection) {
   spdlog::debug("http: {}", text.data());
 }
 
-/// The connection ends with this answer: what follows a refused request may be its body, and must
-/// not be taken for the next request.
+/// Closes the connection after the answer, because bytes after a refused request may be its body
+/// and must not be parsed as the next request.
 void end_with(MHD_Response* response) {
   MHD_add_response_header(response, MHD_HTTP_HEADER_CONNECTION, "close");
 }
 
-/// What is kept of one request while it is served.
+/// State of a request in progress.
 struct Request {
   std::string body;
   bool is_too_large{false};
   std::optional<JsonAnswer> answer;
-  std::string user;  ///< empty: there are no passwords
+  std::string user;  ///< empty: no password file
 };
 
 struct Address {
@@ -123,7 +123,7 @@ struct HttpDoor::Parts {
   Parts(const HttpSettings& settings_in, const PageFiles& files_in, Handler handler_in);
   ~Parts();
 
-  // The library's callbacks, which know the server by a pointer.
+  // libmicrohttpd's callbacks; `cls` is this object.
   static MHD_Result on_request(void* cls, MHD_Connection* connection, const char* path,
                                const char* method, const char* version, const char* data,
                                std::size_t* size, void** state);
@@ -153,13 +153,13 @@ struct HttpDoor::Parts {
   SlowConnections connections;
   std::atomic<std::uint64_t> requests{0};
   std::atomic<std::uint64_t> refused{0};
-  std::string certificate;  // the library goes on reading both
+  std::string certificate;  // libmicrohttpd keeps pointers to both
   std::string key;
   MHD_Daemon* daemon{nullptr};
   std::uint16_t port{0};
 };
 
-/// One request, while its handler is called.
+/// One request during its handler.
 class HttpDoor::Exchange final : public HttpExchange {
  public:
   Exchange(Parts& door, MHD_Connection* connection, const char* path, bool is_post,
@@ -193,7 +193,7 @@ class HttpDoor::Exchange final : public HttpExchange {
   MHD_Result result_{MHD_NO};
 };
 
-/// Called again with the answer, when the thread has it.
+/// When the answer is ready, libmicrohttpd calls on_request() again.
 void HttpDoor::Exchange::later(AnswerThread& answers, AnswerThread::Work work) {
   MHD_suspend_connection(connection_);
   const auto done = [&request = request_, connection = connection_](JsonAnswer made) {
@@ -284,7 +284,7 @@ std::optional<Refusal> HttpDoor::Parts::judge(MHD_Connection* connection, const 
   return judge_request(facts, hosts);
 }
 
-/// @return nothing where the request may go on
+/// @return nullopt: the request may proceed
 std::optional<MHD_Result> HttpDoor::Parts::refuse_stranger(MHD_Connection* connection,
                                                            Request& request) {
   if (!passwords) return std::nullopt;
@@ -316,7 +316,7 @@ MHD_Result HttpDoor::Parts::begin(MHD_Connection* connection, const char* path, 
                                   void** state) {
   auto request = std::make_unique<Request>();
   Request& begun = *request;
-  *state = request.release();  // on_completed ends it
+  *state = request.release();  // deleted by on_completed()
   if (const std::optional<Refusal> refusal = judge(connection, path, method)) {
     ++refused;
     return answer(connection, refusal->status, json_type, error_text(refusal->text));
@@ -394,7 +394,7 @@ MHD_Result HttpDoor::Parts::on_request(void* cls, MHD_Connection* connection, co
     return static_cast<Parts*>(cls)->serve(connection, path, method, data, size, state);
   } catch (const std::exception& error) {
     spdlog::error("http: {}", error.what());
-    return MHD_NO;  // ends this connection
+    return MHD_NO;  // closes the connection
   }
 }
 

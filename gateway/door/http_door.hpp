@@ -1,4 +1,4 @@
-/// The HTTP side of a page: TLS, passwords, limits of a request, the page's files.
+/// HTTP server of a page: TLS, passwords, request limits, the page's files.
 #pragma once
 
 #include <atomic>
@@ -17,38 +17,37 @@ namespace thermocomp::gateway {
 
 inline constexpr const char* json_type = "application/json";
 
-/// A request that the door let in. Its handler calls one of answer(), later() and stream(), once;
-/// a request without any of them ends its connection.
+/// An accepted request. Its handler calls answer(), later() or stream() once; otherwise the
+/// connection is closed.
 class HttpExchange {
  public:
   virtual ~HttpExchange() = default;
   [[nodiscard]] virtual std::string_view path() const = 0;
   [[nodiscard]] virtual bool is_post() const = 0;
-  [[nodiscard]] virtual std::string_view header(const char* name) const = 0;  ///< empty: none
+  [[nodiscard]] virtual std::string_view header(const char* name) const = 0;  ///< empty: absent
   [[nodiscard]] virtual std::string_view argument(const char* name) const = 0;
-  [[nodiscard]] virtual const std::string& user() const = 0;  ///< empty: there are no passwords
+  [[nodiscard]] virtual const std::string& user() const = 0;  ///< empty: no password file
   [[nodiscard]] virtual const std::string& body() const = 0;
   virtual void answer(unsigned status, const char* type, std::string text) = 0;
-  /// JSON, when the thread has made it; before that nothing ends the connection.
+  /// Answers with the JSON that `work` makes on the thread, which suspends the 10 s timeout.
   virtual void later(AnswerThread& answers, AnswerThread::Work work) = 0;
   virtual void stream(EventStreams& streams) = 0;
 };
 
-/// One thread of libmicrohttpd serves all connections. What a client may cost: `connections_max`
-/// connections, 16 kB of headers, 4 kB of body, 10 s without a byte, 15 s until its request is
-/// whole, however slowly it comes.
+/// One thread of libmicrohttpd serves all connections. Limits: `connections_max` connections, 16 kB
+/// of headers, 4 kB of body, 10 s without a byte, 15 s for a whole request.
 class HttpDoor {
  public:
-  /// For all but the page's files; called on the server's thread.
+  /// Handles every path except the page's files; called on the server's thread.
   using Handler = std::function<void(HttpExchange&)>;
 
-  /// @throws std::runtime_error when it cannot listen, or certificate or key cannot be used
+  /// @throws std::runtime_error if it cannot listen, or cannot use certificate or key
   HttpDoor(const HttpSettings& settings, const PageFiles& files, Handler handler);
   ~HttpDoor();
   HttpDoor(const HttpDoor&) = delete;
   HttpDoor& operator=(const HttpDoor&) = delete;
 
-  /// Ends connections that do not get on; called each second.
+  /// Closes connections that exceed their time; called every second.
   void end_slow_connections();
   [[nodiscard]] std::uint16_t port() const noexcept;
   [[nodiscard]] std::uint64_t requests() const noexcept;

@@ -15,7 +15,7 @@
 namespace thermocomp::gateway {
 namespace {
 
-/// By the suffix of a file; nullptr: it is no part of a page.
+/// MIME type by file suffix; nullptr: not served.
 const char* type_of(const std::filesystem::path& file) {
   constexpr std::array<std::array<const char*, 2>, 5> types{
       {{".html", "text/html; charset=utf-8"},
@@ -40,7 +40,7 @@ std::string gzipped(std::string_view bytes) {
                    Z_DEFAULT_STRATEGY) != Z_OK)
     return "";
   std::string text(deflateBound(&stream, bytes.size()), '\0');
-  // The library does not write into what it reads.
+  // zlib does not write to its input.
   stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
   stream.avail_in = static_cast<uInt>(bytes.size());
   stream.next_out = reinterpret_cast<Bytef*>(text.data());

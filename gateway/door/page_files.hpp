@@ -1,4 +1,4 @@
-/// The files of the page, read once at the start: a request can name nothing else.
+/// Files of the page, read once at start-up: no request can name another file.
 #pragma once
 
 #include <filesystem>
@@ -9,26 +9,27 @@
 namespace thermocomp::gateway {
 
 struct PageFile {
-  std::string type;  ///< of its content
+  std::string type;  ///< MIME type
   std::string bytes;
-  std::string gzip;             ///< the same, compressed
-  bool has_own_scripts{false};  ///< scripts stand in the page itself
+  std::string gzip;             ///< `bytes`, compressed
+  bool has_own_scripts{false};  ///< inline scripts
 };
 
-/// @return empty where zlib has no memory
+/// @return empty if zlib fails
 [[nodiscard]] std::string gzipped(std::string_view bytes);
 
 class PageFiles {
  public:
-  /// @param folder  of index.html, which is `/`, and of what it needs, by suffix
-  /// @param charts  of dygraph.min.js and dygraph.min.css; where they are missing the page has no
-  ///                charts, and says so
-  /// @param body  the page of `thermocomp structure --page`; empty: none
+  /// @param folder  index.html, served as `/`, and the other files of the page
+  /// @param charts  folder of dygraph.min.js and dygraph.min.css; without them the page has no
+  ///                charts and reports it
+  /// @param body  page of `thermocomp structure --page`; empty: none
   /// @throws std::runtime_error naming the file
   PageFiles(const std::filesystem::path& folder, const std::filesystem::path& charts,
             const std::filesystem::path& body);
 
-  /// By the path of a request; nullptr: none.
+  /// @param path  of a request
+  /// @return nullptr: no such file
   [[nodiscard]] const PageFile* find(std::string_view path) const;
 
  private:
@@ -37,9 +38,9 @@ class PageFiles {
   std::map<std::string, PageFile, std::less<>> files_;
 };
 
-/// share/thermocomp/`program` beside the folder of the programs.
+/// share/thermocomp/`program` next to the folder of the programs.
 [[nodiscard]] std::filesystem::path page_folder(const std::string& program);
-/// Where Debian's libjs-dygraphs puts its files.
+/// Folder of Debian's libjs-dygraphs.
 [[nodiscard]] std::filesystem::path charts_folder();
 
 }  // namespace thermocomp::gateway

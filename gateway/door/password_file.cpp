@@ -25,7 +25,7 @@ std::string random_bytes(std::size_t count) {
   return bytes;
 }
 
-/// Empty where the library refuses.
+/// @return empty if crypt_r fails
 std::string crypted(const std::string& password, const std::string& setting) {
   const auto work = std::make_unique<crypt_data>();
   const char* made = crypt_r(password.c_str(), setting.c_str(), work.get());
@@ -58,7 +58,7 @@ PasswordFile::Answer PasswordFile::check(const std::string& user, const std::str
   filled_at_ = now;
   if (!(tokens_ >= 1.0)) return Answer::too_many;
   tokens_ -= 1.0;
-  // An unknown user takes as long as a known one.
+  // Hashes for an unknown user too, so that the time does not reveal which users exist.
   const auto found = hashes_.find(user);
   const std::string& hash = found != hashes_.end() ? found->second : hashes_.begin()->second;
   const std::string made = crypted(password, hash);

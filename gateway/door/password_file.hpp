@@ -16,9 +16,9 @@ class PasswordFile {
   /// @throws ConfigurationError as read_passwords()
   explicit PasswordFile(const std::filesystem::path& file);
 
-  /// A hash takes some hundredths of a second, on purpose. So what was right is remembered (as a
-  /// digest with a key of this process), and of what was not only so many a second are looked at:
-  /// who guesses neither gets far nor keeps anybody out who is in.
+  /// A hash takes some hundredths of a second by design. The last correct password of each user is
+  /// therefore cached (as a digest with a key of this process), and other attempts are
+  /// rate-limited: guessing is slow and does not lock out logged-in users.
   [[nodiscard]] Answer check(const std::string& user, const std::string& password,
                              Clock::time_point now);
   [[nodiscard]] bool knows(const std::string& user) const { return hashes_.count(user) != 0; }
@@ -30,13 +30,13 @@ class PasswordFile {
   [[nodiscard]] std::string digest(const std::string& user, const std::string& password) const;
 
   std::map<std::string, std::string> hashes_;  ///< by user
-  std::map<std::string, std::string> right_;   ///< digest of what was right last, by user
+  std::map<std::string, std::string> right_;   ///< digest of the last correct password, by user
   std::string key_;                            ///< random
   double tokens_{looked_at_burst};
   Clock::time_point filled_at_{};
 };
 
-/// A line for the file. @throws std::runtime_error when the user's name or the password cannot be
+/// Line for the file. @throws std::runtime_error if user name or password is not allowed
 [[nodiscard]] std::string password_line(const std::string& user, const std::string& password);
 
 }  // namespace thermocomp::gateway

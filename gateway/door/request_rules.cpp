@@ -36,7 +36,7 @@ bool is_host_character(char c) {
          c == '_';
 }
 
-/// The origin's host with its port; empty: it is no origin of a page over HTTP.
+/// Host and port of the origin; empty: not an HTTP origin.
 std::string_view host_of_origin(std::string_view origin) {
   for (const std::string_view scheme : {"http://", "https://"})
     if (origin.starts_with(scheme)) return origin.substr(scheme.size());
@@ -93,15 +93,16 @@ std::optional<Refusal> judge_request(const RequestFacts& request, const HostRule
   if (request.path.empty() || request.path.front() != '/')
     return Refusal{400, "the path must begin with /"};
   if (request.hosts_given != 1) return Refusal{400, "one header Host is needed"};
-  // Where a proxy reads another length than this library, the rest is a request of somebody else.
+  // If a proxy uses another length than libmicrohttpd, the rest is parsed as someone else's
+  // request.
   if (request.lengths_given > 1) return Refusal{400, "the length of a body must be given once"};
   if (!hosts.allows(request.host))
     return Refusal{421, "this gateway is not known by that name: http.names of its configuration"};
-  // Only pages of this very gateway may ask for anything from within a browser.
+  // In a browser, only pages of this gateway may send requests.
   if (!request.origin.empty() && lower(host_of_origin(request.origin)) != lower(request.host))
     return Refusal{403, "asked by the page of another site"};
   const bool is_elsewhere = request.fetch_site == "cross-site" || request.fetch_site == "same-site";
-  // A link that somebody follows to the page itself is no attack.
+  // A link from another site to the page itself is allowed.
   if (is_elsewhere && (request.path != "/" || request.method == "POST"))
     return Refusal{403, "asked by the page of another site"};
   return std::nullopt;
@@ -141,10 +142,10 @@ std::optional<HistoryRequest> parse_history_request(std::string_view from, std::
 
 namespace {
 
-/// Of a stream that is read, so much may be on its way: some seconds of changes.
+/// Unacknowledged bytes of a stream that is being read: some seconds of changes.
 constexpr std::size_t under_way_bytes_max = 512;
 
-/// Bytes that were sent and that the other side has not taken.
+/// Bytes sent and not yet acknowledged by the peer.
 std::size_t untaken_bytes(int fd) {
   int bytes = 0;
   return ioctl(fd, SIOCOUTQ, &bytes) == 0 && bytes > 0 ? static_cast<std::size_t>(bytes) : 0;

@@ -1,4 +1,4 @@
-/// What a request may be, before anything is done for it, and how long it may take.
+/// Checks of a request before it is handled, and time limits of connections.
 #pragma once
 
 #include <chrono>
@@ -15,12 +15,12 @@ namespace thermocomp::gateway {
 struct RequestFacts {
   std::string_view method;
   std::string_view path;         ///< without the query, percent-decoded
-  std::string_view host;         ///< header Host; empty: none
-  std::string_view origin;       ///< header Origin; empty: none
-  std::string_view fetch_site;   ///< header Sec-Fetch-Site; empty: none
-  std::size_t query_bytes{0};    ///< names and values together
-  std::size_t hosts_given{0};    ///< how many headers Host there are
-  std::size_t lengths_given{0};  ///< headers Content-Length and Transfer-Encoding together
+  std::string_view host;         ///< header Host; empty: absent
+  std::string_view origin;       ///< header Origin; empty: absent
+  std::string_view fetch_site;   ///< header Sec-Fetch-Site; empty: absent
+  std::size_t query_bytes{0};    ///< total of names and values
+  std::size_t hosts_given{0};    ///< number of Host headers
+  std::size_t lengths_given{0};  ///< number of Content-Length and Transfer-Encoding headers
 };
 
 struct Refusal {
@@ -28,11 +28,11 @@ struct Refusal {
   std::string text;
 };
 
-/// Which hosts a page of this gateway is reached by. A name that is not one of them is refused: a
-/// page from elsewhere could otherwise have its own name resolved to this computer and read all.
+/// Host names of this gateway. Others are refused: a page from elsewhere could otherwise resolve
+/// its own name to this computer and read everything (DNS rebinding).
 class HostRules {
  public:
-  /// @param names  besides `address`, localhost and the loopback addresses, any port
+  /// @param names  allowed besides `address`, localhost and the loopback addresses; any port
   HostRules(std::string address, std::vector<std::string> names);
   [[nodiscard]] bool allows(std::string_view host) const;
 
@@ -40,10 +40,10 @@ class HostRules {
   std::vector<std::string> allowed_;
 };
 
-/// Host without its port and without the brackets of IPv6; none: it is malformed.
+/// Host without port and IPv6 brackets; nullopt: malformed.
 [[nodiscard]] std::optional<std::string> host_name(std::string_view host);
 
-/// @return why the request is refused, if it is
+/// @return why the request is refused; nullopt: accepted
 [[nodiscard]] std::optional<Refusal> judge_request(const RequestFacts& request,
                                                    const HostRules& hosts);
 
@@ -52,27 +52,26 @@ struct HistoryRequest {
   double to_s{0.0};
   std::size_t points{600};
 };
-/// `from` and `to` in seconds since 1970, or negative: seconds before now. Left out: the last eight
-/// hours. `points` 2..5000.
-/// @param from, to, points  as given; empty: left out
-/// @param why  set when there is no result: one line
+/// @param from, to  seconds since 1970, or negative: before now; empty: the last 8 h
+/// @param points  2..5000; empty: 600
+/// @param why  reason in one line if there is no result
 [[nodiscard]] std::optional<HistoryRequest> parse_history_request(std::string_view from,
                                                                   std::string_view to,
                                                                   std::string_view points,
                                                                   double now_s, std::string& why);
 
-/// Connections that do not get on. libmicrohttpd ends one that is silent; who sends or takes a byte
-/// now and then would keep a place for ever.
+/// Closes slow connections. libmicrohttpd closes a silent one; a peer that sends or takes a byte
+/// now and then would otherwise keep its place forever.
 class SlowConnections {
  public:
   using Clock = std::chrono::steady_clock;
-  static constexpr std::chrono::seconds request_max{15};  ///< until a request is whole
-  static constexpr std::chrono::seconds answer_max{60};   ///< until its answer is taken
-  /// The same while every place is taken: others wait for one.
+  static constexpr std::chrono::seconds request_max{15};  ///< for a whole request
+  static constexpr std::chrono::seconds answer_max{60};   ///< for the peer to take the answer
+  /// The same while all places are taken.
   static constexpr std::chrono::seconds request_max_when_full{3};
   static constexpr std::chrono::seconds answer_max_when_full{10};
-  /// Of a stream: what lies in the kernel because nobody takes it. Less, but more than what may be
-  /// under way, has the time of an answer.
+  /// Bytes of a stream that the peer has not taken: above this it is closed at once; between the
+  /// normal amount in transit and this, after the time of an answer.
   static constexpr std::size_t untaken_bytes_max = std::size_t{64} * 1024;
 
   enum class Stage { request, answer, stream };
@@ -82,7 +81,7 @@ class SlowConnections {
   void opened(int fd, Clock::time_point now);
   void is_at(int fd, Stage stage, Clock::time_point now);
   void closed(int fd);
-  /// Shuts down those that are over their time; the library then finds them closed.
+  /// Shuts their sockets down; libmicrohttpd then closes the connections.
   void end_slow(Clock::time_point now);
   [[nodiscard]] std::size_t count() const;
 
@@ -93,7 +92,7 @@ class SlowConnections {
   };
   const std::size_t places_max_;
   mutable std::mutex mutex_;
-  std::unordered_map<int, Place> places_;  ///< by socket
+  std::unordered_map<int, Place> places_;  ///< by file descriptor
 };
 
 }  // namespace thermocomp::gateway

@@ -42,7 +42,7 @@ double steady_s() {
   return std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
 }
 
-/// What of a status changes with an event.
+/// Status values that change with an event.
 struct Happened {
   Mode mode{Mode::starting};
   std::uint32_t reasons{0};
@@ -70,7 +70,7 @@ struct DaemonFeed::Parts {
   void take_earlier_events(const Event& own);
   void publish();
   void be_away(const std::string& why);
-  /// @return false when the gateway stops
+  /// @return false if the gateway stops
   bool sleep(std::chrono::milliseconds time);
 
   const GatewaySettings& settings;
@@ -80,22 +80,22 @@ struct DaemonFeed::Parts {
   std::mutex stop_mutex;
   std::condition_variable stop_changed;
 
-  mutable std::mutex mutex;  ///< of newest
+  mutable std::mutex mutex;  ///< guards newest
   SnapshotPointer newest{std::make_shared<Snapshot>()};
 
-  // Only of the feed's thread.
+  // Feed's thread only.
   Snapshot next;
   TrendWatch trends;
   bool has_status{false};
   std::string model_checksum;  ///< of `next.model`
-  /// Of the runs before this one, from the history; read on a thread, for the disk may stand still.
+  /// Events of earlier runs from the history, read on a thread because the disk may stall.
   std::vector<Event> earlier;
-  double absent_s{not_a_number};  ///< between the last of them and this one no daemon ran
-  std::shared_ptr<std::vector<RecordedEvent>> recorded;  ///< the thread's while it is busy
-  bool is_run_recorded{false};  ///< the history has this run too: `earlier` is complete
+  double absent_s{not_a_number};                         ///< time without a daemon before this run
+  std::shared_ptr<std::vector<RecordedEvent>> recorded;  ///< owned by the thread while it is busy
+  bool is_run_recorded{false};  ///< the history contains this run, so `earlier` is complete
   SideThread history_thread{"history"};
   Clock::time_point events_at{};
-  Happened happened;  ///< when events were asked for last
+  Happened happened;  ///< at the last request for events
 };
 
 void DaemonFeed::Parts::run() {
@@ -110,7 +110,7 @@ void DaemonFeed::Parts::run() {
   }
 }
 
-/// Until the connection ends. @throws ClientError, RemoteError
+/// Returns only by exception, or when the gateway stops. @throws ClientError, RemoteError
 void DaemonFeed::Parts::follow() {
   StatusClient client(settings.socket, silence_max);
   const json subscription = {{"methods", {"status", "sensors"}}, {"period_s", period_s}};
@@ -122,7 +122,7 @@ void DaemonFeed::Parts::follow() {
       next.status = part_from<Status>(notification["params"]);
       has_status = true;
     }
-    if (method == "sensors" && has_status) {  // else the pair is not whole yet
+    if (method == "sensors" && has_status) {  // ignored until the first status
       next.sensors = part_from<SensorsAnswer>(notification["params"]);
       take_sensors(client);
     }
@@ -144,8 +144,8 @@ void DaemonFeed::Parts::take_sensors(StatusClient& client) {
   publish();
 }
 
-/// The model when it is another one; events when something shows that there are new ones, and every
-/// few seconds: there may be a thousand of them.
+/// Requests the model if it changed, and events if the status indicates new ones, else every few
+/// seconds (there may be a thousand).
 void DaemonFeed::Parts::renew_slow_answers(StatusClient& client) {
   const std::string& checksum = next.status.model.checksum;
   if (!next.is_here || model_checksum != checksum) {
@@ -176,7 +176,7 @@ void DaemonFeed::Parts::renew_events(StatusClient& client) {
   next.events = std::make_shared<const std::vector<Event>>(std::move(all));
 }
 
-/// @param own  the oldest of this run that the daemon has
+/// @param own  oldest event of this run that the daemon has
 void DaemonFeed::Parts::take_earlier_events(const Event& own) {
   constexpr std::chrono::milliseconds mostly_enough(200);
   if (!history_thread.is_busy()) {
@@ -187,7 +187,7 @@ void DaemonFeed::Parts::take_earlier_events(const Event& own) {
     history_thread.start([file, from, found = recorded] {
       try {
         *found = read_events(file, from);
-      } catch (const std::exception&) {  // the page asks for charts too, and is told why not
+      } catch (const std::exception&) {  // the charts report the cause
         found->clear();
       }
     });

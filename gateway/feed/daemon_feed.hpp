@@ -1,4 +1,4 @@
-/// Follows the daemon over its status socket, on a thread of its own, and finds it again.
+/// Follows the daemon over its status socket on its own thread, and reconnects.
 #pragma once
 
 #include <filesystem>
@@ -10,24 +10,24 @@
 
 namespace thermocomp::gateway {
 
-/// Twice a second status and sensors, events when there are new ones; within 1.5 s of silence the
-/// daemon counts as away. While it is away there is a snapshot every second that says so.
+/// Receives status and sensors twice a second, events when there are new ones. After 1.5 s of
+/// silence the daemon counts as away, with a snapshot every second.
 class DaemonFeed {
  public:
   using Listener = std::function<void(const SnapshotPointer&)>;
 
   explicit DaemonFeed(const GatewaySettings& settings);
-  ~DaemonFeed();  ///< stops
+  ~DaemonFeed();
   DaemonFeed(const DaemonFeed&) = delete;
   DaemonFeed& operator=(const DaemonFeed&) = delete;
 
-  /// Called on the feed's thread with each new snapshot; must not throw or wait. Before start().
+  /// Called on the feed's thread with each snapshot; must not throw or block. Add before start().
   void listen(Listener listener);
   void start();
   void stop() noexcept;
 
   [[nodiscard]] SnapshotPointer newest() const;
-  /// The history file: the one that is configured, or that the daemon names; empty: not known.
+  /// History file from the configuration, else from the daemon; empty: unknown.
   [[nodiscard]] std::filesystem::path history_file() const;
 
  private:

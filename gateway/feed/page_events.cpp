@@ -17,12 +17,12 @@ namespace {
 
 using nlohmann::json;
 
-/// What a cause explains begins so near to it.
+/// An effect begins at most this much before its cause begins or after it ends.
 constexpr double near_s = 5.0;
 constexpr double unknown_end_s = std::numeric_limits<double>::infinity();
 
-/// A cause explains what stands behind it here: a link its sensors, these the inputs of the model
-/// and the reasons, all of them and commands the mode.
+/// Causes come before their effects: a link before its sensors, these before inputs of the model
+/// and reasons, all of them and commands before the mode.
 enum class Rank { link, sensor, input, order, mode, alone };
 
 Rank rank_of(const Event& event) {
@@ -56,13 +56,12 @@ bool is_start(const Event& event) {
   return event.kind == EventKind::daemon && event.code == "started";
 }
 
-/// The end of the run before a start; where that is not known, the start.
+/// End of the run before a start; if unknown, the start.
 double absent_since_s(const Event& start) {
   return start.wall_s - (std::isfinite(start.duration_s) ? start.duration_s : 0.0);
 }
 
-/// From the first fault of a subject until it is well again, or the daemon ends; of all else a
-/// moment.
+/// From the first fault of a subject to its recovery or the daemon's end; of other events a moment.
 struct Outage {
   const Event* first{nullptr};
   Rank rank{Rank::alone};
@@ -70,13 +69,13 @@ struct Outage {
   double to_s{unknown_end_s};
 };
 
-/// @param of_event  for each event its outage
+/// @param of_event  index of each event's outage
 std::vector<Outage> outages_of(const std::vector<Event>& events,
                                std::vector<std::size_t>& of_event) {
   std::vector<Outage> outages;
   std::map<Subject, std::size_t> open;
   for (const Event& event : events) {
-    if (is_start(event)) {  // what was wrong is reported anew
+    if (is_start(event)) {  // present faults are reported again
       for (const auto& [subject, known] : open) outages[known].to_s = absent_since_s(event);
       open.clear();
     }
@@ -86,7 +85,7 @@ std::vector<Outage> outages_of(const std::vector<Event>& events,
       of_event.push_back(known->second);
     } else {
       of_event.push_back(outages.size());
-      // The beginning of an outage may be older than the list.
+      // An outage may begin before the oldest event.
       outages.push_back(
           {&event, rank_of(event), ends ? event.wall_s - event.duration_s : event.wall_s});
       if (event.kind == EventKind::fault) open[event.subject] = of_event.back();
@@ -99,7 +98,7 @@ std::vector<Outage> outages_of(const std::vector<Event>& events,
   return outages;
 }
 
-/// What explains an outage: of a lower rank, and there when it began.
+/// The outage of lowest rank that existed when `outage` began and ranks below it; nullptr: none.
 const Outage* cause_of(const Outage& outage, const std::vector<Outage>& all) {
   const Outage* cause = nullptr;
   for (const Outage& other : all) {
@@ -111,12 +110,12 @@ const Outage* cause_of(const Outage& outage, const std::vector<Outage>& all) {
   return cause;
 }
 
-/// What happens again and again is one entry.
+/// Events shown as one entry because they repeat.
 struct Group {
   const Event* newest{nullptr};
   std::size_t times{0};
   double lasted_s{0.0};
-  double idle_s{0.0};  ///< not compensated because of it
+  double idle_s{0.0};  ///< time without compensation caused by it
 };
 
 bool is_outage(const Event& event) {
@@ -129,7 +128,7 @@ bool is_same(const Event& a, const Event& b) {
   return is_outage(a) ? is_outage(b) : a.kind == EventKind::mode && b.kind == a.kind;
 }
 
-/// @param lasts  the outage has not ended
+/// @param lasts  the outage continues
 std::string text_of(const Group& group, bool lasts) {
   std::string text = page_event_text(*group.newest);
   if (group.times > 1) {
@@ -141,7 +140,7 @@ std::string text_of(const Group& group, bool lasts) {
   return group.idle_s > 0.0 ? text + "; not compensated for " + duration_text(group.idle_s) : text;
 }
 
-/// How long a mode that does not compensate lasted, of the event that ended it.
+/// Duration of the mode without compensation that this event ended; 0 for other events.
 double idle_s(const Event& event) {
   const bool counts = event.kind == EventKind::mode && std::isfinite(event.duration_s) &&
                       event.code == to_string(Mode::compensating) &&
@@ -179,7 +178,7 @@ json page_events(const Snapshot& snapshot, std::size_t most) {
     return std::find_if(groups.begin(), groups.end(),
                         [&](const Group& known) { return is_same(*known.newest, event); });
   };
-  std::vector<std::pair<const Event*, double>> idle;  // of which event how long
+  std::vector<std::pair<const Event*, double>> idle;  // cause and duration
   for (std::size_t i = events.size(); i-- > 0;) {
     const Event& event = events[i];
     const bool is_next_start = i + 1 < events.size() && is_start(events[i + 1]);
@@ -190,7 +189,7 @@ json page_events(const Snapshot& snapshot, std::size_t most) {
     }
     auto group = group_of(event);
     if (group == groups.end()) group = groups.insert(group, {&event});
-    // An outage has two events: it counts by its beginning, which may be older than the list.
+    // An outage counts once, by its fault, which may be older than the list.
     if (event.kind != EventKind::recovery) ++group->times;
     if (event.kind == EventKind::recovery) group->lasted_s += event.duration_s;
   }

@@ -65,7 +65,7 @@ void round_numbers(json& value, double steps_per_unit) {
     for (json& part : value) round_numbers(part, steps_per_unit);
 }
 
-/// Counters and digits that nobody sees would be sent again and again.
+/// Drops counters and digits that the page does not show, so that they cause no changes.
 void keep_what_is_shown(json& state) {
   keep(state, {"time_s", "here",      "since_s",   "why",      "machine", "verdict", "problems",
                "mode",   "axes",      "probe_due", "warm",     "sensors", "buses",   "controller",
@@ -108,7 +108,7 @@ bool add_changes(const json& before, const json& after, json& changes) {
     if (is_alike && add_changes(old, value, part))
       changes[key] = std::move(part);
     else if (value.is_object() && is_alike)
-      return false;  // an object that replaces one would be taken for its changes
+      return false;  // the receiver would merge it instead of replacing the old one
     else
       changes[key] = value;
   }
@@ -161,7 +161,7 @@ json page_state(const Snapshot& snapshot, const std::string& machine) {
                 {"machine", machine},          {"verdict", verdict_of(snapshot, problems)}};
   state["problems"] = std::move(problems);
   const Status& status = snapshot.status;
-  if (status.axes.empty()) return state;  // the daemon has not answered yet
+  if (status.axes.empty()) return state;  // no answer of the daemon yet
   json sensors = json::array();
   for (const SensorStatus& sensor : snapshot.sensors.sensors)
     sensors.push_back(sensor_json(sensor, snapshot));

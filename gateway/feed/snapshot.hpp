@@ -1,4 +1,4 @@
-/// What the daemon said last, as every part of the gateway reads it.
+/// The daemon's last answers, shared by all parts of the gateway.
 #pragma once
 
 #include <cstdint>
@@ -14,33 +14,33 @@
 
 namespace thermocomp::gateway {
 
-/// Never changed once it is handed on.
+/// Immutable once published.
 struct Snapshot {
-  std::uint64_t number{0};  ///< rises by one each time
-  double wall_s{0.0};       ///< when it was received
+  std::uint64_t number{0};  ///< increases by one per snapshot
+  double wall_s{0.0};       ///< time of reception
   bool is_here{false};      ///< the daemon answers
-  double since_s{0.0};      ///< wall clock; since when it does, or does not
-  std::string why;          ///< why it does not
-  Status status;  ///< answers of the methods of these names; the last ones while it is away
+  double since_s{0.0};      ///< wall clock of the last change of is_here
+  std::string why;          ///< reason if it does not answer
+  Status status;            ///< last answers of the methods of these names
   SensorsAnswer sensors;
   std::shared_ptr<const nlohmann::json> model{
-      std::make_shared<nlohmann::json>()};  ///< null: not known yet
-  /// The newest of the last week, by the history, and of the answer of `events`; oldest first.
+      std::make_shared<nlohmann::json>()};  ///< null: unknown
+  /// Newest events of the last week, from the history and the answer of `events`; oldest first.
   std::shared_ptr<const std::vector<Event>> events{std::make_shared<std::vector<Event>>()};
-  std::map<std::string, double> trends;  ///< [K/h] by sensor; NaN where not known yet
+  std::map<std::string, double> trends;  ///< [K/h] by sensor; NaN: unknown
 };
 using SnapshotPointer = std::shared_ptr<const Snapshot>;
 
-/// How fast each temperature changes, by the straight line through its last minutes.
+/// Rate of change of each temperature: slope of the regression line over the last 15 min.
 class TrendWatch {
  public:
   static constexpr double sample_every_s = 10.0;
   static constexpr double window_s = 900.0;
   static constexpr double known_after_s = 60.0;
 
-  /// @param now_s  of a clock that does not go back; NaN values are passed over
+  /// @param now_s  monotonic; NaN values are ignored
   void add(const std::string& name, double now_s, double value);
-  /// Least squares over the window, per hour; NaN while less than a minute is known.
+  /// Least-squares slope over the window, per hour; NaN with less than a minute of samples.
   [[nodiscard]] double per_hour(const std::string& name) const;
   void forget() { samples_.clear(); }
 

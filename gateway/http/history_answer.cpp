@@ -29,7 +29,7 @@ JsonAnswer error_answer(unsigned status, const std::string& text) {
   return {status, error_text(text)};
 }
 
-/// A chart shows no more than seven significant digits, and an answer has half the size.
+/// Seven digits: more than a chart shows, and half the size of all digits.
 void append_short(std::string& text, double value) {
   if (!std::isfinite(value)) {
     text += "null";
@@ -66,10 +66,10 @@ json probings_json(const std::vector<Probing>& probings) {
   return list;
 }
 
-/// When nothing was compensated: the mode, or "no_daemon".
+/// Intervals without compensation: the mode, or "no_daemon".
 json modes_json(const std::vector<RecordedEvent>& events, const HistoryRequest& request) {
   json list = json::array();
-  std::string mode;  // empty: not known, or none
+  std::string mode;  // empty: unknown or none
   double since_s = 0.0;
   const auto end_at = [&](double wall_s) {
     if (!mode.empty() && mode != to_string(Mode::compensating) && wall_s > request.from_s)
@@ -81,7 +81,7 @@ json modes_json(const std::vector<RecordedEvent>& events, const HistoryRequest& 
                       (event.kind == EventKind::daemon && event.code != "history");
     if (!ends) continue;
     if (event.code == "started") {
-      // How long the mode of a run lasted whose end is not known is not known either.
+      // If the end of a run is unknown, so is the duration of its last mode.
       if (std::isfinite(event.duration_s)) end_at(event.wall_s - event.duration_s);
       mode = event.duration_s > 0.0 ? "no_daemon" : "";
       since_s = event.wall_s - event.duration_s;
@@ -94,7 +94,7 @@ json modes_json(const std::vector<RecordedEvent>& events, const HistoryRequest& 
   return list;
 }
 
-/// What a chart marks: starts, commands, and faults of modules and links; not what comes of these.
+/// Chart marks: starts, commands, faults of modules and links; not their effects.
 json events_json(const std::vector<RecordedEvent>& events, const HistoryRequest& request) {
   constexpr std::size_t most = 200;
   json list = json::array();

@@ -1,4 +1,4 @@
-/// The answer to /api/history.
+/// Answer to /api/history.
 #pragma once
 
 #include "gateway/door/answer_thread.hpp"
@@ -7,11 +7,10 @@
 
 namespace thermocomp::gateway {
 
-/// To /api/history: {"from_s", "recorded_since_s", "to_s", "span_s", "columns": {"time_s": [...],
-/// "bed_degC": [...], "z_offset_um":
-/// [...]}, "probings": [{"axis", "time_s", "left_um", "needed_um"}], "modes": [{"mode", "from_s",
-/// "to_s"}], "events": [{"time_s", "text"}], "chunks", "chunks_read", "damage": [...]}; null: not
-/// known. The modes are those in which nothing is compensated.
+/// {"from_s", "recorded_since_s", "to_s", "span_s", "columns": {"time_s": [...], "bed_degC": [...],
+/// "z_offset_um": [...]}, "probings": [{"axis", "time_s", "left_um", "needed_um"}], "modes":
+/// [{"mode", "from_s", "to_s"}], "events": [{"time_s", "text"}], "chunks", "chunks_read", "damage":
+/// [...]}; null: unknown. `modes` are the intervals without compensation.
 [[nodiscard]] JsonAnswer history_answer(const DaemonFeed& feed, const HistoryRequest& request);
 
 }  // namespace thermocomp::gateway

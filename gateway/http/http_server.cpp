@@ -27,7 +27,7 @@ std::string dumped(const json& value) {
   return value.dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
-/// As one of the problems of page_state(); the compensation does not suffer, so the verdict stays.
+/// A further entry of page_state()'s problems. Compensation is not affected, so the verdict stays.
 json broker_is_away(const MqttSettings& mqtt) {
   return {{"what", "the MQTT broker on " + mqtt.host + ", port " + std::to_string(mqtt.port) +
                        ", is away: nobody gets values or alarms from it"},
@@ -55,10 +55,10 @@ struct HttpServer::Parts {
   PageCommands commands;
   AddFigures add_figures;
   AnswerThread history_answers;
-  AnswerThread page_commands;  ///< of its own: nobody's charts are in the way of a command
+  AnswerThread page_commands;  ///< separate, so that slow charts do not delay commands
   EventStreams streams;
-  json shown;     ///< the newest state; only of the feed's thread
-  HttpDoor door;  ///< last: what its handler uses is there
+  json shown;     ///< newest state; feed's thread only
+  HttpDoor door;  ///< last: its handler uses the members above
 };
 
 HttpServer::Parts::Parts(const GatewaySettings& settings_in, DaemonFeed& feed_in,
@@ -101,7 +101,7 @@ void HttpServer::Parts::serve(HttpExchange& exchange) {
 void HttpServer::Parts::take_command(HttpExchange& exchange) {
   if (exchange.path() != "/api/command")
     return exchange.answer(405, json_type, error_text("only GET"));
-  // A form of another site cannot have this type without asking first, and is not allowed to ask.
+  // A form of another site cannot send this type without a preflight request, which is refused.
   if (exchange.header("Content-Type") != json_type)
     return exchange.answer(415, json_type, error_text("the body must be application/json"));
   exchange.later(page_commands, [this, user = exchange.user(), body = exchange.body()] {
@@ -130,7 +130,7 @@ void HttpServer::Parts::tell_history(HttpExchange& exchange) {
   exchange.later(history_answers, [this, asked = *asked] { return history_answer(feed, asked); });
 }
 
-/// Read anew each time: it is written anew each week.
+/// Reads the file for each request, because it is rewritten weekly.
 void HttpServer::Parts::show_report(HttpExchange& exchange) const {
   constexpr std::uintmax_t report_bytes_max = 4'000'000;
   try {

@@ -1,4 +1,4 @@
-/// The gateway's door for browsers, Prometheus and programs: page, /metrics, /api.
+/// The gateway's HTTP server for browsers, Prometheus and programs: page, /metrics, /api.
 #pragma once
 
 #include <cstdint>
@@ -15,19 +15,19 @@ namespace thermocomp::gateway {
 
 class HttpServer {
  public:
-  /// Fills in, for /metrics and the page, what other parts of the gateway know. Called on the
-  /// server's thread and by show().
+  /// Adds figures of other parts of the gateway for /metrics and the page. Called on the server's
+  /// thread and by show().
   using AddFigures = std::function<void(GatewayFigures&)>;
 
-  /// @throws std::runtime_error when it cannot listen, or certificate or key cannot be used
+  /// @throws std::runtime_error if it cannot listen, or cannot use certificate or key
   HttpServer(const GatewaySettings& settings, DaemonFeed& feed, const PageFiles& files,
              AddFigures add_figures);
   ~HttpServer();
   HttpServer(const HttpServer&) = delete;
   HttpServer& operator=(const HttpServer&) = delete;
 
-  void show(const SnapshotPointer& snapshot);  ///< to all pages
-  /// Ends connections that do not get on; called each second.
+  void show(const SnapshotPointer& snapshot);  ///< sends to all pages
+  /// Closes connections that exceed their time; called every second.
   void end_slow_connections();
   [[nodiscard]] std::uint16_t port() const noexcept;
 

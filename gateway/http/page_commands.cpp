@@ -153,7 +153,7 @@ JsonAnswer PageCommands::confirm(const std::string& user, const CommandRequest& 
   return answer(200, {{"token", token}, {"text", text}});
 }
 
-/// Only in the places of this user: nobody's unconfirmed commands are in another's way.
+/// Drops the oldest unconfirmed command of this user, so that users do not displace each other.
 void PageCommands::make_room(const std::string& user) {
   std::size_t count = 0;
   auto oldest = waiting_.end();

@@ -1,5 +1,5 @@
-/// Commands that change something, from the page: only those that are configured, for named users,
-/// and carried out when the user has confirmed what will move.
+/// Commands from the page that change something: only configured ones, for named users, executed
+/// after the user has confirmed the movement.
 #pragma once
 
 #include <chrono>
@@ -15,7 +15,6 @@
 
 namespace thermocomp::gateway {
 
-/// What a page asks for.
 struct CommandRequest {
   std::string method{};
   std::string axis{};    ///< of prove
@@ -26,18 +25,19 @@ struct CommandRequest {
 class PageCommands {
  public:
   static constexpr std::chrono::seconds confirmation_max{60};
-  /// Of one user; beyond them the oldest of the same user counts no more.
+  /// Limit per user; a further request drops the user's oldest.
   static constexpr std::size_t confirmations_max = 4;
 
   explicit PageCommands(const GatewaySettings& settings);
 
-  /// {"user", "commands": ["enable", ...]}: what this user may ask for.
+  /// {"user", "commands": ["enable", ...], "names": {"enable": "switch on", ...}} that this user
+  /// may give.
   [[nodiscard]] nlohmann::json offered(const std::string& user) const;
 
-  /// Two steps. {"method": "prove", "axis": "z", "value_um": 5} is answered {"token", "text"}; the
-  /// text says what will move. {"token": ...} of the same user, once, within a minute, does it: the
-  /// answer has the daemon's. Refusals: 403 not for this user, 400 not understood, 409 refused by
-  /// the daemon, 410 no such token, 503 no daemon.
+  /// Two steps. {"method": "prove", "axis": "z", "value_um": 5} is answered with {"token", "text"};
+  /// the text describes the movement. {"token": ...} from the same user, once, within a minute,
+  /// executes it; the answer is the daemon's. Refusals: 403 user not allowed, 400 malformed, 409
+  /// refused by the daemon, 410 no such token, 503 no daemon.
   [[nodiscard]] JsonAnswer take(const std::string& user, const std::string& body,
                                 const Snapshot& snapshot);
 
@@ -60,7 +60,7 @@ class PageCommands {
   std::map<std::string, Asked> waiting_;  ///< by token
 };
 
-/// What the command will move, in words. @throws std::invalid_argument: no such axis, no number
+/// Describes the movement. @throws std::invalid_argument: no such axis, no number
 [[nodiscard]] std::string confirmation_text(const CommandRequest& asked, const Status& status);
 
 }  // namespace thermocomp::gateway

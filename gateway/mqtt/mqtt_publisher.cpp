@@ -29,7 +29,7 @@ constexpr int unacknowledged_max = 20;
 constexpr milliseconds again_after_min(1000);
 constexpr milliseconds again_after_max(30000);
 
-/// The library has no words for the first.
+/// libmosquitto has no text for a keepalive timeout.
 std::string text_of(int code) {
   return code == MOSQ_ERR_KEEPALIVE ? "no answer in time" : mosquitto_strerror(code);
 }
@@ -49,7 +49,7 @@ std::string first_line(const std::filesystem::path& file) {
 
 }  // namespace
 
-/// All calls of the library are made by one thread; others only reach the buffer.
+/// One thread makes all calls of libmosquitto; others only access the buffer.
 struct MqttPublisher::Parts {
   explicit Parts(const GatewaySettings& settings_in);
   ~Parts();
@@ -66,12 +66,12 @@ struct MqttPublisher::Parts {
   std::atomic<bool> stops{false};
   std::atomic<bool> is_connected{false};
 
-  mutable std::mutex mutex;  ///< of the next three
+  mutable std::mutex mutex;  ///< guards the next three
   MessageBuffer buffer;
-  std::map<std::string, nlohmann::json> said;  ///< by topic, last state
+  std::map<std::string, nlohmann::json> said;  ///< last state, by topic
   double said_at_s{0.0};
 
-  // Only of the thread.
+  // Publisher's thread only.
   int unacknowledged{0};
   milliseconds again_after{again_after_min};
   std::string last_problem;
@@ -139,8 +139,8 @@ void MqttPublisher::Parts::sleep(milliseconds time) const {
 
 void MqttPublisher::Parts::run() {
   constexpr int wait_ms = 100;
-  // Connecting waits in mosquitto_loop(), which has its time; only a name server is waited for
-  // here.
+  // Connecting waits in mosquitto_loop(), with its timeout; this call waits only for the name
+  // server.
   int code =
       mosquitto_connect_async(client, settings.mqtt.host.c_str(), settings.mqtt.port, keepalive_s);
   while (!stops) {
@@ -160,8 +160,8 @@ void MqttPublisher::Parts::run() {
   if (is_connected) say_goodbye();
 }
 
-/// Only so many at a time, so that the library's own queue stays small; it sends those again by
-/// itself when the connection is lost before they are acknowledged.
+/// Keeps at most `unacknowledged_max` messages in libmosquitto, which resends them after a lost
+/// connection.
 void MqttPublisher::Parts::send_waiting() {
   while (unacknowledged < unacknowledged_max) {
     std::unique_lock lock(mutex);
@@ -199,12 +199,12 @@ MqttPublisher::~MqttPublisher() = default;
 void MqttPublisher::show(const SnapshotPointer& snapshot) {
   std::vector<TopicState> states = topic_states(*snapshot, parts_->settings.machine);
   const std::lock_guard lock(parts_->mutex);
-  constexpr double early_s = 0.1;  // snapshots do not come to the microsecond
+  constexpr double early_s = 0.1;  // tolerance of the snapshots' period
   const double passed_s = snapshot->wall_s - parts_->said_at_s;
   const bool is_due = !(passed_s >= 0.0 && passed_s < parts_->settings.mqtt.period_s - early_s);
   if (is_due) parts_->said_at_s = snapshot->wall_s;
   for (std::size_t i = 0; i < states.size(); ++i) {
-    // The status, which comes first, is sent at once; numbers wait for their period.
+    // The status (first) is sent at once, the others once per period.
     if (i > 0 && !is_due) return;
     nlohmann::json& said = parts_->said[states[i].topic];
     if (said == states[i].state) continue;

@@ -1,4 +1,4 @@
-/// Publishes on an MQTT broker, from a thread of its own; waits for a broker that is away.
+/// Publishes to an MQTT broker on its own thread; reconnects if the broker is away.
 #pragma once
 
 #include <memory>
@@ -10,18 +10,18 @@
 
 namespace thermocomp::gateway {
 
-/// Everything is retained and of quality 1. A topic is published when its state has changed, at
-/// most every `period_s`; with a connection, what waited in the buffer and then the last of every
-/// topic. The last will, `{"state": "offline"}` on `.../status`, ends a state that nobody renews.
+/// All messages are retained, QoS 1. A topic is published when its state changes, at most every
+/// `period_s`; after connecting, the buffered messages and then the last state of each topic. The
+/// last will, `{"state": "offline"}` on `.../status`, marks retained states as stale.
 class MqttPublisher {
  public:
-  /// @throws std::runtime_error when certificates or the password file cannot be used
+  /// @throws std::runtime_error if certificates or the password file cannot be used
   explicit MqttPublisher(const GatewaySettings& settings);
-  ~MqttPublisher();  ///< says offline, where the broker is there
+  ~MqttPublisher();  ///< publishes offline if connected
   MqttPublisher(const MqttPublisher&) = delete;
   MqttPublisher& operator=(const MqttPublisher&) = delete;
 
-  /// None of these waits.
+  /// None of these blocks.
   void show(const SnapshotPointer& snapshot);
   void show_alarms(const std::vector<Alarm>& active, const AlarmChange* changed, double wall_s);
   void add_figures(GatewayFigures& figures) const;

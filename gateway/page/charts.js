@@ -1,4 +1,4 @@
-// The charts: one table of history for all of them, one cursor of time, one zoom.
+// Charts over one table of history, with a common time cursor and zoom.
 'use strict';
 
 const drawEveryMs = 2000;
@@ -13,21 +13,21 @@ let range = ranges[1];
 let columns = [];        // names, time first
 let table = [];          // rows: Date, then values by column
 let probings = [];       // [{axis, time_s, left_um, needed_um}], oldest first
-let modes = [];          // [{mode, from_s, to_s}]: nothing was compensated; mode no_daemon too
+let modes = [];          // [{mode, from_s, to_s}] without compensation, mode no_daemon included
 let recordedSince_s = null;
 let marks = [];          // [{time_s, text}], newest first
 let spacing_s = 10;      // of the rows
-let zoomed = null;       // [from, to] in ms where the eye has chosen a part
+let zoomed = null;       // [from, to] in ms if zoomed
 let cursorAt = null;     // ms
 let drawnAt = 0;
 let asked = 0;
-const hidden = new Set();  // temperatures that a tap on the legend has put away
+const hidden = new Set();  // temperatures switched off in the legend
 const charts = new Map();  // by name: {graph, element, names}
 
 const css = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 const isWall = () => document.body.classList.contains('wall');
 
-// What is shown: the part chosen, or the range, but nothing from before the first value.
+// Time window: the zoomed part or the range, from the first value on.
 function wholeWindow() {
   const end = Date.now();
   const first = table.find(row => row.some((value, c) => c > 0 && value !== null));
@@ -39,8 +39,8 @@ const timeWindow = () => zoomed || wholeWindow();
 const absences = () => modes.filter(each => each.mode === 'no_daemon');
 const middle_ms = each => 500 * (each.from_s + each.to_s);
 
-// null joins what is recorded seldom, NaN parts it: a gap is longer than a minute and than three of
-// the column's own steps, or no daemon ran.
+// null connects neighbours, NaN breaks the line: at gaps longer than a minute and than three of the
+// column's steps, and where no daemon ran.
 function withGaps(index) {
   const known = [];
   table.forEach((row, i) => { if (isNumber(row[index])) known.push(i); });
@@ -72,8 +72,8 @@ function chartOptions(labels, unit, more) {
     underlayCallback: drawUnder}, more);
 }
 
-// Under the lines: when nothing was compensated and what happened; of an axis the claimed error of
-// its offset and the probings.
+// Under the lines: times without compensation and marks; for an axis, its claimed error and
+// probings.
 function drawUnder(canvas, area, graph) {
   const x = ms => graph.toDomXCoord(ms);
   canvas.save();
@@ -93,7 +93,7 @@ function drawUnder(canvas, area, graph) {
 function drawError(canvas, graph) {
   const sd = claimedSd(graph.axisName);
   const index = columns.indexOf(graph.axisName + '_offset_um');
-  // While nothing follows the machine, nothing is claimed.
+  // No claimed error without compensation.
   const idle = row => modes.some(each => row[0] >= each.from_s * 1000 && row[0] <= each.to_s * 1000);
   const stretches = [[]];
   for (const row of table)
@@ -115,14 +115,14 @@ function drawError(canvas, graph) {
   }
 }
 
-// Standard deviation that is claimed of an axis now: the model's, and that of estimated inputs.
+// Claimed standard deviation of an axis now: that of the model and of estimated inputs.
 function claimedSd(axis) {
   if (!state || !state.axes) return 0;
   const of = state.axes.find(each => each.name === axis) || {};
   return Math.hypot((state.model.claimed_sd_um || {})[axis] || 0, of.offset_sd || 0);
 }
 
-// The scale of an axis holds its band and its probings, and is never finer than 4 um.
+// The scale of an axis contains its error band and probings and spans at least 4 um.
 function valueRange(name, [from, to]) {
   const index = columns.indexOf(name + '_offset_um');
   const isIn = ms => ms >= from && ms <= to;
@@ -137,7 +137,7 @@ function valueRange(name, [from, to]) {
   return [low - pad, high + pad];
 }
 
-// A chart of some columns of the table. Where nothing is known at all there is nothing to draw.
+// Chart of some columns of the table; none if all are unknown.
 function draw(name, element, names, unit, window_ms, more) {
   const chart = charts.get(name) || {graph: null};
   const picks = names.map(each => columns.indexOf(each)).filter(index => index > 0);
@@ -159,7 +159,7 @@ function draw(name, element, names, unit, window_ms, more) {
     chart.labelKey = labels.join();
     chart.line = make('div', null, 'cursor-line');
     chart.graph.graphDiv.append(chart.line);
-    chart.graph.updateOptions({});  // the axis' own things, now that its name is known
+    chart.graph.updateOptions({});  // redraws with the name of the axis set
   }
   if (!element.hasAttribute('tabindex')) makeReachable(element);
   element.setAttribute('aria-label', more.label + ', ' + (zoomed ? 'part of ' : '') + range.name +
@@ -168,7 +168,7 @@ function draw(name, element, names, unit, window_ms, more) {
   placeCursors();
 }
 
-// By key and by finger what the mouse does.
+// Keyboard and touch equivalents of the mouse.
 function makeReachable(element) {
   element.tabIndex = 0;
   new ResizeObserver(() => charts.forEach(({graph}) => element.contains(graph.graphDiv) && graph.resize()))
@@ -201,7 +201,7 @@ function nearestRow(ms) {
 }
 
 function moveCursor(step) {
-  drawAll();  // the newest rows may not be drawn yet, and the line would be outside
+  drawAll();  // includes the newest rows, so that the line stays inside
   const [from, to] = timeWindow();
   const seen = table.map(row => row[0].getTime()).filter(ms => ms >= from && ms <= to);
   if (seen.length === 0) return;
@@ -211,7 +211,7 @@ function moveCursor(step) {
 
 const cursorRow = () => table.find(row => row[0].getTime() === cursorAt);
 
-// One time for all charts; beside each name the value it had then.
+// Common time cursor; the legends show the values at that time.
 function showCursor(ms) {
   if (ms === cursorAt) return;
   cursorAt = ms;
@@ -248,7 +248,7 @@ function zoomTo(window_ms) {
 
 function zoomBack() { zoomTo(null); }
 
-// About the cursor, or the middle.
+// Zooms about the cursor, or the middle.
 function zoomBy(factor) {
   const [from, to] = timeWindow();
   const about = cursorAt !== null && cursorAt >= from && cursorAt <= to ? cursorAt : (from + to) / 2;
@@ -270,7 +270,7 @@ function drawAll() {
   showLegend(cursorRow());
 }
 
-// A tap puts a line away or brings it back.
+// A tap hides or shows a line.
 function showLegend(row) {
   const names = columns.filter(name => name.endsWith('_degC'));
   const holder = place('temperature-legend');
@@ -296,7 +296,7 @@ function showLegend(row) {
   });
 }
 
-// The history of one sensor alone.
+// Shows the history of one sensor only.
 function showOnly(sensor) {
   const names = columns.filter(name => name.endsWith('_degC'));
   const alone = names.length - hidden.size === 1 && !hidden.has(sensor + '_degC');
@@ -306,7 +306,7 @@ function showOnly(sensor) {
   place('temperatures').scrollIntoView({block: 'start'});
 }
 
-// A range that begins before the history does.
+// Note if the range begins before the history.
 function recordedSince(from_s) {
   const first = table.find(row => row.some((value, c) => c > 0 && value !== null));
   if (!first) return 'nothing was recorded in this time';
@@ -343,7 +343,7 @@ async function loadHistory() {
 
 const addEmptyRow = ms => table.push(columns.map((name, c) => c === 0 ? new Date(ms) : null));
 
-// The time without a daemon goes on; the history has it later.
+// Extends the current time without a daemon, which is not in the history yet.
 function addAbsence(now) {
   let last = modes[modes.length - 1];
   if (!last || last.from_s !== now.since_s) {
@@ -355,7 +355,7 @@ function addAbsence(now) {
   if (performance.now() - drawnAt > drawEveryMs && !document.hidden) drawAll();
 }
 
-// Between two loads of the history the newest values come from the states.
+// Adds the newest values from the states between two loads of the history.
 function addLiveRow(now) {
   const spacing_ms = Math.max(1000, Math.min(10000, spacing_s * 1000));
   const last = table.length ? table[table.length - 1][0].getTime() : 0;
@@ -384,7 +384,7 @@ function chooseRange(chosen) {
   loadHistory();
 }
 
-// Colours of another scheme: all anew.
+// Draws everything again after a change of the colour scheme.
 function redraw() {
   for (const chart of charts.values()) chart.graph.destroy();
   charts.clear();

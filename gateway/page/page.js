@@ -1,10 +1,10 @@
-// The page of thermocomp-gateway. It gets one stream of states and asks for history; texts come from
-// the gateway, which has them from where `thermocomp status` has them.
+// Page of thermocomp-gateway. It receives one stream of states and requests history; texts come
+// from the gateway, which shares them with `thermocomp status`.
 'use strict';
 
-const silentAfterMs = 2500;      // without a state for so long the gateway counts as gone
+const silentAfterMs = 2500;      // without a state for this long the gateway counts as away
 const clockTolerance_s = 30;
-const historyCommit_ms = 12000;   // the daemon writes its history at least every 10 s
+const historyCommit_ms = 12000;   // the daemon commits at least every 10 s
 
 const place = id => document.getElementById(id);
 const make = (tag, text, className) => {
@@ -19,7 +19,7 @@ const setText = (element, text) => {
 const isNumber = value => typeof value === 'number' && isFinite(value);
 const fixed = (value, digits) => isNumber(value) ? value.toFixed(digits).replace('-', '\u2212') : '\u2013';
 const signed = (value, digits) => isNumber(value) && value >= 0 ? '+' + fixed(value, digits) : fixed(value, digits);
-// A bookmark may have user and password in its address, which fetch() refuses.
+// A bookmark may contain user and password, which fetch() rejects.
 const api = path => location.origin + '/api/' + path;
 const unitText = unit => unit === 'urad' ? '\u00b5rad' : '\u00b5m';
 const withUnits = text => text.replace(/ u(m|rad)\b/g, ' \u00b5$1').replace(/ degC\b/g, ' \u00b0C');
@@ -41,7 +41,7 @@ function clockText(wall_s, parts = {hour: '2-digit', minute: '2-digit', second: 
   return sameDay ? time : at.toLocaleDateString([], {day: 'numeric', month: 'short'}) + ', ' + time;
 }
 
-// Of something young with its seconds.
+// Time of day, with seconds if less than 2 min ago.
 const shortTime = wall_s => Date.now() / 1000 - wall_s < 120 ? clockText(wall_s) : minuteText(wall_s);
 const minuteText = wall_s => clockText(wall_s, {hour: '2-digit', minute: '2-digit'});
 
@@ -66,7 +66,7 @@ function listen() {
   });
 }
 
-// Objects change what they name, everything else replaces.
+// Objects are merged; other values replace.
 function change(target, changes) {
   for (const [key, value] of Object.entries(changes)) {
     const old = target[key];
@@ -213,7 +213,7 @@ function showAxes(axes) {
   }
 }
 
-// What happens, a probing too, is in the history once that is committed.
+// Events and probings appear in the history once it is committed.
 let newestDrawn = null;
 let reload = 0;
 function followEvents(events) {
@@ -225,12 +225,12 @@ function followEvents(events) {
   newestDrawn = number;
 }
 
-// Of a sensor with a fault what it shows now, to be compared with a thermometer.
+// A faulty sensor shows its raw value, for comparison with a thermometer.
 const temperatureOf = sensor => isNumber(sensor.raw_degC) ? sensor.raw_degC : sensor.smoothed_degC;
 
-const lastGood = new Map();  // by sensor: {value, time_s}; at first from the history
+const lastGood = new Map();  // by sensor: {value, time_s}; initially from the history
 
-// A hot place whose sensor is lost keeps its place in the list.
+// A hot sensor keeps its place in the list when it is lost.
 function showHottest(now) {
   const list = place('hottest');
   for (const sensor of now.sensors) {
@@ -264,7 +264,7 @@ function arrow(rate) {
   return '\u2192';
 }
 
-// Rows are kept and filled anew, so that nothing jumps under a finger.
+// Rows are reused, so that nothing moves while the user taps.
 function rows(holder, count) {
   while (holder.children.length > count) holder.lastChild.remove();
   while (holder.children.length < count) {
@@ -417,7 +417,7 @@ function proveRequest() {
 
 let offered = {commands: [], names: {}};
 
-// A button for each command that can be given now; `why` one cannot.
+// One button per available command; `why`: reason if disabled.
 function buttonsOf(now) {
   const jumped = (now.sensors || []).filter(each => each.jump);
   return offered.commands.flatMap(method => {
@@ -444,7 +444,7 @@ function showCommands(now) {
     .map(each => each.text + ', not now: ' + withUnits(each.why)).join('. '));
 }
 
-// Kept where the same commands are offered, so that nothing jumps under a finger.
+// Buttons are kept if the commands are unchanged, so that nothing moves while the user taps.
 function rebuild(holder, buttons) {
   const names = buttons.map(each => each.text).join();
   if (holder.dataset.names !== names)

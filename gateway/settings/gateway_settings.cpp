@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t name_bytes_max = 64;
 
-/// A part of a topic, of a label, of a file name.
+/// Allowed as part of a topic, label or file name.
 bool is_plain_name(const std::string& name) {
   return !name.empty() && name.size() <= name_bytes_max &&
          std::all_of(name.begin(), name.end(), [](char c) {
@@ -31,7 +31,7 @@ bool is_numeric_address(const std::string& address) {
          inet_pton(AF_INET6, address.c_str(), bytes.data()) == 1;
 }
 
-/// Relative to the folder of the file; empty where the key is absent.
+/// Path relative to the folder of the file; empty if the key is absent.
 fs::path path_in(const TomlTable& table, std::string_view key, const fs::path& folder) {
   if (!table.has(key)) return {};
   const fs::path named = table.text(key);
@@ -45,7 +45,8 @@ void read_text(const fs::path& file) {
   static_cast<void>(read_text_file(file));
 }
 
-/// The same for a file that must be there, and that `read` takes: the start would fail otherwise.
+/// The same for a file that must exist and that `read` accepts, since start-up would fail
+/// otherwise.
 fs::path existing_in(const TomlTable& table, std::string_view key, const fs::path& folder,
                      ReadFile read) {
   fs::path named = path_in(table, key, folder);
@@ -63,7 +64,7 @@ fs::path existing_in(const TomlTable& table, std::string_view key, const fs::pat
   return named;
 }
 
-/// Reads `certificate` and `key`. Both or neither.
+/// Reads `certificate` and `key`: both or neither.
 void read_pair(const TomlTable& table, const fs::path& folder, fs::path& certificate,
                fs::path& key) {
   certificate = existing_in(table, "certificate", folder, &read_certificate);
@@ -75,7 +76,7 @@ void read_pair(const TomlTable& table, const fs::path& folder, fs::path& certifi
     if (!certificate.empty() && !key.empty() && !fit_each_other(certificate, key))
       table.problem("key", "must be the key of the certificate");
   } catch (const ConfigurationError&) {
-    // Said above, of the file.
+    // Reported by existing_in().
   }
 }
 
@@ -86,7 +87,7 @@ std::string address_in(const TomlTable& table, const std::string& otherwise) {
   return given;
 }
 
-/// Reads one file's tables; knows its folder.
+/// Reads the tables of one file; paths are relative to its folder.
 class SettingsReader {
  public:
   SettingsReader(const TomlTable& root, fs::path folder)
@@ -108,7 +109,7 @@ class SettingsReader {
     settings.http.body = existing_in(http, "body", folder_, [](const fs::path& file) {
       static_cast<void>(read_text_file(file, HttpSettings::body_bytes_max));
     });
-    settings.http.report = path(http, "report");  // made on a Monday
+    settings.http.report = path(http, "report");  // may not exist yet
     settings.commands = read_commands(root_.table_or_empty("commands"), settings.http);
     settings.mqtt = read_mqtt(root_.table_or_empty("mqtt"));
     settings.shdr = read_shdr(root_.table_or_empty("shdr"));
@@ -122,7 +123,7 @@ class SettingsReader {
 
   void read_daemon(const TomlTable& table, GatewaySettings& settings) const {
     if (const fs::path socket = path(table, "socket"); !socket.empty()) settings.socket = socket;
-    constexpr std::size_t path_max = 107;  // sockaddr_un::sun_path less the end
+    constexpr std::size_t path_max = 107;  // sockaddr_un::sun_path without the terminator
     if (settings.socket.string().size() > path_max)
       table.problem("socket", "must have at most 107 characters");
     settings.history = path(table, "history");

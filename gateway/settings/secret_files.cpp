@@ -18,7 +18,7 @@ namespace {
 using Certificate = std::unique_ptr<X509, decltype(&X509_free)>;
 using Key = std::unique_ptr<EVP_PKEY, decltype(&EVP_PKEY_free)>;
 
-/// The first such object of the file. A password is not asked for.
+/// Reads the first such object of the file, without prompting for a password.
 template <class Object, class Free>
 std::unique_ptr<Object, Free> read_pem(const std::filesystem::path& file, Free free,
                                        Object* (*read)(BIO*, Object**, pem_password_cb*, void*),

@@ -1,4 +1,4 @@
-/// Files that only this computer may read: passwords, certificates and their keys.
+/// Files readable only by this computer: passwords, certificates and their keys.
 #pragma once
 
 #include <filesystem>
@@ -9,15 +9,15 @@ namespace thermocomp::gateway {
 
 [[nodiscard]] bool is_user_name(const std::string& name);
 
-/// Hashes after crypt(5), by user, from lines `user:hash`; empty lines and those that begin with #
-/// are passed over. @throws ConfigurationError naming file, line and rule; also without any user
+/// crypt(5) hashes by user, from lines `user:hash`; empty lines and lines with # are skipped.
+/// @throws ConfigurationError naming file, line and rule; also if there is no user
 [[nodiscard]] std::map<std::string, std::string> read_passwords(const std::filesystem::path& file);
 
-/// @throws ConfigurationError unless it is a certificate in PEM
+/// @throws ConfigurationError unless the file is a certificate in PEM
 void read_certificate(const std::filesystem::path& file);
-/// @throws ConfigurationError unless it is a private key in PEM, without a password
+/// @throws ConfigurationError unless the file is a private key in PEM, without a password
 void read_key(const std::filesystem::path& file);
-/// @throws ConfigurationError where one of them is none
+/// @throws ConfigurationError if a file is invalid
 [[nodiscard]] bool fit_each_other(const std::filesystem::path& certificate,
                                   const std::filesystem::path& key);
 

@@ -86,11 +86,11 @@ struct ShdrAdapter::Parts {
   int wake{-1};
   std::thread thread;
 
-  std::mutex mutex;  ///< of the next two
+  std::mutex mutex;  ///< guards the next two
   SnapshotPointer newest;
   bool stops{false};
 
-  // Only of the thread.
+  // Adapter's thread only.
   std::list<Agent> agents;
   ShdrStates sent;
   double sent_wall_s{0.0};
@@ -145,7 +145,8 @@ void ShdrAdapter::Parts::take_agent() {
   agents.back().out = shdr_lines({}, sent, sent_wall_s);
 }
 
-/// An agent pings once a heartbeat; who has been silent for two gives its place to a new one.
+/// An agent pings once per heartbeat; the one silent longest, for at least two, is replaced by a
+/// new one.
 bool ShdrAdapter::Parts::drop_silent() {
   const auto silent =
       std::min_element(agents.begin(), agents.end(),

@@ -1,4 +1,4 @@
-/// The port that an MTConnect agent connects to.
+/// Port for MTConnect agents.
 #pragma once
 
 #include <cstdint>
@@ -9,17 +9,17 @@
 
 namespace thermocomp::gateway {
 
-/// A thread of its own serves a few agents: everything when one connects, then what changes. An
-/// agent that sends what is no line, or does not read, is cut off.
+/// One thread serves a few agents: all items on connection, then changes. An agent that sends an
+/// overlong line or does not read is disconnected.
 class ShdrAdapter {
  public:
-  /// @throws std::runtime_error when it cannot listen
+  /// @throws std::runtime_error if it cannot listen
   explicit ShdrAdapter(const ShdrSettings& settings);
   ~ShdrAdapter();
   ShdrAdapter(const ShdrAdapter&) = delete;
   ShdrAdapter& operator=(const ShdrAdapter&) = delete;
 
-  void show(const SnapshotPointer& snapshot);  ///< never waits
+  void show(const SnapshotPointer& snapshot);  ///< never blocks
   [[nodiscard]] std::uint16_t port() const noexcept;
 
  private:

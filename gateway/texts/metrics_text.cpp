@@ -14,12 +14,12 @@ namespace {
 
 using Labels = std::initializer_list<std::pair<std::string_view, std::string>>;
 
-constexpr double m_per_um = 1e-6;  // also rad per urad
+constexpr double m_per_um = 1e-6;  // rad per urad likewise
 constexpr double s_per_us = 1e-6;
 constexpr double s_per_ms = 1e-3;
 constexpr double bytes_per_MB_decimal = 1e6;
 
-/// Writes families one after the other; a family's samples stand together, as the format wants.
+/// Writes metric families; the format requires the samples of a family to be contiguous.
 class MetricsWriter {
  public:
   void family(std::string_view name, std::string_view kind, std::string_view help) {
@@ -31,7 +31,7 @@ class MetricsWriter {
   void gauge(std::string_view name, std::string_view help) { family(name, "gauge", help); }
   void counter(std::string_view name, std::string_view help) { family(name, "counter", help); }
 
-  /// NaN is left out: not known is no number.
+  /// NaN (unknown) is left out.
   void sample(double value, Labels labels = {}) {
     if (!std::isfinite(value)) return;
     text_ += pending_;
@@ -68,7 +68,7 @@ class MetricsWriter {
   }
 
   std::string name_;
-  std::string pending_;  ///< head of the family; written before its first sample
+  std::string pending_;  ///< header of the family, written before its first sample
   std::string text_;
 };
 
@@ -87,7 +87,7 @@ void write_gateway(MetricsWriter& out, const GatewayFigures& figures) {
   out.count(figures.mqtt_dropped);
 }
 
-/// A family of one sample.
+/// Family with one sample.
 void write_gauge(MetricsWriter& out, const char* name, const char* help, double value) {
   out.gauge(name, help);
   out.sample(value);
@@ -129,7 +129,7 @@ void write_cycle(MetricsWriter& out, const CycleStatus& cycle) {
               cycle.real_time);
 }
 
-/// A figure of all axes: lengths in meters; of rotary axes and tilts in radians, by another name.
+/// One figure of all axes: [m]; of rotary axes and tilts [rad], under another name.
 void write_axis_figure(MetricsWriter& out, const Status& status, const std::string& name,
                        double AxisStatus::*figure, const std::string& help) {
   for (const bool is_angle : {false, true}) {

@@ -54,7 +54,7 @@ json axis_state(const AxisStatus& axis) {
 
 json sensor_topic_state(const SensorStatus& sensor, const Snapshot& snapshot) {
   json state = sensor_json(sensor, snapshot);
-  // The age changes with every look; `fault` has what matters of it.
+  // The age changes constantly; `fault` covers stale readings.
   for (const char* key : {"name", "age_s"}) state.erase(key);
   for (const char* key : {"raw_degC", "smoothed_degC", "trend_K_per_h"})
     if (state[key].is_number()) state[key] = rounded(state[key].get<double>());

@@ -1,4 +1,4 @@
-/// The topics of a machine, what is published on them, and what waits for a broker that is away.
+/// MQTT topics and payloads of a machine, and the buffer for a broker that is away.
 #pragma once
 
 #include <cstddef>
@@ -16,30 +16,29 @@
 
 namespace thermocomp::gateway {
 
-/// A name for a place that allows fewer characters. Two names never become alike, and what a name
-/// becomes depends on it alone: each byte that is not allowed is `_0x` and two digits ("a b" is
-/// a_0x20b), and so is the `_` of a `_0x` that a name has itself.
+/// Unique name with allowed characters, a function of the name only: each other byte becomes `_0x`
+/// and two digits ("a b" becomes a_0x20b), as does the `_` of a `_0x` in the name itself.
 [[nodiscard]] std::string distinct_name(std::string_view name, bool (*is_allowed)(char));
 
-/// `thermocomp/<machine>/<rest>`; a topic's name has neither `/`, `+`, `#` nor blanks.
+/// `thermocomp/<machine>/<rest>`, without `/`, `+`, `#` or blanks in a name.
 [[nodiscard]] std::string topic_of(const std::string& machine, const std::string& kind,
                                    const std::string& name = "");
 
-/// The last will, and what is said at an orderly end: {"state": "offline"}.
+/// Last will, also published at an orderly end: {"state": "offline"}.
 [[nodiscard]] std::string offline_payload();
 
-/// One topic and its payload without the time. Numbers have three decimals: less is noise.
+/// One topic and its payload without the time. Numbers are rounded to three decimals.
 struct TopicState {
   std::string topic;
   nlohmann::json state;
 };
-/// status, sensor/<name>, axis/<name>. While the daemon is away only status.
+/// Topics status, sensor/<name>, axis/<name>; only status while the daemon is away.
 [[nodiscard]] std::vector<TopicState> topic_states(const Snapshot& snapshot,
                                                    const std::string& machine);
 /// {"active": [{"name", "text", "remedy", "since_s"}], "changed": {..., "state"} or null}.
 [[nodiscard]] nlohmann::json alarm_state(const std::vector<Alarm>& active,
                                          const AlarmChange* changed);
-/// `state` and "time": UTC, ISO 8601 with milliseconds.
+/// `state` plus "time": UTC, ISO 8601 with milliseconds.
 [[nodiscard]] std::string payload_of(const nlohmann::json& state, double wall_s);
 /// 2026-03-01T08:30:00.125Z
 [[nodiscard]] std::string utc_text(double wall_s);
@@ -49,8 +48,8 @@ struct Message {
   std::string payload;
 };
 
-/// Messages for a broker that may be away: a bounded queue that keeps the newest, and the last of
-/// each topic. Pure.
+/// Messages for a broker that may be away: a bounded queue of the newest, and the last of each
+/// topic. Pure.
 class MessageBuffer {
  public:
   explicit MessageBuffer(std::size_t messages_max) : messages_max_(messages_max) {}
@@ -62,15 +61,15 @@ class MessageBuffer {
     waiting_.pop_front();
     ++dropped_;
   }
-  /// The next to be sent, oldest first.
+  /// Oldest message of the queue.
   [[nodiscard]] std::optional<Message> take() {
     if (waiting_.empty()) return std::nullopt;
     Message message = std::move(waiting_.front());
     waiting_.pop_front();
     return message;
   }
-  /// After a connection was made anew: behind what waits, the last of each topic once more, so that
-  /// what the broker retains is right even where the queue had to drop.
+  /// After a reconnection: appends the last message of each topic, so that the broker retains the
+  /// current states even if messages were dropped.
   void repeat_newest() {
     for (const auto& [topic, payload] : newest_) waiting_.push_back({topic, payload});
   }

@@ -25,7 +25,7 @@ std::string number(double value) {
   return text.data();
 }
 
-/// `|` divides fields and a line ends an entry: neither may stand in a text.
+/// Replaces `|` and control characters, which delimit fields and entries.
 std::string plain(std::string_view text) {
   std::string made;
   for (const char c : text) {
@@ -43,8 +43,7 @@ bool is_condition(const std::string& item) {
   return item == "system" || item.starts_with("sensor_") || item.starts_with("bus_");
 }
 
-/// FAULT: the machine is not compensated though it should be. WARNING: it is, or it is switched
-/// off, and something is wrong.
+/// FAULT: not compensated but should be. WARNING: compensated, or off on purpose, with a problem.
 std::vector<std::string> system_condition(const Status& status) {
   const Verdict now = verdict(status);
   const bool is_fault = !now.compensating && !now.intended;
@@ -78,7 +77,7 @@ void add_sensors(const SensorsAnswer& answer, ShdrStates& states) {
   }
 }
 
-/// A kind of data item in the device file.
+/// Data item in the device file.
 struct ItemKind {
   const char* category;
   const char* type;
@@ -133,7 +132,7 @@ std::string shdr_lines(const ShdrStates& before, const ShdrStates& now, double w
       values.append("|").append(item).append("|").append(entries.front());
       return;
     }
-    // NORMAL without a code ends all that were active; then those that are.
+    // NORMAL without a code clears all active entries; then follow the current ones.
     const bool is_plain =
         entries.size() == 1 && (entries[0] == normal || entries[0] == unavailable);
     const auto line = [&](const std::string& entry) {

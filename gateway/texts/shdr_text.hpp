@@ -1,6 +1,6 @@
-/// A snapshot as an MTConnect adapter tells it (SHDR, "simple hierarchical data representation"):
-/// lines `time|item|value|...` and `time|item|level|code|severity|qualifier|text`, and the device
-/// file that gives the items their meaning. Pure.
+/// Snapshot as lines of an MTConnect adapter (SHDR, "simple hierarchical data representation"),
+/// `time|item|value|...` and `time|item|level|code|severity|qualifier|text`, and the device file
+/// that defines the items. Pure.
 /// Source: MTConnect Institute, cppagent, "Adapter Agent Protocol", version 2.
 #pragma once
 
@@ -13,7 +13,7 @@
 
 namespace thermocomp::gateway {
 
-/// What is sent of one data item; a condition has as many entries as it has reasons.
+/// Values by data item; a condition has one entry per reason.
 using ShdrStates = std::map<std::string, std::vector<std::string>>;
 
 /// Data items: `avail`; `temp_<sensor>` [degC]; `offset_<axis>`, `displacement_<axis>` [mm or deg];
@@ -21,18 +21,18 @@ using ShdrStates = std::map<std::string, std::vector<std::string>>;
 /// away.
 [[nodiscard]] ShdrStates shdr_states(const Snapshot& snapshot);
 
-/// Lines for what differs between two states; all of `now` where `before` is empty. What has gone
-/// (a sensor of another configuration) becomes UNAVAILABLE. Each line ends with "\n".
+/// Lines for the differences of two states; all of `now` if `before` is empty. Items no longer
+/// present (a sensor of another configuration) become UNAVAILABLE. Each line ends with "\n".
 [[nodiscard]] std::string shdr_lines(const ShdrStates& before, const ShdrStates& now,
                                      double wall_s);
 
-/// `* PONG 10000` for `* PING`; empty for anything else.
+/// `* PONG 10000` to `* PING`; empty otherwise.
 [[nodiscard]] std::string shdr_answer(std::string_view line, double heartbeat_s);
 
-/// Letters, digits and `_`, as an item of SHDR and an id of XML may have them: distinct_name().
+/// Only letters, digits and `_`, as SHDR items and XML ids allow: see distinct_name().
 [[nodiscard]] std::string item_name(const std::string& kind, const std::string& name);
 
-/// The device file (MTConnectDevices 1.8) of a machine with these sensors, axes and buses.
+/// Device file (MTConnectDevices 1.8) of a machine with these sensors, axes and buses.
 [[nodiscard]] std::string device_file(const Snapshot& snapshot, const std::string& machine);
 
 }  // namespace thermocomp::gateway
