@@ -13,11 +13,11 @@ namespace {
 constexpr double s_per_ns = 1e-9;
 constexpr std::size_t points_max = 4000;
 constexpr double point_s_min = 10.0;
-/// Of the bound, from which on an offset counts as standing at it.
+/// Share of the bound from which an offset counts as at the bound.
 constexpr double at_bound_share = 0.995;
-/// Around a probing: offsets change by a fraction of a micrometre in that time.
+/// Averaging window about a probing; an offset changes by less than 1 um in it.
 constexpr double probing_half_s = 2.0;
-/// Between segments without a pause.
+/// Longest gap between contiguous segments.
 constexpr double apart_s = 1.0;
 
 double end_s(const SegmentInfo& segment) {
@@ -41,7 +41,7 @@ const std::vector<double>* column_of(const ThinnedHistory& course, const std::st
   return nullptr;
 }
 
-/// The setup in force at a moment: that of the last segment that began before it.
+/// Setup in force at a given time: that of the last segment that began before it.
 class Setups {
  public:
   Setups(const HistoryReader& reader, const SetupParser& parser, std::vector<HistoryDamage>& damage)
@@ -75,7 +75,7 @@ class Setups {
   std::map<std::int64_t, ReplaySetup> setups_;
 };
 
-/// Of segments with or without a dry run; one behind the other they are one.
+/// Spans of segments with the given `dry_run`; contiguous segments are merged.
 std::vector<WallSpan> spans_of(const std::vector<SegmentInfo>& segments, const Setups& setups,
                                bool dry_run, const WallSpan& span) {
   std::vector<WallSpan> spans;
@@ -93,7 +93,7 @@ std::vector<WallSpan> spans_of(const std::vector<SegmentInfo>& segments, const S
   return spans;
 }
 
-/// A proving move takes out nothing: its points have no offset.
+/// Blanks the offsets during a proving move, which compensates nothing.
 void leave_out(const RecordedEvent& prove, const ReplaySetup& setup, ThinnedHistory& course) {
   const auto& axes = setup.estimator.axes;
   const auto axis = std::find_if(axes.begin(), axes.end(), [&](const AxisConfig& each) {
@@ -110,7 +110,7 @@ void leave_out(const RecordedEvent& prove, const ReplaySetup& setup, ThinnedHist
         column.values[i] = std::nan("");
 }
 
-/// Of the points at one place.
+/// Range over the points with the given place.
 OffsetRange range_of(const std::vector<double>& offsets, const std::vector<PointPlace>& places,
                      PointPlace place, double bound_um) {
   OffsetRange range;
@@ -162,7 +162,7 @@ ProbingWeek probing_of(const std::filesystem::path& history, const ReplaySetup& 
                                [&](const AxisConfig& one) { return one.name == axis; });
   if (of == axes.end()) return probing;
   probing.offset_um = offset_at(history, moment_s, axis, parser);
-  // Given as a whole (always so in a dry run), what the offset takes out is still in it.
+  // A total measured value (always total in a dry run) includes the compensated displacement.
   if (setup.estimator.correction.measured == MeasuredMeaning::total || setup.dry_run)
     probing.left_um = value_um + probing.offset_um * of->sign;
   return probing;
@@ -173,8 +173,8 @@ struct Line {
   double slope_sd{0.0};
 };
 
-/// Drift of a difference over the stretch beside what follows from the neighbour's own course:
-/// least squares on one, neighbour and time; its error counts six hours as one independent value.
+/// Drift of sensor minus neighbour over the whole stretch: least squares on constant, neighbour and
+/// time. The standard error counts six hours as one independent sample.
 Line drift_of(const std::vector<double>& time_s, const std::vector<double>& sensor,
               const std::vector<double>& neighbour) {
   double sums[3][4] = {};
@@ -199,7 +199,7 @@ Line drift_of(const std::vector<double>& time_s, const std::vector<double>& sens
     for (std::size_t a = 0; a < 3; ++a)
       for (std::size_t b = 0; b < 4; ++b) sums[a][b] += rows.back()[a] * rows.back()[b];
   }
-  // The constant is apart from the other two, which were centred.
+  // Neighbour and time are centred, so the constant decouples.
   const double determinant = sums[1][1] * sums[2][2] - sums[1][2] * sums[1][2];
   if (!(determinant > 1e-9 * sums[1][1] * sums[2][2])) return {0.0, std::nan("")};
   const double gain = (sums[1][3] * sums[2][2] - sums[2][3] * sums[1][2]) / determinant;
@@ -308,7 +308,7 @@ std::vector<ModeSpell> daemon_pauses(const WeekEvents& events, std::vector<WallS
 std::vector<Outages> outages_of(const WeekEvents& events, const WallSpan& span) {
   std::map<Subject, Outages> found;
   const auto& list = events.events;
-  std::int64_t stopping = -1;  // run
+  std::int64_t stopping = -1;  // run that is stopping
   for (std::size_t i = 0; i < list.size(); ++i) {
     if (list[i].kind == EventKind::daemon && list[i].code == "stopping") stopping = list[i].run;
     if (list[i].kind != EventKind::fault || list[i].run == stopping) continue;
@@ -318,7 +318,7 @@ std::vector<Outages> outages_of(const WeekEvents& events, const WallSpan& span) 
     for (std::size_t j = i + 1; j < list.size(); ++j) {
       if (list[j].run != list[i].run) break;
       if (list[j].subject != list[i].subject) continue;
-      until_s = list[j].wall_s;  // recovery, or another fault of the same subject
+      until_s = list[j].wall_s;  // recovery or next fault of the subject
       ended = true;
       break;
     }
@@ -366,7 +366,7 @@ std::vector<SensorWeek> sensors_of(const ThinnedHistory& course) {
       if (!(alike > best)) continue;
       best = alike;
       sensor.neighbour = other.name.substr(0, other.name.size() - 5);
-      constexpr double day_s = 86400.0;  // a daily course must be separated from a drift
+      constexpr double day_s = 86400.0;  // to separate the daily cycle from a drift
       if (course.time_s.back() - course.time_s.front() < day_s) continue;
       const Line drift = drift_of(course.time_s, column.values, other.values);
       sensor.drift_K = drift.slope;

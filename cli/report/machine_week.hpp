@@ -1,4 +1,4 @@
-/// What a history says about a stretch of a machine's life, for its owner.
+/// Summary of a period of a machine's history, for its owner.
 #pragma once
 
 #include <cstddef>
@@ -16,7 +16,7 @@
 
 namespace thermocomp::cli {
 
-/// Times of the wall clock, seconds since 1970, in all that follows.
+/// Wall-clock times, seconds since 1970, as everywhere below.
 struct WallSpan {
   double from_s{0.0};
   double to_s{0.0};
@@ -27,13 +27,13 @@ struct WallSpan {
   [[nodiscard]] WallSpan within(const WallSpan& other) const noexcept;
 };
 
-/// In the place of a mode where no daemon ran: it was stopped, or ended without that.
+/// In place of a mode while no daemon ran: stopped, or ended without a stop.
 inline constexpr const char* daemon_stopped = "daemon_stopped";
 inline constexpr const char* daemon_ended = "daemon_ended";
 
 struct ModeSpell {
   WallSpan span;
-  std::string mode;  ///< name of a mode: "compensating", "holding", ...; or one of the above
+  std::string mode;  ///< "compensating", "holding", ..., or one of the above
 };
 
 /// Faults of one subject.
@@ -48,15 +48,16 @@ struct Outages {
   Event last;
   std::size_t count{0};
   double lasted_s{0.0};
-  bool lasts{false};                  ///< at the end of the stretch
-  std::map<std::string, Kind> kinds;  ///< the same, by code
+  bool lasts{false};                  ///< at the end of the period
+  std::map<std::string, Kind> kinds;  ///< by fault code
 };
 
 struct OffsetRange {
   double low_um{std::numeric_limits<double>::quiet_NaN()};
   double high_um{std::numeric_limits<double>::quiet_NaN()};
   double mean_size_um{std::numeric_limits<double>::quiet_NaN()};  ///< of |offset|
-  double at_bound_share{0.0};                                     ///< of the time with an offset
+  double at_bound_share{0.0};                                     ///< share of the time with an
+                                                                  ///< offset
   [[nodiscard]] bool is_there() const noexcept { return low_um <= high_um; }
 };
 
@@ -65,43 +66,44 @@ struct AxisWeek {
   std::string unit;  ///< "um", "urad"
   double bound_um{0.0};
   OffsetRange sent;
-  OffsetRange dry_run;  ///< computed and recorded, and not sent
+  OffsetRange dry_run;  ///< computed and recorded, but not sent
 };
 
 struct ProbingWeek {
   double wall_s{0.0};
   std::string axis;
   double offset_um{std::numeric_limits<double>::quiet_NaN()};  ///< as sent
-  double left_um{std::numeric_limits<double>::quiet_NaN()};    ///< at the tool, with the offset
-  bool dry_run{false};  ///< the offset was not sent: both are what they would have been
+  double left_um{std::numeric_limits<double>::quiet_NaN()};    ///< remaining displacement at the
+                                                               ///< tool
+  bool dry_run{false};  ///< not sent: both values are hypothetical
 };
 
-/// A sensor beside the one that moved most like it.
+/// A sensor and its most strongly correlated neighbour.
 struct SensorWeek {
   std::string name;
-  std::string neighbour;  ///< empty: none moved alike
+  std::string neighbour;  ///< empty: correlation at most 0.8 with all
   double low_degC{std::numeric_limits<double>::quiet_NaN()};
   double high_degC{std::numeric_limits<double>::quiet_NaN()};
-  double missing_share{0.0};                                    ///< of the recorded time
+  double missing_share{0.0};                                    ///< share of the recorded time
   double drift_K{std::numeric_limits<double>::quiet_NaN()};     ///< against the neighbour
-  double drift_sd_K{std::numeric_limits<double>::quiet_NaN()};  ///< of that figure
+  double drift_sd_K{std::numeric_limits<double>::quiet_NaN()};  ///< standard error of drift_K
 };
 
 struct MachineWeek {
-  std::string machine;  ///< its name, in the title; empty: none
+  std::string machine;  ///< title of the report; empty: none
   std::string history;
   WallSpan span;
-  double recorded_s{0.0};        ///< the daemon ran
-  std::vector<ModeSpell> modes;  ///< within the span
+  double recorded_s{0.0};        ///< time with a running daemon
+  std::vector<ModeSpell> modes;  ///< clipped to the span
   std::vector<Outages> outages;  ///< longest first
   std::vector<AxisWeek> axes;
   std::vector<ProbingWeek> probings;
-  std::optional<CandidateStatus> candidate;  ///< its score at the last probing with one beside
+  std::optional<CandidateStatus> candidate;  ///< score at the last probing with a candidate
   std::vector<SensorWeek> sensors;
   std::vector<RecordedEvent> commands;  ///< oldest first
-  std::size_t starts{0};                ///< of the daemon
-  std::vector<WallSpan> sent;           ///< recorded outside of dry runs; in order
-  std::vector<WallSpan> dry_runs;       ///< recorded, and nothing sent; in order
+  std::size_t starts{0};                ///< starts of the daemon
+  std::vector<WallSpan> sent;           ///< recorded without dry run, in order
+  std::vector<WallSpan> dry_runs;       ///< recorded in a dry run, in order
   bool dry_run{false};                  ///< at the end
   std::vector<HistoryDamage> damage;
   ThinnedHistory course;
@@ -110,31 +112,31 @@ struct MachineWeek {
   [[nodiscard]] double dry_run_s() const;
 };
 
-/// The same from the parts, for a test.
+/// Parts of machine_week(), for tests.
 struct WeekEvents {
-  std::vector<RecordedEvent> events;          ///< of the whole history, oldest first
-  std::map<std::int64_t, double> run_ends_s;  ///< of each start of the daemon: its last record
+  std::vector<RecordedEvent> events;          ///< whole history, oldest first
+  std::map<std::int64_t, double> run_ends_s;  ///< time of the last record of each run of the daemon
 };
 [[nodiscard]] std::vector<ModeSpell> mode_spells(const WeekEvents& events, const WallSpan& span);
-/// When no daemon ran. @param recorded  in any order
+/// Times without a daemon. @param recorded in any order
 [[nodiscard]] std::vector<ModeSpell> daemon_pauses(const WeekEvents& events,
                                                    std::vector<WallSpan> recorded,
                                                    const WallSpan& span);
-/// Faults after the daemon began to stop do not count: with the machine everything is switched off.
+/// Ignores faults after the daemon began to stop, when everything is switched off.
 [[nodiscard]] std::vector<Outages> outages_of(const WeekEvents& events, const WallSpan& span);
 [[nodiscard]] std::vector<SensorWeek> sensors_of(const ThinnedHistory& course);
 
-/// Whether a point of a course lies in a dry run, or elsewhere; `both`: its mean is of both.
+/// Whether the samples of a thinned point are from a dry run, not, or `both`.
 enum class PointPlace { sent, dry_run, both };
 [[nodiscard]] std::vector<PointPlace> places_of(const ThinnedHistory& course,
                                                 const std::vector<WallSpan>& sent,
                                                 const std::vector<WallSpan>& dry_runs);
 
-/// @throws HistoryError when nothing can be taken from the file
+/// @throws HistoryError if nothing can be read from the file
 [[nodiscard]] MachineWeek machine_week(const std::filesystem::path& history, const WallSpan& span,
                                        const SetupParser& parser = parse_setup);
 
-/// From the first to the last record. @throws HistoryError
+/// From the first record to the last. @throws HistoryError
 [[nodiscard]] WallSpan recorded_span(const std::filesystem::path& history);
 
 }  // namespace thermocomp::cli

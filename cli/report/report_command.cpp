@@ -25,7 +25,7 @@ struct ReportOptions {
   std::string machine;
 };
 
-/// A wall time, or seconds since the history's start.
+/// Wall time, or seconds since the start of the history.
 double moment_of(const std::string& text, double otherwise_s, const WallSpan& recorded) {
   if (text.empty()) return otherwise_s;
   const HistoryTime time = parse_history_time(text);

@@ -17,11 +17,12 @@ constexpr double drift_listed_K = 0.5;
 constexpr double drift_listed_sd = 4.0;
 constexpr double outage_listed_s = 60.0;
 constexpr double bound_listed_share = 0.01;
-/// A model that leaves more of what it takes out than this at the tool is worth looking at.
+/// Ratio of remaining to compensated displacement above which a model is listed.
 constexpr double left_listed_share = 0.3;
 constexpr double left_listed_um = 2.0;
 
-/// Of dry runs and of the rest alike: by both the model is judged.
+/// RMS remaining displacement of all probings, dry runs included.
+/// @param claimed_um  RMS of the offsets
 double rms_left_um(const MachineWeek& week, const std::string& axis, double& claimed_um,
                    std::size_t& count) {
   double squares = 0.0;
@@ -42,7 +43,6 @@ bool is_listed(const Outages::Kind& kind) {
   return kind.lasted_s >= outage_listed_s || kind.lasts || kind.count >= 5;
 }
 
-/// "2 times, 54 min 0 s in all, and still."
 std::string how_often(const Outages::Kind& kind) {
   return std::to_string(kind.count) + (kind.count == 1 ? " time, " : " times, ") +
          duration_text(kind.lasted_s) + " in all" + (kind.lasts ? ", and still" : "") + ".";
@@ -64,7 +64,7 @@ bool any_listed(const MachineWeek& week, SubjectKind subject) {
   });
 }
 
-/// Lines of sensors, axes and the controller say more.
+/// True if lines of sensors, axes or the controller are more specific.
 bool is_listed_by_its_cause(const MachineWeek& week, Reason reason) {
   switch (reason) {
     case Reason::sensor_suspected:
@@ -95,7 +95,6 @@ void add_reasons(const MachineWeek& week, std::vector<std::string>& lines) {
   }
 }
 
-/// Buses, the controller.
 void add_devices(const MachineWeek& week, std::initializer_list<SubjectKind> kinds,
                  std::vector<std::string>& lines) {
   for (const Outages& outages : week.outages) {
@@ -108,7 +107,8 @@ void add_devices(const MachineWeek& week, std::initializer_list<SubjectKind> kin
   }
 }
 
-/// Those with the same fault for the same time are one line: a bus takes all its sensors with it.
+/// Sensors with the same fault, count and duration share a line, since a bus fault affects all of
+/// its sensors.
 void add_sensor_faults(const MachineWeek& week, std::vector<std::string>& lines) {
   struct Group {
     std::string code;
@@ -165,7 +165,7 @@ void add_sensors(const MachineWeek& week, std::vector<std::string>& lines) {
     if (!(std::abs(sensor.drift_K) > drift_listed_K &&
           std::abs(sensor.drift_K) > drift_listed_sd * sensor.drift_sd_K))
       continue;
-    // Said already, and more exactly.
+    // already reported in more detail
     if (is_suspected(week, sensor.name) || is_suspected(week, sensor.neighbour)) continue;
     lines.push_back("Sensor " + sensor.name + " drifted by " + figure_text(sensor.drift_K) +
                     " K against " + sensor.neighbour +

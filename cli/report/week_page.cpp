@@ -52,7 +52,7 @@ std::string summary(const MachineWeek& week) {
   return text;
 }
 
-/// Seconds and tenths of a percent of the rows add up to those of the whole.
+/// The rows add up to the total in whole seconds and tenths of a percent.
 std::string time_table(const MachineWeek& week) {
   constexpr double tenths = 1000.0;
   const double whole_s = std::floor(week.span.length_s());
@@ -75,7 +75,7 @@ std::string time_table(const MachineWeek& week) {
   return html_table(rows);
 }
 
-/// The longest; what is shorter in one row, so that nothing is left out.
+/// The longest periods; the rest is summed in one row.
 std::string spells_part(const MachineWeek& week) {
   constexpr std::size_t listed_max = 12;
   std::vector<ModeSpell> spells;
@@ -103,7 +103,7 @@ std::string spells_part(const MachineWeek& week) {
 std::string why_part(const MachineWeek& week) {
   std::vector<std::vector<std::string>> rows{{"why it did less than it could", "times", "in all"}};
   for (const Outages& outages : week.outages)
-    // A suspicion stands with its sensor; by itself it takes nothing away.
+    // A suspicion is reported with its sensor and alone reduces nothing.
     if (const auto reason = reason_named(outages.last.code);
         outages.subject.kind == SubjectKind::reason && reason && reason != Reason::sensor_suspected)
       rows.push_back({std::string(code_text(*reason).meaning), std::to_string(outages.count),
@@ -201,7 +201,7 @@ std::string outages_part(const MachineWeek& week) {
          (table.empty() ? html_paragraph("No faults of buses, devices or controller.") : table);
 }
 
-/// A column where its points lie in one place; gaps elsewhere.
+/// A column with NaN at points of other places.
 std::vector<double> only(const std::vector<double>& values, const std::vector<PointPlace>& places,
                          PointPlace place) {
   std::vector<double> kept = values;
@@ -218,7 +218,7 @@ std::string day_text(std::time_t seconds) {
   return local_text(static_cast<double>(seconds), "%a %d");
 }
 
-/// The beginning, and the midnights of the machine's place: a course of some days is read by them.
+/// Ticks at the start and at local midnights.
 std::vector<TimeTick> days_of(const WallSpan& span) {
   const auto from = static_cast<std::time_t>(span.from_s);
   std::vector<TimeTick> ticks{{0.0, day_text(from)}};
@@ -235,7 +235,7 @@ std::vector<TimeTick> days_of(const WallSpan& span) {
 }
 
 struct WeekPanels {
-  std::deque<std::vector<double>> kept;  ///< what the lines look at
+  std::deque<std::vector<double>> kept;  ///< storage of the lines' values
   std::vector<PlotPanel> panels;
 };
 

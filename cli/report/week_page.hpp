@@ -1,4 +1,4 @@
-/// The report on a machine's week: a page for its owner.
+/// Report on a machine's week, as a page for its owner.
 #pragma once
 
 #include <string>
@@ -8,7 +8,7 @@
 
 namespace thermocomp::cli {
 
-/// What to do, most important first; empty: nothing.
+/// Recommended actions, most important first.
 [[nodiscard]] std::vector<std::string> advice(const MachineWeek& week);
 [[nodiscard]] std::string week_html(const MachineWeek& week);
 

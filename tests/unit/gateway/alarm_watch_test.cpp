@@ -31,7 +31,7 @@ std::vector<std::string> names(const std::vector<AlarmCondition>& wrong) {
 
 }  // namespace
 
-TEST_CASE("an alarm is raised and cleared once, and only when it lasts", "[gateway][alarm]") {
+TEST_CASE("a lasting condition raises and clears its alarm once", "[gateway][alarm]") {
   AlarmWatch watch(10.0, 60.0);
   CHECK(watch.update(0.0, lost, true).empty());
   CHECK(watch.update(9.9, lost, true).empty());
@@ -50,7 +50,7 @@ TEST_CASE("an alarm is raised and cleared once, and only when it lasts", "[gatew
   CHECK(watch.active().empty());
 }
 
-TEST_CASE("what comes and goes every second is one alarm at most", "[gateway][alarm]") {
+TEST_CASE("an intermittent condition raises at most one alarm", "[gateway][alarm]") {
   AlarmWatch watch(3.0, 10.0);
   std::size_t changes = 0;
   for (int s = 0; s < 1000; ++s)
@@ -60,8 +60,7 @@ TEST_CASE("what comes and goes every second is one alarm at most", "[gateway][al
   for (int s = 0; s < 1000; ++s) CHECK(never.update(s, s % 2 == 0 ? lost : nothing, true).empty());
 }
 
-TEST_CASE("while the daemon is away, what was wrong is neither cleared nor forgotten",
-          "[gateway][alarm]") {
+TEST_CASE("alarms keep their state while the daemon is away", "[gateway][alarm]") {
   AlarmWatch watch(1.0, 1.0);
   watch.update(0.0, lost, true);
   CHECK(watch.update(1.0, lost, true).size() == 1);
@@ -75,7 +74,7 @@ TEST_CASE("while the daemon is away, what was wrong is neither cleared nor forgo
   CHECK(back[0].alarm.condition.name == "daemon");
 }
 
-TEST_CASE("each thing that is wrong has its alarm", "[gateway][alarm]") {
+TEST_CASE("each condition raises its own alarm", "[gateway][alarm]") {
   Snapshot snapshot = good_snapshot();
   CHECK(wrong_now(snapshot).empty());
   snapshot.status.axes[0].at_bound = true;
@@ -96,7 +95,7 @@ TEST_CASE("each thing that is wrong has its alarm", "[gateway][alarm]") {
   CHECK(names(wrong_now(snapshot)) == std::vector<std::string>{"daemon"});
 }
 
-TEST_CASE("a bus or module that is away has one alarm, and its sensors have none",
+TEST_CASE("a disconnected bus or silent module raises one alarm, not one per sensor",
           "[gateway][alarm]") {
   Snapshot snapshot = good_snapshot();
   snapshot.sensors.sensors[0].fault = Fault::no_answer;
@@ -109,7 +108,7 @@ TEST_CASE("a bus or module that is away has one alarm, and its sensors have none
   CHECK(names(wrong_now(snapshot)) == std::vector<std::string>{"bus/cabinet"});
 }
 
-TEST_CASE("values that must last before they count are no alarm", "[gateway][alarm]") {
+TEST_CASE("values not yet confirmed at start-up raise no alarm", "[gateway][alarm]") {
   Snapshot snapshot = good_snapshot();
   snapshot.status.mode = Mode::starting;
   snapshot.sensors.sensors[0].fault = Fault::unconfirmed;
@@ -119,7 +118,7 @@ TEST_CASE("values that must last before they count are no alarm", "[gateway][ala
   CHECK(names(wrong_now(snapshot)) == std::vector<std::string>{"compensation", "sensor/a"});
 }
 
-TEST_CASE("an hour has room for so many commands", "[gateway][alarm]") {
+TEST_CASE("alarm commands are limited per hour", "[gateway][alarm]") {
   HookLimit limit(2);
   CHECK(limit.take(0.0));
   CHECK(limit.take(1.0));
@@ -141,7 +140,7 @@ TEST_CASE("a full buffer keeps the newest messages, and the last of each topic",
   CHECK(taken == "often2 often3 often4 often4 rarer ");
 }
 
-TEST_CASE("a dry run is no alarm, one that lacks a sensor is", "[gateway][alarm]") {
+TEST_CASE("a dry run raises no alarm, a held dry run does", "[gateway][alarm]") {
   Snapshot snapshot = good_snapshot();
   snapshot.status.dry_run = true;
   CHECK(wrong_now(snapshot).empty());

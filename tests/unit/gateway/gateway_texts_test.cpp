@@ -40,7 +40,7 @@ Snapshot snapshot_of_two_axes() {
 
 }  // namespace
 
-TEST_CASE("metrics are in base units; what is not known has no sample", "[gateway][metrics]") {
+TEST_CASE("metrics are in base units; unknown values have no sample", "[gateway][metrics]") {
   const std::string text = metrics_text(snapshot_of_two_axes(), {});
   CHECK_THAT(text, Contains("thermocomp_up 1\n"));
   CHECK_THAT(text, Contains("thermocomp_axis_offset_meters{axis=\"z\"} -3.5e-06\n"));
@@ -53,7 +53,7 @@ TEST_CASE("metrics are in base units; what is not known has no sample", "[gatewa
   CHECK_THAT(text, !Contains(" nan"));
 }
 
-TEST_CASE("metrics of a daemon that is away end, and do not stand still", "[gateway][metrics]") {
+TEST_CASE("series end while the daemon is away", "[gateway][metrics]") {
   Snapshot snapshot = snapshot_of_two_axes();
   snapshot.is_here = false;
   const std::string text = metrics_text(snapshot, {});
@@ -76,7 +76,7 @@ TEST_CASE("metrics of any answer are lines of the format", "[gateway][metrics]")
   }
 }
 
-TEST_CASE("topics have no character that a topic gives a meaning to", "[gateway][mqtt]") {
+TEST_CASE("topic names contain no MQTT special characters", "[gateway][mqtt]") {
   CHECK(topic_of("mill", "sensor", "bed front/+#") ==
         "thermocomp/mill/sensor/bed_0x20front_0x2F_0x2B_0x23");
   CHECK(topic_of("mill", "status") == "thermocomp/mill/status");
@@ -88,11 +88,11 @@ TEST_CASE("topics have no character that a topic gives a meaning to", "[gateway]
   CHECK(states[3].state["offset_urad"] == 4.0);
 }
 
-TEST_CASE("different names stay different and a name stays what it was", "[gateway][names]") {
+TEST_CASE("topic names are unique and depend on the name only", "[gateway][names]") {
   CHECK(item_name("temp", "bed_front2") == "temp_bed_front2");
   CHECK(item_name("temp", "a b") == "temp_a_0x20b");
   CHECK(topic_of("mill", "sensor", "床前") == "thermocomp/mill/sensor/床前");
-  // Short names of the characters that could be confused: all of them.
+  // All short names of characters that could collide.
   const std::string alphabet = "_0x2A /\xE5";
   std::vector<std::string> names{""};
   for (std::size_t i = 0; names.size() < 60000; ++i)
@@ -112,7 +112,7 @@ TEST_CASE("different names stay different and a name stays what it was", "[gatew
   CHECK(topics.size() == names.size());
 }
 
-TEST_CASE("every sensor has an item of its own in lines and device file", "[gateway][names]") {
+TEST_CASE("every sensor has its own item in lines and device file", "[gateway][names]") {
   Snapshot snapshot = snapshot_of_two_axes();
   snapshot.sensors.sensors.clear();
   for (const char* name : {"床前", "床后", "主轴", "立柱", "a b", "a_b"})
@@ -131,7 +131,7 @@ TEST_CASE("every sensor has an item of its own in lines and device file", "[gate
   CHECK(faulty == 1);
 }
 
-TEST_CASE("adapter lines tell everything once, then what changes", "[gateway][shdr]") {
+TEST_CASE("adapter lines contain all items once, then changes", "[gateway][shdr]") {
   Snapshot snapshot = snapshot_of_two_axes();
   const ShdrStates first = shdr_states(snapshot);
   const std::string all = shdr_lines({}, first, snapshot.wall_s);
@@ -164,7 +164,7 @@ TEST_CASE("only a ping is answered", "[gateway][shdr]") {
   CHECK(shdr_answer("", 10.0).empty());
 }
 
-TEST_CASE("a trend is the slope of the last minutes, once there are some", "[gateway][trend]") {
+TEST_CASE("a trend is the slope over the window, after one minute", "[gateway][trend]") {
   TrendWatch trends;
   for (int s = 0; s < 50; ++s) trends.add("a", s, 20.0 + 0.001 * s);
   CHECK(std::isnan(trends.per_hour("a")));
@@ -175,7 +175,7 @@ TEST_CASE("a trend is the slope of the last minutes, once there are some", "[gat
   CHECK(std::isnan(trends.per_hour("b")));
 }
 
-TEST_CASE("the page is reported in the words of thermocomp status", "[gateway][page]") {
+TEST_CASE("the page uses the texts of thermocomp status", "[gateway][page]") {
   Snapshot snapshot = snapshot_of_two_axes();
   json state = page_state(snapshot, "mill");
   CHECK(state["verdict"]["answer"] == "yes");
@@ -191,7 +191,7 @@ TEST_CASE("the page is reported in the words of thermocomp status", "[gateway][p
   snapshot.is_here = false;
   state = page_state(snapshot, "mill");
   CHECK(state["verdict"]["answer"] == "not known");
-  CHECK(state["axes"].size() == 2);  // the last known
+  CHECK(state["axes"].size() == 2);  // last known values
   CHECK_THAT(state["problems"][0]["remedy"].get<std::string>(),
              Catch::Contains("the last offsets stay at the controller: "));
   CHECK(state["verdict"]["since_s"] == std::round(snapshot.since_s));
@@ -212,14 +212,14 @@ TEST_CASE("switched off and degraded are two levels", "[gateway][page]") {
   CHECK(said["since_s"] == std::round(snapshot.wall_s - 90.0));
 }
 
-TEST_CASE("a change holds what a receiver of the state before lacks", "[gateway][page]") {
+TEST_CASE("a change turns the previous state into the new one", "[gateway][page]") {
   const json before = {
       {"time_s", 1.0}, {"axes", {{{"name", "z"}, {"offset", 1.0}}}}, {"why", json()}};
   json after = before;
   after["axes"][0]["offset"] = 2.0;
   CHECK(state_change(before, after).value() == json{{"axes", {{"0", {{"offset", 2.0}}}}}});
   CHECK(state_change(before, before).value() == json::object());
-  after["axes"].push_back({{"name", "x"}});  // another length: the array anew
+  after["axes"].push_back({{"name", "x"}});  // other length: the whole array
   CHECK(state_change(before, after).value()["axes"] == after["axes"]);
   after["sensors"] = json::array();
   CHECK_FALSE(state_change(before, after));
@@ -249,7 +249,7 @@ std::vector<std::string> texts_of(std::vector<Event> events) {
 
 }  // namespace
 
-TEST_CASE("what a fault or a command does to the mode is no line of its own", "[gateway][page]") {
+TEST_CASE("a mode change caused by a fault or command has no entry of its own", "[gateway][page]") {
   const Subject module{SubjectKind::device, "bed_module"};
   const auto mode = [](double wall_s, const char* before, const char* now, double lasted_s) {
     return event(wall_s, EventKind::mode, {SubjectKind::nothing, before}, now, lasted_s);
@@ -266,13 +266,13 @@ TEST_CASE("what a fault or a command does to the mode is no line of its own", "[
                   mode(260.1, "disabled", "compensating", 60.0)}) ==
         std::vector<std::string>{"switch on; not compensated for 1 min 0 s", "switch off"});
 
-  // Long before or after the fault it is news of its own.
+  // Far from the fault it has an entry of its own.
   const Event later = mode(300.0, "compensating", "holding", 170.0);
   CHECK(texts_of({fault, over, later}) ==
         std::vector<std::string>{event_text(later), event_text(over)});
 }
 
-TEST_CASE("what happens again and again is one line, without what it explains", "[gateway][page]") {
+TEST_CASE("repeated events are one entry, without their effects", "[gateway][page]") {
   std::vector<Event> events;
   for (int i = 0; i < 3; ++i) {
     const Subject module{SubjectKind::device, "bed_module"};

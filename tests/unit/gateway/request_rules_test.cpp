@@ -22,7 +22,7 @@ unsigned status_of(const RequestFacts& request) {
 
 }  // namespace
 
-TEST_CASE("a host is taken by its names, whatever the port and the case", "[gateway][http]") {
+TEST_CASE("host names match regardless of port and case", "[gateway][http]") {
   for (const char* host : {"localhost", "LOCALHOST:1", "127.0.0.1:8420", "[::1]:8420",
                            "192.168.1.5", "mill-3.shop.example:443"})
     CHECK(hosts.allows(host));
@@ -32,7 +32,7 @@ TEST_CASE("a host is taken by its names, whatever the port and the case", "[gate
     CHECK_FALSE(hosts.allows(host));
 }
 
-TEST_CASE("only a page of this gateway may ask from within a browser", "[gateway][http]") {
+TEST_CASE("in a browser only pages of this gateway may send requests", "[gateway][http]") {
   CHECK(status_of(plain_request()) == 200);
   RequestFacts request = plain_request();
   request.origin = "https://localhost:8420";
@@ -46,12 +46,12 @@ TEST_CASE("only a page of this gateway may ask from within a browser", "[gateway
   request.fetch_site = "cross-site";
   CHECK(status_of(request) == 403);
   request.path = "/";
-  CHECK(status_of(request) == 200);  // a link that somebody follows
+  CHECK(status_of(request) == 200);  // a followed link
   request.method = "POST";
   CHECK(status_of(request) == 403);
 }
 
-TEST_CASE("what is no plain request is refused", "[gateway][http]") {
+TEST_CASE("malformed requests are refused", "[gateway][http]") {
   RequestFacts request = plain_request();
   request.hosts_given = 2;
   CHECK(status_of(request) == 400);
@@ -71,7 +71,7 @@ TEST_CASE("what is no plain request is refused", "[gateway][http]") {
   CHECK(status_of(request) == 400);
 }
 
-TEST_CASE("history may be asked for by times or by how long ago", "[gateway][http]") {
+TEST_CASE("history is requested by absolute or relative times", "[gateway][http]") {
   std::string why;
   const double now_s = 1e9;
   const auto shift = parse_history_request("", "", "", now_s, why);

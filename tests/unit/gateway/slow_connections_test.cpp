@@ -19,7 +19,7 @@ using Stage = SlowConnections::Stage;
 
 namespace {
 
-/// A connection on the loopback: ours, and the other side's.
+/// Loopback connection with both ends.
 class Link {
  public:
   Link() {
@@ -50,12 +50,12 @@ class Link {
     pollfd entry{ours, POLLIN, 0};
     return poll(&entry, 1, 0) == 1 && (entry.revents & POLLHUP) != 0;
   }
-  /// As much of it as fits.
+  /// Sends `count` bytes without blocking.
   void send_bytes(std::size_t count) const {
     const std::string bytes(count, 'x');
     REQUIRE(send(ours, bytes.data(), bytes.size(), MSG_DONTWAIT) == static_cast<ssize_t>(count));
   }
-  /// Takes so many bytes on the other side.
+  /// Reads `count` bytes at the peer.
   void take(std::size_t count) const {
     std::array<char, 4096> block{};
     while (count > 0) {
@@ -73,8 +73,7 @@ const SlowConnections::Clock::time_point begin{};
 
 }  // namespace
 
-TEST_CASE("a request has fifteen seconds, and three while all places are taken",
-          "[gateway][slow]") {
+TEST_CASE("a request times out after 15 s, or 3 s while all places are taken", "[gateway][slow]") {
   const Link first;
   const Link second;
   SlowConnections connections(2);
@@ -92,7 +91,7 @@ TEST_CASE("a request has fifteen seconds, and three while all places are taken",
   CHECK(second.is_ended());
 }
 
-TEST_CASE("an answer has a minute, and ten seconds while all places are taken", "[gateway][slow]") {
+TEST_CASE("an answer times out after 60 s, or 10 s while all places are taken", "[gateway][slow]") {
   const Link link;
   SlowConnections roomy(2);
   roomy.is_at(link.ours, Stage::answer, begin);
@@ -106,8 +105,7 @@ TEST_CASE("an answer has a minute, and ten seconds while all places are taken", 
   CHECK(link.is_ended());
 }
 
-TEST_CASE("a stream that nobody reads is ended, one that is read lasts for ever",
-          "[gateway][slow]") {
+TEST_CASE("a stream is closed unless the peer reads it", "[gateway][slow]") {
   const Link link;
   SlowConnections connections(10);
   connections.is_at(link.ours, Stage::stream, begin);
@@ -124,12 +122,11 @@ TEST_CASE("a stream that nobody reads is ended, one that is read lasts for ever"
   CHECK(link.is_ended());
 }
 
-TEST_CASE("a stream of little that nobody reads is ended after the time of an answer",
-          "[gateway][slow]") {
+TEST_CASE("a slow stream that the peer does not read times out like an answer", "[gateway][slow]") {
   const Link link;
   SlowConnections connections(10);
   connections.is_at(link.ours, Stage::stream, begin);
-  link.send_bytes(16000);  // more than the other side's window, less than ends it at once
+  link.send_bytes(16000);  // above the peer's window, below the immediate limit
   connections.end_slow(begin + seconds(60));
   CHECK_FALSE(link.is_ended());
   connections.end_slow(begin + seconds(61));

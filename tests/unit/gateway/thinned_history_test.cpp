@@ -23,7 +23,7 @@ const ThinnedColumn& column_of(const ThinnedHistory& history, const std::string&
   throw std::runtime_error("no column " + name);
 }
 
-/// Mean of a column of a run file's text.
+/// Mean of a column of a run file.
 double mean_of(const std::string& csv, const std::string& name) {
   std::istringstream lines(csv);
   std::string line;
@@ -53,7 +53,7 @@ struct Recorded {
     machine.start();
     for (int part = 0; part < 4; ++part) {
       machine.run(300);
-      std::this_thread::sleep_for(std::chrono::milliseconds(300));  // a commit, and with it a chunk
+      std::this_thread::sleep_for(std::chrono::milliseconds(300));  // one chunk
     }
     machine.stop();
     const HistoryReader reader(config.file);
@@ -65,7 +65,7 @@ struct Recorded {
 
 }  // namespace
 
-TEST_CASE("one point is the mean of all that was recorded", "[gateway][history]") {
+TEST_CASE("a single point is the mean of all records", "[gateway][history]") {
   const TempFolder folder;
   const Recorded recorded(folder);
   const ThinnedHistory history = thin_history(recorded.config.file, recorded.begin_s - 100.0,
@@ -84,7 +84,7 @@ TEST_CASE("one point is the mean of all that was recorded", "[gateway][history]"
   CHECK(bed_degC < 20.3);
 }
 
-TEST_CASE("the points begin with the history and end where it was asked to", "[gateway][history]") {
+TEST_CASE("points span from the start of the history to the requested end", "[gateway][history]") {
   const TempFolder folder;
   const Recorded recorded(folder);
   const ThinnedHistory history = thin_history(recorded.config.file, recorded.begin_s - 100.0,
@@ -102,7 +102,7 @@ TEST_CASE("the points begin with the history and end where it was asked to", "[g
       later_s);
 }
 
-TEST_CASE("a long stretch is read in samples, evenly", "[gateway][history]") {
+TEST_CASE("a long period is sampled evenly", "[gateway][history]") {
   const TempFolder folder;
   const Recorded recorded(folder);
   const ThinnedHistory history =
@@ -113,7 +113,7 @@ TEST_CASE("a long stretch is read in samples, evenly", "[gateway][history]") {
   CHECK(history.chunks > 2);
 }
 
-TEST_CASE("before the history and without points there is nothing", "[gateway][history]") {
+TEST_CASE("a period before the history, or zero points, gives no data", "[gateway][history]") {
   const TempFolder folder;
   const Recorded recorded(folder);
   const auto thin = [&](double from_s, double to_s, std::size_t points) {

@@ -31,7 +31,7 @@ TEST_CASE("small changes stay flat, and plain terminals get letters", "[trend]")
   CHECK_THAT(trends.text("z"), Contains("falling fast"));
 }
 
-TEST_CASE("what is older than the window, or of an earlier daemon, is forgotten", "[trend]") {
+TEST_CASE("values older than the window or of an earlier daemon are dropped", "[trend]") {
   AxisTrends trends(true);
   trends.add(status_at(0.0, 100.0));
   trends.add(status_at(601.0, 1.0));

@@ -64,7 +64,7 @@ double spell_s(const std::vector<ModeSpell>& spells, const std::string& mode) {
   return sum;
 }
 
-/// Temperatures of a day's course, one point in ten minutes, with noise.
+/// Temperatures with a daily cycle and noise, sampled every 10 min.
 ThinnedHistory week_of_sensors(double drift_K, std::uint64_t seed) {
   ThinnedHistory course;
   std::mt19937_64 random(seed);
@@ -84,8 +84,7 @@ ThinnedHistory week_of_sensors(double drift_K, std::uint64_t seed) {
 
 }  // namespace
 
-TEST_CASE("hours of each mode are those between its events, cut at the span and at a run's end",
-          "[week]") {
+TEST_CASE("time per mode runs between events, clipped to the span and the run's end", "[week]") {
   const WeekEvents events{
       {mode_at(-3600, "starting"), mode_at(0, "compensating"), mode_at(7200, "holding"),
        mode_at(7800, "compensating"), mode_at(20000, "disabled", 2)},
@@ -112,7 +111,7 @@ TEST_CASE("outages count and last until their recovery, or the run's end", "[wee
   CHECK_FALSE(outages[1].lasts);
 }
 
-TEST_CASE("where no daemon ran, the page has the time, and whether it was stopped", "[week]") {
+TEST_CASE("times without a daemon are listed, stopped or not", "[week]") {
   const WeekEvents events{
       {event_at(0, EventKind::daemon, {}, "started"), mode_at(0.4, "compensating"),
        event_at(1000, EventKind::daemon, {}, "stopping"), fault_at(1000, bed, "no_answer"),
@@ -126,7 +125,7 @@ TEST_CASE("where no daemon ran, the page has the time, and whether it was stoppe
   CHECK(week.mode_s(daemon_stopped) == Approx(100.0).margin(1e-3));
   CHECK(week.mode_s(daemon_ended) == Approx(300.4).margin(1e-3));
   for (const ModeSpell& spell : mode_spells(events, week.span)) week.modes.push_back(spell);
-  CHECK(outages_of(events, week.span).empty());  // switched off together with the daemon
+  CHECK(outages_of(events, week.span).empty());  // switched off with the daemon
   const std::string html = week_html(week);
   CHECK_THAT(
       html,
@@ -149,7 +148,7 @@ TEST_CASE("a sensor's drift against its neighbour is within its interval of the 
   CHECK(within >= 19);
 }
 
-TEST_CASE("what to do: a drifting sensor is named, a steady one is not", "[week]") {
+TEST_CASE("advice names a drifting sensor, not a steady one", "[week]") {
   MachineWeek week;
   week.span = {begin_s, begin_s + 7 * day_s};
   week.course = week_of_sensors(2.0, 3);
@@ -162,10 +161,10 @@ TEST_CASE("what to do: a drifting sensor is named, a steady one is not", "[week]
   CHECK(advice(week).empty());
 }
 
-TEST_CASE("a sensor that was suspected is named with what to do, in its own line", "[week]") {
+TEST_CASE("a suspected sensor has its own line of advice", "[week]") {
   MachineWeek week;
   week.span = {begin_s, begin_s + 7 * day_s};
-  week.course = week_of_sensors(2.0, 3);  // column drifts, too
+  week.course = week_of_sensors(2.0, 3);  // `column` drifts as well
   week.sensors = sensors_of(week.course);
   RecordedEvent suspected = fault_at(1000, {SubjectKind::suspected_sensor, "column"}, "suspected");
   suspected.value = 2.0;
@@ -182,7 +181,7 @@ TEST_CASE("a sensor that was suspected is named with what to do, in its own line
   CHECK_THAT(lines[0], Contains("Sensor column is suspected: off by +2.0 K") &&
                            Contains("1 time, 2 h 0 min in all. Do:") && Contains("thermometer"));
   for (const std::string& line : lines) {
-    CHECK_THAT(line, !Contains("drifted by"));  // said once
+    CHECK_THAT(line, !Contains("drifted by"));  // not reported twice
     CHECK_THAT(line, !Contains("a sensor shows what its neighbours contradict"));
   }
   const std::string html = week_html(week);
@@ -190,7 +189,7 @@ TEST_CASE("a sensor that was suspected is named with what to do, in its own line
   CHECK_THAT(html, Contains("No faults of buses, devices or controller."));
 }
 
-TEST_CASE("a bus takes its sensors with it in one line, and a broken one has its own", "[week]") {
+TEST_CASE("faults caused by a bus share a line, a broken sensor has its own", "[week]") {
   WeekEvents events{{}, {{1, begin_s + day_s}}};
   events.events.push_back(fault_at(1000, cabinet, "no answer"));
   for (const char* name : {"bed", "column", "oil"})
@@ -229,7 +228,7 @@ TEST_CASE("a picture does not bridge the hours in which the daemon did not run",
   CHECK(pens() == 1);
   for (std::size_t i = 300; i < 360; ++i) week.course.columns[0].values[i] = std::nan("");
   CHECK(pens() == 2);
-  week.course.columns[0].values[500] = std::nan("");  // one point is no gap
+  week.course.columns[0].values[500] = std::nan("");  // a single missing point is not a gap
   CHECK(pens() == 2);
 }
 
@@ -244,13 +243,13 @@ TEST_CASE("a point of a course is sent, of a dry run, or of both", "[week]") {
   CHECK(places[3] == PointPlace::sent);
 }
 
-TEST_CASE("what a dry run computed is not said to have been taken out", "[week]") {
+TEST_CASE("offsets of a dry run are not reported as compensated", "[week]") {
   const TempFolder folder;
   const auto config = history_config(folder / "h.db");
   const WriterClocks clocks{[] { return nanoseconds(0); },
                             [] { return std::chrono::hours(500000); }};
   const double zero_s = 3600.0 * 500007.0;
-  // The text of the configuration is the gain of its model: 2 is a dry run, 0.5 is not.
+  // The configuration text is the gain of the model: 2 in a dry run, 0.5 otherwise.
   const SetupParser parser = [](const SegmentSetup& text) {
     ReplaySetup setup = parse_test_setup(text);
     setup.dry_run = std::stod(text.config_text) > 1.0;
@@ -291,7 +290,7 @@ TEST_CASE("what a dry run computed is not said to have been taken out", "[week]"
   CHECK(week.probings[0].dry_run);
   const double computed_um = at_probing_um / static_cast<double>(near);
   CHECK(week.probings[0].offset_um == Approx(computed_um).margin(0.3));
-  // In a dry run a probing is the whole displacement.
+  // In a dry run a probing measures the total displacement.
   CHECK(week.probings[0].left_um == Approx(2.5 + computed_um).margin(0.3));
   const std::string html = week_html(week);
   CHECK_THAT(html, Contains("offset sent") && Contains("computed in the dry run, not sent") &&
@@ -304,12 +303,12 @@ TEST_CASE("what a dry run computed is not said to have been taken out", "[week]"
   CHECK_THAT(dry_html, Contains("Nothing was sent.") && !Contains(">offset sent<"));
 }
 
-TEST_CASE("a recorded machine: offsets and probings as replay has them", "[week]") {
+TEST_CASE("offsets and probings of a recorded machine equal those of replay", "[week]") {
   const TempFolder folder;
   const auto config = history_config(folder / "h.db");
   const WriterClocks clocks{[] { return nanoseconds(0); },
                             [] { return std::chrono::hours(500000); }};
-  const double zero_s = 3600.0 * 500007.0;  // the grid begins at 7 h
+  const double zero_s = 3600.0 * 500007.0;  // the grid starts at 07:00
   RecordedMachine machine(config, 11, 65536, clocks);
   machine.start();
   machine.run(12000);  // two minutes
