@@ -1,4 +1,4 @@
-"""A headless Chromium, for the tests of the pages and the benchmarks that draw them."""
+"""Headless Chromium for tests and benchmarks of the pages."""
 
 import contextlib
 import functools
@@ -11,9 +11,9 @@ import pytest
 
 @contextlib.contextmanager
 def headless(folder, *arguments):
-    """@param folder  gets its profile
-    @param arguments  further ones of the command line, without their dashes"""
-    from selenium import webdriver  # not everywhere; who calls says what without it
+    """@param folder  receives its profile
+    @param arguments  further command line options without dashes"""
+    from selenium import webdriver  # optional; callers handle its absence
     options = webdriver.ChromeOptions()
     for argument in ("headless", "no-sandbox", "disable-gpu", "disable-dev-shm-usage",
                      "disable-background-networking", "hide-scrollbars",
@@ -30,9 +30,9 @@ def headless(folder, *arguments):
 
 @functools.cache
 def axe_core(address):
-    """The source of axe-core, which Chromium carries for its own Lighthouse.
+    """Source of axe-core, which Chromium contains for Lighthouse.
     @param address  of its debugger
-    @return a JavaScript literal; "" where this Chromium has none"""
+    @return a JavaScript literal; "" if this Chromium has none"""
     bundle = f"http://{address}/devtools/third_party/lighthouse/lighthouse-dt-bundle.js"
     with urllib.request.urlopen(bundle) as answer:
         found = re.search(r"`/\*! axe v(?:\\.|[^`\\])*`", answer.read().decode(), re.DOTALL)
@@ -40,7 +40,7 @@ def axe_core(address):
 
 
 def accessibility_problems(driver):
-    """What axe-core finds: what keeps somebody out who sees little, or uses no mouse."""
+    """Accessibility problems found by axe-core."""
     literal = axe_core(driver.capabilities["goog:chromeOptions"]["debuggerAddress"])
     if not literal:
         pytest.skip("this Chromium carries no axe-core")

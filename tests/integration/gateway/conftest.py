@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-# Daemon, devices and their folder are those of the daemon's own tests.
+# Shares daemon, devices and folder with the daemon's tests.
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "daemon"))
 
 from gateway_lab import Gateway  # noqa: E402
@@ -23,7 +23,7 @@ def lab(tmp_path):
 
 @pytest.fixture
 def machine(lab):
-    """A daemon that compensates between its devices."""
+    """A compensating daemon with its devices."""
     running = Machine(lab)
     running.start()
     return running

@@ -1,4 +1,4 @@
-"""A gateway beside a daemon, for the tests: its process, its configuration, plain requests."""
+"""A gateway with its daemon for the tests: process, configuration, plain requests."""
 
 import contextlib
 import http.client
@@ -13,7 +13,7 @@ from lab import BIN, PATIENCE_S, eventually, free_port
 
 
 def change(state, changes):
-    """As the page does it: objects change what they name, everything else replaces."""
+    """Applies changes like the page: objects are merged, other values replace."""
     for key, value in changes.items():
         place = int(key) if isinstance(state, list) else key
         old = state.get(key) if isinstance(state, dict) else state[place]
@@ -30,7 +30,7 @@ class Gateway:
         self.folder = lab.folder
         self.config = lab.folder / "gateway.toml"
         self.log = lab.folder / "gateway.log"
-        self.context = None  # of TLS
+        self.context = None  # TLS
         self.process = None
         self.config.write_text(f'format = 1\nmachine = "mill_3"\n[daemon]\n'
                                f'socket = "{daemon.socket}"\n[http]\nport = 0\n{http}\n{more}\n')
@@ -68,7 +68,7 @@ class Gateway:
         return json.loads(self.text(path, **rest))
 
     def raw(self, request, timeout_s=PATIENCE_S):
-        """Bytes as they are; everything that comes back until the gateway closes."""
+        """Sends raw bytes; returns everything received until the gateway closes."""
         with socket.create_connection(("127.0.0.1", self.port), timeout=timeout_s) as link:
             try:
                 link.sendall(request)
@@ -76,7 +76,7 @@ class Gateway:
             except TimeoutError:
                 raise
             except OSError:
-                pass  # it has hung up at what it has read so far
+                pass  # closed by the gateway before the end
             answer = b""
             with contextlib.suppress(ConnectionResetError):
                 while block := link.recv(65536):
@@ -107,7 +107,7 @@ class Gateway:
             yield next_state
 
     def wait_for(self, check, what):
-        """The first state of the stream for which check() holds."""
+        """Waits for the first state of the stream that satisfies check()."""
         with self.events() as next_state:
             return eventually(lambda: next(filter(check, [next_state()]), None), what)
 
@@ -196,13 +196,13 @@ class Subscriber:
         return found
 
     def wait_for(self, check, what):
-        """The last message for which check(topic, retained, payload) holds."""
+        """Waits for a message that satisfies check(topic, retained, payload)."""
         return eventually(lambda: next((m for m in reversed(self.messages()) if check(*m)), None),
                           what)
 
 
 def stretch_history(history, days):
-    """The last segment becomes the days until now, as commits every five seconds: copies of one of its own."""
+    """Fills the last `days` of the history with copies of a commit of its last segment, one every 5 s."""
     length_s, commit_s = days * 86400, 5
     with contextlib.closing(sqlite3.connect(history)) as base:
         base.execute("PRAGMA synchronous=OFF")

@@ -1,5 +1,5 @@
-"""The agent's side of an adapter, from what MTConnect publishes of the protocol, and nothing of ours: it knows
-the device file, and refuses each line that this file or the protocol has no place for."""
+"""Agent side of an adapter, written from MTConnect's published protocol, independent of our code. It reads the
+device file and refuses lines that the file or the protocol does not allow."""
 
 import re
 import socket
@@ -8,15 +8,15 @@ import xml.etree.ElementTree
 
 from lab import PATIENCE_S
 
-# A line is a time stamp and either pairs of key and value, or one condition with level, native code, native
-# severity, qualifier and text; a line that begins with `*` is a command.
+# A line has a time stamp and either key-value pairs or one condition with level, native code, native
+# severity, qualifier and text; a line starting with `*` is a command.
 TIME = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(?:\.\d{1,9})?Z")
 NUMBER = re.compile(r"[+-]?\d+(?:\.\d+)?(?:[eE][+-]?\d+)?")
 COMMAND = re.compile(r"\* PONG [1-9]\d*")
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.-]*")
 LEVELS = {"NORMAL", "WARNING", "FAULT", "UNAVAILABLE"}
 QUALIFIERS = {"", "HIGH", "LOW"}
-# Of the kinds of data items that the device file may name: units, or for events the words (None: any text).
+# Allowed data items of the device file: units; for events the values (None: any text).
 SAMPLES = {"TEMPERATURE": "CELSIUS", "DISPLACEMENT": "MILLIMETER", "ANGLE": "DEGREE"}
 EVENTS = {"AVAILABILITY": {"AVAILABLE", "UNAVAILABLE"}, "VARIABLE": None,
           "FUNCTIONAL_MODE": {"PRODUCTION", "SETUP", "TEARDOWN", "MAINTENANCE", "PROCESS_DEVELOPMENT",
@@ -26,11 +26,11 @@ NAMESPACE = re.compile(r"\{urn:mtconnect\.org:MTConnectDevices:(\d)\.(\d+)\}(\w+
 
 
 class Refused(Exception):
-    """Why."""
+    """The reason."""
 
 
 def items_of(device_file):
-    """{name: attributes} of each data item; Refused where the file is none of a device."""
+    """{name: attributes} of each data item. Raises Refused if the file does not describe a device."""
     root = xml.etree.ElementTree.fromstring(device_file)
     found = {}
     ids = set()
@@ -63,7 +63,7 @@ def items_of(device_file):
 
 
 class Agent:
-    """What an agent keeps of an adapter's lines."""
+    """State of an agent from an adapter's lines."""
 
     def __init__(self, port, device_file=None):
         self.items = items_of(device_file) if device_file else None

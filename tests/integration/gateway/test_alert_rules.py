@@ -1,5 +1,5 @@
-"""The alert rules that are shipped, by Prometheus' own tool: no warning, and each fires and ends when it
-must (alert_rules.yml)."""
+"""The shipped alert rules, checked by promtool: no warnings, and each fires and ends when it must
+(alert_rules.yml)."""
 
 import pathlib
 import re
@@ -41,7 +41,7 @@ def test_each_alert_fires_and_ends():
 def test_every_metric_of_a_rule_is_one_that_the_gateway_answers(machine, gateway):
     gateway.wait_for(lambda s: s["here"], "a state")
     told = set(re.findall(r"^# TYPE (\w+)", gateway.text("/metrics"), re.MULTILINE))
-    # The plain machine's model has no domain.
+    # The model of the plain machine has no domain.
     told.add("thermocomp_model_outside_domain")
     expressions = re.sub(r"#.*|summary:.*|description:.*", "", RULES.read_text())
     assert set(re.findall(r"\bthermocomp_\w+", expressions)) <= told

@@ -1,4 +1,4 @@
-"""What the gateway answers is what the daemon says, by socket and by history."""
+"""Answers of the gateway equal those of the daemon's socket and history."""
 
 import contextlib
 import csv
@@ -14,7 +14,7 @@ from lab import eventually, run_tool
 
 
 def without_times(value):
-    """Numbers that differ from one moment to the next taken out, so that two answers compare."""
+    """Removes numbers that change constantly, so that two answers can be compared."""
     changing = {"age_s", "uptime_s", "mode_since_s", "compensating_s", "cycle", "socket", "last_commit_age_s",
                 "size_MB", "round_trip_ms", "requests", "answers", "writes", "reads", "state_s",
                 "rate_K_per_h", "ended", "outside_share_24h", "last_confirmed_s"}
@@ -41,7 +41,7 @@ def test_a_browser_that_takes_gzip_gets_the_same_bytes_in_fewer(gateway):
         assert headers["Content-Encoding"] == "gzip", path
         _, plain_headers, plain = gateway.ask(path)
         assert "Content-Encoding" not in plain_headers and len(short) < 0.6 * len(plain), path
-        if path != "/metrics":  # its counters go on
+        if path != "/metrics":  # counters increase
             assert gzip.decompress(short) == plain
     assert "Content-Encoding" not in gateway.ask("/api/commands", headers={"Accept-Encoding": "gzip"})[1]
 
@@ -57,7 +57,7 @@ def test_the_stream_follows_the_machine_and_says_what_to_do(machine, gateway):
     assert held["verdict"]["level"] == "bad"
     said = machine.daemon.cli("status")[1]
     for problem in held["problems"][:2]:
-        assert problem["what"] in said  # the very words of `thermocomp status`
+        assert problem["what"] in said  # same text as `thermocomp status`
     assert held["problems"][0]["remedy"] in said
     machine.module.start()
     machine.warm_by(9.0)
@@ -120,7 +120,7 @@ def test_history_is_that_of_the_export(machine, gateway, lab):
     assert all(len(values) == 120 for values in columns.values())
     assert {"time_s", "column_degC", "spindle_degC", "z_offset_um"} <= set(columns)
     offsets = [v for v in columns["z_offset_um"] if v is not None]
-    # Every mean lies within what the export has of its half second.
+    # Every mean is within the range of the export in its half second.
     assert run_tool("export", machine.daemon.history, "-o", lab.folder / "run.csv")[0] == 0
     with (lab.folder / "run.csv").open() as text:
         rows = list(csv.DictReader(line for line in text if not line.startswith("#")))

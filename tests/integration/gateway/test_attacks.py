@@ -1,4 +1,4 @@
-"""The gateway attacked: nothing changes, the daemon notices nothing, the next page is served."""
+"""Attacks on the gateway: nothing changes, the daemon is not affected, the next page is served."""
 
 import base64
 import contextlib
@@ -17,19 +17,19 @@ from lab import eventually, run_tool
 
 @pytest.fixture(autouse=True)
 def nothing_changed(machine):
-    # A first reference is known once its step has been saved.
+    # The first reference is reported after its step has been saved.
     eventually(lambda: machine.daemon.status()["reference"]["by"], "the reference is taken")
     before = machine.daemon.status()
     yield
     after = machine.daemon.status()
     for status in (before, after):
-        del status["reference"]["objections"]  # which the temperatures of a test may change
+        del status["reference"]["objections"]  # depend on the temperatures of the test
     for key in ("enabled", "mode", "reference", "model"):
         assert after[key] == before[key], key
 
 
 def serves(gateway):
-    """It goes on; its own first look at the daemon may still be under way."""
+    """Waits for page and status; the first request to the daemon may still be pending."""
     eventually(lambda: gateway.ask("/")[0] == 200 and gateway.ask("/api/status")[0] == 200,
                "the gateway serves")
     return True
@@ -101,7 +101,7 @@ def test_other_sites_get_nothing(gateway):
             status, _, _ = gateway.ask(path, method=method, headers=headers, body=(
                 b"{}" if method == "POST" else None))
             assert status == 403, (headers, path)
-    # The page's own requests, and somebody who comes by a tunnel with another port.
+    # Requests of the page itself, and through a tunnel with another port.
     assert gateway.ask("/api/status", headers={"Origin": f"http://127.0.0.1:{gateway.port}",
                                                "Sec-Fetch-Site": "same-origin"})[0] == 200
     assert status_of(gateway.raw(get(b"/api/status", host=b"localhost:9999"))) == 200
@@ -132,7 +132,7 @@ def test_three_hundred_connections_do_not_keep_it_from_others(machine, gateway):
                 link.sendall(b"GET / HTTP/1.1\r\nHo" if i % 2 else b"")
                 links.append(link)
         assert len(links) > 100
-        # Those that ask for nothing are ended, and a place becomes free.
+        # Idle connections are closed, which frees places.
         eventually(lambda: asks_in_vain_at_most(gateway), "a place is free again", 60)
     eventually(lambda: serves(gateway), "it serves again")
     assert machine.daemon.status()["mode"] == "compensating"
@@ -252,7 +252,7 @@ def test_what_follows_a_body_that_is_too_large_is_no_request(gateway):
 
 
 def test_a_stranger_gets_one_answer_a_connection(guarded):
-    """Also where the next request in the connection would be somebody's else, by a proxy."""
+    """Behind a proxy the next request in the connection may be another client's."""
     inner = b"GET /api/status HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n"
     for first in (b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n",
                   b"POST /api/command HTTP/1.1\r\nHost: localhost\r\nContent-Length: %d\r\n\r\n" %
@@ -268,7 +268,7 @@ def test_a_stranger_gets_one_answer_a_connection(guarded):
 
 
 def fill_queue(path):
-    """Connections until the listener's queue is full."""
+    """Connects until the listener's queue is full."""
     links = []
     for _ in range(2000):
         link = socket.socket(socket.AF_UNIX)
@@ -288,7 +288,7 @@ def test_it_ends_although_the_daemon_stands_still(machine, gateway):
     try:
         links = fill_queue(machine.daemon.socket)
         eventually(lambda: gateway.ask("/api/status")[0] == 503, "the daemon is away")
-        time.sleep(3.0)  # it tries to connect again
+        time.sleep(3.0)  # it retries to connect
         began = time.monotonic()
         gateway.end()
         assert time.monotonic() - began < 6.0
@@ -301,7 +301,7 @@ def test_it_ends_although_the_daemon_stands_still(machine, gateway):
         machine.daemon.process.send_signal(signal.SIGCONT)
 
     def goes_on():
-        with contextlib.suppress(OSError):  # its queue is emptied first
+        with contextlib.suppress(OSError):  # it first empties its queue
             return machine.daemon.status()["mode"] == "compensating"
 
     eventually(goes_on, "it goes on")
@@ -346,13 +346,13 @@ def test_a_named_user_confirms_what_will_move(guarded, machine):
                0.1, "the gateway knows")
     status, asked = post(guarded, {"method": "disable"}, MARIA)
     assert status == 200 and "z from +12.0 um to 0 um" in asked["text"]
-    assert machine.daemon.status()["enabled"]  # nothing yet
+    assert machine.daemon.status()["enabled"]  # not before confirmation
     guest = as_user("guest", "only looks on")
     eventually(lambda: post(guarded, {"method": "disable"}, guest)[0] == 403, "not for the guest")
     assert post(guarded, {"token": asked["token"]}, guest)[0] == 410
     assert post(guarded, {"token": asked["token"]}, MARIA) == (200, {"done": True})
     machine.daemon.wait_for_mode("disabled")
-    assert post(guarded, {"token": asked["token"]}, MARIA)[0] == 410  # once
+    assert post(guarded, {"token": asked["token"]}, MARIA)[0] == 410  # only once
     assert post(guarded, {"method": "reference"}, MARIA)[0] == 403  # not configured
     status, asked = post(guarded, {"method": "prove", "axis": "z", "value_um": 900}, MARIA)
     assert status == 200

@@ -1,4 +1,4 @@
-"""The machine in three dimensions: the page of `structure --page`, by itself and behind the gateway."""
+"""The page of `structure --page`, standalone and behind the gateway."""
 
 import importlib.util
 import json
@@ -22,7 +22,7 @@ pytestmark = [
     pytest.mark.skipif(not MODELLING.exists(), reason="thermocomp-modelling is not in this build"),
     pytest.mark.skipif(not LIBRARY.exists(), reason="libjs-three is not installed")]
 
-# The blocks are the inputs of the machine's model. 0.6 m of column: 6.6 um for a kelvin.
+# The blocks are the inputs of the machine's model. The 0.6 m column expands by 6.6 um/K.
 STRUCTURE = """format = 1
 [[material]]
 name = "cast_iron"
@@ -94,7 +94,7 @@ def text(browser, place):
 
 
 def colours_drawn(browser):
-    """How many different colours the picture has."""
+    """Number of different colours in the picture."""
     return browser.execute_script("""
         render();
         const gl = renderer.getContext(), pixels = new Uint8Array(4 * gl.drawingBufferWidth * gl.drawingBufferHeight);
@@ -118,7 +118,7 @@ def test_the_page_needs_nothing_else(page, browser):
         "return [...document.querySelectorAll('[src],link')].map(e => e.src || e.href).join()")
     choose(browser, "group", "column_degC 1 K warm")
     choose(browser, "quantity", "z")
-    # 600 mm of column expand by 6.6 um, and carry the spindle.
+    # The 600 mm column expands by 6.6 um and carries the spindle.
     assert 6.0 < float(text(browser, "high").split()[0]) < 7.2, text(browser, "high")
     assert colours_drawn(browser) > 20
     assert "tool, z_um at 100, 100, 800 mm" in text(browser, "points")
@@ -152,7 +152,7 @@ def test_behind_the_gateway_it_shows_the_machine_as_it_is_now(page, lab, machine
     assert console(browser) == []
     machine.module.stop()
     eventually(lambda: "without" in text(browser, "when"), "the inputs are lost")
-    assert text(browser, "outputs") == ""  # a part of the sum says nothing of the tool
+    assert text(browser, "outputs") == ""  # undefined with a partial sum
     machine.daemon.end()
     eventually(lambda: "old" in text(browser, "when") or "does not answer" in text(browser, "when"),
                "it says that the machine does not answer")

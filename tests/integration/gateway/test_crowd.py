@@ -1,5 +1,5 @@
-"""A thousand connections at once, of every kind that does not get on: the daemon and its machine notice
-nothing, the gateway stays small, and others are served again."""
+"""A thousand simultaneous slow or hostile connections: the daemon and its machine are not affected, the
+gateway's memory stays small, and other clients are served again."""
 
 import contextlib
 import os
@@ -14,11 +14,11 @@ from gateway_lab import Gateway
 from lab import eventually
 
 COUNT = 1000
-# Of the gateway's unit; what a sanitizer keeps comes on top.
+# Limit of the gateway's unit; sanitizers need more.
 MEMORY_MAX_KB = 1024 * int(os.environ.get("THERMOCOMP_GATEWAY_MEMORY_MB", "128"))
 REQUEST = b"GET /api/history?from=-28800&points=5000 HTTP/1.1\r\nHost: localhost\r\n\r\n"
 STREAM = b"GET /api/events HTTP/1.1\r\nHost: localhost\r\n\r\n"
-# What each says at once, and what it says then, a byte now and then.
+# Bytes sent at once, and bytes sent later, one every 0.5 s.
 KINDS = {
     "silent": (b"", b""),
     "half": (b"GET / HTTP/1.1\r\nHo", b""),
@@ -47,7 +47,7 @@ def enough_files():
 
 
 class Crowd:
-    """The connections, held by one thread that says a byte for each now and then."""
+    """The connections; one thread sends a byte on each every 0.5 s."""
 
     def __init__(self, port):
         self.port = port
@@ -86,10 +86,10 @@ class Crowd:
         except BlockingIOError:
             pass
         except OSError:
-            entry[1] = entry[2] = b""  # it was ended
+            entry[1] = entry[2] = b""  # closed by the gateway
 
     def said_to(self, kind):
-        """What one of a kind was answered, as far as it is there."""
+        """Answers to the connections of a kind, as far as received."""
         answers = b""
         for i, (link, _, _) in enumerate(self.links):
             if list(KINDS)[i % len(KINDS)] == kind:
@@ -117,7 +117,7 @@ def is_served(gateway):
 
 
 def changes(daemon):
-    """What was done to it. (Module and controller live in this process, and may be late in a crowd.)"""
+    """Events of mode, commands and daemon. (Module and controller run in this process and may be late.)"""
     return [event for event in daemon.call("events")["events"]
             if event["kind"] in ("mode", "command", "daemon")]
 
@@ -131,13 +131,13 @@ def test_a_thousand_at_once_change_nothing(lab, machine, places):
     changes_before = changes(machine.daemon)
     pid = gateway.process.pid
     with contextlib.closing(Crowd(gateway.port)) as crowd:
-        # The machine warms meanwhile, and the offset follows.
+        # Meanwhile the machine warms and the offset follows.
         for offset_um in (9.0, 3.0, 12.0):
             machine.warm_by(offset_um)
             machine.daemon.wait_for_offset(offset_um)
             assert machine.daemon.status()["mode"] == "compensating"
             assert resident_kB(gateway) < MEMORY_MAX_KB
-        # Those that do not get on are ended while they go on trying: somebody else gets a place.
+        # Slow connections are closed although they continue, so another client gets a place.
         eventually(lambda: is_served(gateway), "others are served", 120)
         print(f"{places} places: the gateway has {resident_kB(gateway) / 1000:.1f} MB")
         assert resident_kB(gateway) < MEMORY_MAX_KB
@@ -148,7 +148,7 @@ def test_a_thousand_at_once_change_nothing(lab, machine, places):
     assert gateway.process.poll() is None and gateway.process.pid == pid
     after = machine.daemon.status()
     for status in (before, after):
-        del status["reference"]["objections"]  # the temperatures change them
+        del status["reference"]["objections"]  # depend on the temperatures
     for key in ("enabled", "mode", "reference", "model"):
         assert after[key] == before[key], key
     assert changes(machine.daemon) == changes_before

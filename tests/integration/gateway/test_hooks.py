@@ -1,4 +1,4 @@
-"""The command of a site is run for alarms: once each, with the words, never a flood."""
+"""The site's command runs once per alarm, with its text, and never in a flood."""
 
 from gateway_lab import Gateway
 from lab import eventually
@@ -28,7 +28,7 @@ def test_each_alarm_is_told_once_raised_and_once_cleared(lab, machine):
         return sorted(line.split("|")[1] for line in out.read_text().splitlines()
                       if line.startswith(state))
 
-    expected = ["bus/cabinet", "compensation"]  # which explains the sensors
+    expected = ["bus/cabinet", "compensation"]  # covers its sensors
     eventually(lambda: told("raised") == expected, "all are raised")
     line = next(line for line in out.read_text().splitlines() if "|bus/cabinet|" in line)
     assert line.split("|")[2] == "mill_3" and line.split("|")[3].startswith("bus cabinet is not connected")

@@ -1,4 +1,4 @@
-"""MQTT by a real mosquitto: everything arrives, and an end of whatever kind is seen."""
+"""MQTT with a real mosquitto: all messages arrive, and any end of the gateway is published."""
 
 import contextlib
 import socket
@@ -42,7 +42,7 @@ def test_values_arrive_retained_and_the_last_will_ends_them(lab, machine, broker
     assert (status["state"], status["daemon"], status["mode"]) == ("online", "here",
                                                                   "compensating")
     assert listener.wait_for(lambda t, _, p: t == topic("alarm"), "alarms")[2]["active"] == []
-    # Who comes later has all of it at once.
+    # A later subscriber receives everything at once.
     late = lab.also_end(Subscriber(broker))
     for rest in ("status", "alarm", "axis/z", "sensor/column", "sensor/spindle"):
         late.wait_for(lambda t, retained, _, r=rest: t == topic(r) and retained, rest)
@@ -117,7 +117,7 @@ def test_user_password_and_certificate_are_asked_for(lab, machine):
 
 
 def test_a_broker_that_takes_no_connection_keeps_it_from_nothing(lab, machine):
-    """Its queue of connections is full: nothing answers, as where a firewall drops."""
+    """With a full queue of connections it does not answer, like a firewall that drops packets."""
     with socket.socket() as listener, contextlib.ExitStack() as stack:
         listener.bind(("127.0.0.1", 0))
         listener.listen(0)
@@ -130,7 +130,7 @@ def test_a_broker_that_takes_no_connection_keeps_it_from_nothing(lab, machine):
                           f'port = {listener.getsockname()[1]}').start()
         eventually(lambda: "no answer in time" in gateway.log.read_text(), "it is said")
         gateway.wait_for(lambda s: any("MQTT" in p["what"] for p in s["problems"]), "shown")
-        time.sleep(2.0)  # it tries again
+        time.sleep(2.0)  # it retries
         began = time.monotonic()
         gateway.end()
         assert time.monotonic() - began < 3.0

@@ -1,4 +1,4 @@
-"""The page in a real browser: no error in its console, and it follows the machine."""
+"""The page in a real browser: it follows the machine without errors in the console."""
 
 import importlib.util
 import os
@@ -46,13 +46,13 @@ def console(browser, but=()):
 
 
 def picture(browser, name):
-    """For people: where GATEWAY_PICTURES names a folder."""
+    """Saves a screenshot if GATEWAY_PICTURES names a folder."""
     if folder := os.environ.get("GATEWAY_PICTURES"):
         browser.save_screenshot(os.path.join(folder, name + ".png"))
 
 
 def within_s(check, what):
-    """How long it took; that is the claim of the document, not of this test."""
+    """Elapsed time, for the documents; not a criterion of this test."""
     begun = time.monotonic()
     eventually(check, what)
     return time.monotonic() - begun
@@ -84,7 +84,7 @@ def test_it_loads_without_an_error_and_fits_the_screen(machine, gateway, browser
     print(f"the page shows the daemon's offset after {took_s:.2f} s")
     eventually(lambda: browser.execute_script(
         "return document.querySelectorAll('.axis canvas').length") > 0, "a chart")
-    # A history of seconds is not one point of an eight-hour chart.
+    # A history of seconds must be more than one point of an eight-hour chart.
     eventually(lambda: browser.execute_script(
         "return table.filter(row => isNumber(row[columns.indexOf('z_offset_um')])).length") > 5, "a curve")
     assert no_wider_than_the_screen(browser)
@@ -177,7 +177,7 @@ def test_a_candidate_shows_its_score(machine, gateway, browser, lab):
     new = lab.folder / "new.toml"
     new.write_text(machine.model.read_text().replace("[[3.0, -1.5]]", "[[2.0, -1.5]]"))
     assert machine.daemon.cli("candidate", new)[0] == 0
-    machine.warm_by(12.0)  # 4 K colder: -12 um by the model, -8 by the candidate
+    machine.warm_by(12.0)  # 4 K colder: model -12 um, candidate -8 um
     machine.daemon.wait_for_offset(12.0, 0.05)
     machine.daemon.call("measured", axis="z", value_um=4.0, confirm=True)
     show(browser, gateway, WALL)
@@ -192,7 +192,7 @@ def test_one_cursor_and_one_zoom_for_all_charts(machine, gateway, browser):
     machine.daemon.wait_for_offset(9.0)
     browser.execute_script("chooseRange(ranges[0])")
     drawn(browser)
-    # Less than 4 s are not zoomed into.
+    # Zoom stops at 4 s.
     eventually(lambda: browser.execute_script(
         "const [from, to] = wholeWindow(); return table.length > 10 && to - from > 9000"), "some rows")
     chart = browser.find_element("css selector", ".axis .chart")
@@ -253,7 +253,7 @@ def test_commands_are_offered_while_they_can_be_given(lab, machine):
                ".map(each => [each.textContent, each.disabled])")
     with headless(lab.folder, "ignore-certificate-errors") as browser:
         resize(browser, PHONE)
-        browser.get(f"https://maria:long-and-secret@localhost:{gateway.port}/")  # as a bookmark has it
+        browser.get(f"https://maria:long-and-secret@localhost:{gateway.port}/")  # as in a bookmark
         eventually(lambda: text(browser, "history-note"), "an answer about the history")
         assert "recorded since" in text(browser, "history-note")
         machine.warm_by(12.0)
@@ -323,7 +323,7 @@ def test_on_the_wall_a_cause_is_whole_and_the_charts_fill_the_rest(machine, gate
 def test_the_weeks_report_is_one_click_away(lab, machine, browser):
     report = lab.folder / "week.html"
     gateway = lab.also_end(Gateway(lab, machine.daemon, http=f'report = "{report}"')).start()
-    assert gateway.ask("/report")[0] == 404  # the timer has not made it yet
+    assert gateway.ask("/report")[0] == 404  # the weekly timer has not run yet
     machine.warm_by(6.0)
     machine.daemon.wait_for_offset(6.0)
     eventually(lambda: run_tool("report", machine.daemon.history, "--machine", "mill 3", "-o", report)[0] == 0, "rows are committed")
@@ -358,7 +358,7 @@ def test_everything_can_be_read_and_touched(machine, gateway, browser, scheme):
     browser.execute_script("document.body.append(document.createElement('button'), Object.assign("
                            "document.createElement('p'), {textContent: 'faint', style: 'color: #999; background: #aaa'}))")
     assert {each.split(":")[0] for each in accessibility_problems(browser)} == {
-        "color-contrast", "button-name", "region"}  # outside of main
+        "color-contrast", "button-name", "region"}  # outside main
 
 
 def test_a_broker_that_is_gone_is_told_and_found_again(lab, machine, browser):

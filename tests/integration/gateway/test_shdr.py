@@ -1,5 +1,5 @@
-"""The adapter port, read by the protocol that MTConnect publishes for adapters, not by ours (no MTConnect
-agent is to be had as a package of Debian)."""
+"""The adapter port, checked against MTConnect's published protocol by shdr_agent.py (Debian has no package of
+an MTConnect agent)."""
 
 import contextlib
 import socket
@@ -83,7 +83,7 @@ def test_the_device_file_names_every_item(machine, gateway, agent):
 
 
 def test_who_knows_the_device_file_alone_refuses_no_line(machine, gateway, lab):
-    """Through all that a machine does: warming, a bus away, switched off and on, the daemon killed."""
+    """Warming, a bus disconnected, switching off and on, and a killed daemon."""
     told = device_file(gateway)
     agent = lab.also_end(Agent(gateway.ready["shdr"], told))
     agent.wait_for(lambda: agent.values.get("mode") == "compensating", "it compensates")
