@@ -59,7 +59,7 @@ TEST_CASE("the covariance is that of the record, whatever its level and its gaps
   CHECK(two.matrix_K2[1][1] == Approx(fit.matrix_K2[1][1]).epsilon(0.01));
 }
 
-TEST_CASE("only the selected rows count, and too few are refused", "[cli][covariance]") {
+TEST_CASE("only selected rows are used, and too few are refused", "[cli][covariance]") {
   RunFile run = run_of(2000);
   run.selected_begin = 500;
   run.selected_end = 1000;
@@ -70,7 +70,7 @@ TEST_CASE("only the selected rows count, and too few are refused", "[cli][covari
                     Catch::Matchers::Contains("d_degC"));
 }
 
-TEST_CASE("an input that never changed is not treated as certain", "[cli][covariance]") {
+TEST_CASE("an input that never changed has a variance above zero", "[cli][covariance]") {
   RunFile run = run_of(2000);
   std::fill(run.values[3].begin(), run.values[3].end(), 21.0);
   const CovarianceFit fit = fit_covariance({&run, 1}, inputs);

@@ -71,8 +71,7 @@ TEST_CASE("a device is written, not replaced", "[cli][output]") {
   CHECK(fs::is_character_file("/dev/null"));
 }
 
-TEST_CASE("a pipe without a reader is refused at once, one with a reader is written",
-          "[cli][output]") {
+TEST_CASE("a pipe with a reader is written, one without is refused at once", "[cli][output]") {
   const Folder folder;
   const std::string pipe = (folder / "pipe").string();
   REQUIRE(::mkfifo(pipe.c_str(), 0600) == 0);

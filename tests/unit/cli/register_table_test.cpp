@@ -120,7 +120,7 @@ TEST_CASE("a set in frames is shown frame by frame, with its number in each", "[
   CHECK_THAT(text, !Contains("Missing"));
 }
 
-TEST_CASE("a piezo's registers are in volts; without a controller there are none",
+TEST_CASE("a piezo's registers are in volts; without a controller the table is empty",
           "[cli][registers]") {
   CHECK_THAT(register_table(example("piezo.toml")), Contains("voltage of axis"));
   CHECK_THAT(register_table(example("modbus_rtu.toml")), Contains("there is no controller"));

@@ -57,7 +57,7 @@ std::uint32_t only(Reason reason) {
   return static_cast<std::uint32_t>(reason);
 }
 
-TEST_CASE("the status shows at a glance whether and how much is compensated", "[cli][status]") {
+TEST_CASE("the status shows whether and how much is compensated", "[cli][status]") {
   const std::string text = status_text(good_status(), false);
   CHECK_THAT(text, Contains("Compensating    : yes, for 1 h 2 min"));
   CHECK_THAT(text, Contains("Axis z          : offset    +3.10 um, target    +3.20 um, applied"));
@@ -91,7 +91,7 @@ TEST_CASE("the status shows time, origin and temperatures of the reference", "[c
   CHECK_THAT(status_text(status, false), Contains("Reference       : ") && Contains("none yet"));
 }
 
-TEST_CASE("a model that was never compared is named as such", "[cli][status]") {
+TEST_CASE("a model that was never compared is reported as such", "[cli][status]") {
   Status status = good_status();
   CHECK_THAT(status_text(status, false), !Contains("COMPARED"));
   status.model.compared = false;
@@ -319,7 +319,7 @@ TEST_CASE("a refused write is shown with function, address and exception", "[cli
   CHECK_THAT(status_text(status, false), Contains("writes unanswered; last confirmed 12 s ago"));
 }
 
-TEST_CASE("a status without any value is shown", "[cli][status]") {
+TEST_CASE("a status without values is shown", "[cli][status]") {
   CHECK_FALSE(is_compensating({}));
   CHECK_FALSE(status_text({}, true).empty());
   CHECK_FALSE(sensors_text({}, true).empty());
@@ -347,7 +347,7 @@ TEST_CASE("the heading of a watch is repeated when the truth appears", "[cli][wa
   CHECK(log.next(good_status(), &truth) == watch_line(good_status(), &truth));
 }
 
-TEST_CASE("in its first seconds a watch line says 'starting' and no more", "[cli][watch]") {
+TEST_CASE("in its first seconds a watch line shows only 'starting'", "[cli][watch]") {
   Status status = good_status();
   status.mode = Mode::starting;
   status.reasons = static_cast<std::uint32_t>(Reason::block_lost) |
@@ -359,7 +359,7 @@ TEST_CASE("in its first seconds a watch line says 'starting' and no more", "[cli
   CHECK(watch_line(status, nullptr).size() > begun.size() + 10);
 }
 
-TEST_CASE("durations are for people", "[cli]") {
+TEST_CASE("durations are readable", "[cli]") {
   CHECK(duration_text(7.9) == "7 s");
   CHECK(duration_text(725.0) == "12 min 5 s");
   CHECK(duration_text(3.0 * 3600 + 1200) == "3 h 20 min");

@@ -90,7 +90,7 @@ TEST_CASE("halsampler without numbers: an overrun before the first row loses not
   CHECK(says(run, "not numbered"));
 }
 
-TEST_CASE("halsampler says neither names nor period: the line to write is reported", "[import]") {
+TEST_CASE("halsampler without names and period: the error shows the lines to add", "[import]") {
   CHECK_THROWS_WITH(imported("halsampler_numbered.txt"),
                     Contains("--names t1_degC,t2_degC,t3_degC --period-s S"));
   CHECK_THROWS_WITH(imported("halsampler_numbered.txt", {{"a", "b", "c"}, {}}),
@@ -99,7 +99,7 @@ TEST_CASE("halsampler says neither names nor period: the line to write is report
                     Contains("must be one for each of the 4 numbers"));
 }
 
-TEST_CASE("lost samples are a gap where they are numbered, else an error", "[import]") {
+TEST_CASE("lost samples are a gap if samples are numbered, else an error", "[import]") {
   const LogOptions one{{"z_mm"}, 0.5};
   const RunFile run = import_text("7 1.5 \n8 1.6 \noverrun\n20 1.9 \n", one);
   CHECK(run.time_s() == std::vector<double>{0.0, 0.5, 6.5});
@@ -134,8 +134,8 @@ TEST_CASE("TOA5: names and units from their lines, record numbers left out", "[i
   CHECK(says(run, "'RECORD' left out"));
 }
 
-TEST_CASE("TOA5: elements of an array keep their units, what has no value is missing", "[import]") {
-  // As multiplexers of thermocouples are written; the fractions of a second of fast tables.
+TEST_CASE("TOA5: elements of an array keep their units, absent values are missing", "[import]") {
+  // As in tables of thermocouple multiplexers; fractions of a second as in fast tables.
   const auto written = [](const std::string& unit_of_flags) {
     return "\"TOA5\",\"mill_3\",\"CR3000\",\"1\",\"CR3000.Std.22\",\"CPU:a.CR3\",\"24006\","
            "\"fast\"\r\n"
@@ -164,7 +164,7 @@ TEST_CASE("KW Watcher: seven lines above the rows", "[import]") {
   CHECK(run.column("spindle_rpm")[1] == 3000.0);
 }
 
-TEST_CASE("a log whose columns have no unit asks for the map's lines, and takes them", "[import]") {
+TEST_CASE("a log without units needs the column map and is read with it", "[import]") {
   CHECK_THROWS_WITH(imported("rtu_log.csv"), Contains("write \"plc.plc1.bed\" = "));
   const RunFile run = imported_with("rtu_log.csv",
                                     "[columns]\n\"plc.plc1.bed\" = \"bed_degC\"\n"
@@ -174,24 +174,24 @@ TEST_CASE("a log whose columns have no unit asks for the map's lines, and takes 
   CHECK(run.column("head_degC").back() == 22.6);
 }
 
-TEST_CASE("two files with dates are joined by them", "[import]") {
+TEST_CASE("two files with dates are joined by their dates", "[import]") {
   const RunFile run = joined_runs(imported("kw_watcher.csv"), imported("probings.csv"), {});
   CHECK(run.columns == Columns{"time_s", "bed_degC", "head_degC", "spindle_rpm", "z_um"});
   CHECK(run.time_s() == std::vector<double>{0, 20, 30, 45, 60, 1800});
-  // Between two rows: temperatures on the line, the speed as it was before.
+  // Between two rows temperatures are interpolated and the speed is held.
   CHECK(run.column("head_degC")[1] == Approx(21.9 + 20.0 / 30.0 * 0.2));
   CHECK(run.column("spindle_rpm")[1] == 0.0);
   CHECK(run.column("spindle_rpm")[3] == 3000.0);
   CHECK(run.column("z_um")[1] == 0.8);
   CHECK(std::isnan(run.column("z_um")[2]));
-  // After the last row of the first nothing is known of it.
+  // Unknown after the last row of the first file.
   CHECK(std::isnan(run.column("head_degC")[5]));
   CHECK(says(run, "2 of its 3 rows lie within"));
   // What is written reads back.
   CHECK(parse_run(write_run(run), "again").columns == run.columns);
 }
 
-TEST_CASE("files without a common clock ask for the shift", "[import]") {
+TEST_CASE("files without a common clock need the shift", "[import]") {
   const RunFile store = imported("temperature_store.json");
   const RunFile probings = imported("probings.csv");
   CHECK_THROWS_WITH(joined_runs(store, probings, {}), Contains("write --shift-s S"));
@@ -204,7 +204,7 @@ TEST_CASE("files without a common clock ask for the shift", "[import]") {
 
 namespace {
 
-/// A spindle warms up and cools, from `start_s` of the machine's time on, each `step_s`.
+/// A spindle warms up and cools, seen from machine time `start_s` on, once per `step_s`.
 RunFile seen_from(double start_s, double step_s, const std::string& column, double factor,
                   bool with_event, unsigned seed) {
   RunFile run;
@@ -227,7 +227,7 @@ RunFile seen_from(double start_s, double step_s, const std::string& column, doub
 
 }  // namespace
 
-TEST_CASE("clocks without dates are joined by the event that both saw, or not at all", "[import]") {
+TEST_CASE("files without dates are joined by a common event, or not at all", "[import]") {
   for (unsigned seed = 1; seed <= 20; ++seed) {
     const RunFile first = seen_from(0.0, 10.0, "bed_degC", 1.0, true, seed);
     const RunFile second = seen_from(1500.0, 7.0, "z_um", -3.0, true, 100 + seed);
@@ -237,14 +237,14 @@ TEST_CASE("clocks without dates are joined by the event that both saw, or not at
     CHECK(shift->is_sure());
     CHECK(shift->shift_s == Approx(1500.0).margin(15.0));
     CHECK(says(joined_runs(first, second, {}), "'bed_degC' and 'z_um' change alike"));
-    // Noise alone, and an event that only one saw, say nothing.
+    // Noise alone, or an event in only one file, gives no result.
     const RunFile calm = seen_from(1500.0, 7.0, "z_um", 1.0, false, 200 + seed);
     CHECK(!clock_shift(first, calm)->is_sure());
     CHECK_THROWS_WITH(joined_runs(first, calm, {}), Contains("which is not sure"));
   }
 }
 
-TEST_CASE("an export's comment says its clock", "[import]") {
+TEST_CASE("the comment of an export gives its clock", "[import]") {
   const RunFile log = import_text(
       "# 0.000 s: wall time 2026-03-02T07:00:00.000Z\ntime_s,t1_degC\n0,20\n60,21\n", {});
   REQUIRE(log.wall_zero);
@@ -252,7 +252,7 @@ TEST_CASE("an export's comment says its clock", "[import]") {
   CHECK_THROWS_WITH(joined_runs(log, imported("probings.csv"), {}), Contains("time zone"));
 }
 
-TEST_CASE("a folder a form: what a program writes becomes the run that is expected", "[import]") {
+TEST_CASE("each form's example gives the expected run", "[import]") {
   namespace fs = std::filesystem;
   std::size_t folders = 0;
   for (const auto& folder : fs::directory_iterator(THERMOCOMP_FORMS)) {
@@ -279,7 +279,7 @@ TEST_CASE("a folder a form: what a program writes becomes the run that is expect
   CHECK(folders >= 25);
 }
 
-TEST_CASE("a workbook is read by xlsx2csv, or the error says how", "[import]") {
+TEST_CASE("a workbook is read by xlsx2csv, or the error gives the remedy", "[import]") {
   const std::string file =
       (std::filesystem::temp_directory_path() / ("book" + std::to_string(getpid()) + ".xlsx"))
           .string();
@@ -292,17 +292,17 @@ TEST_CASE("a workbook is read by xlsx2csv, or the error says how", "[import]") {
   std::filesystem::remove(file);
 }
 
-TEST_CASE("options that a log has no use for are refused", "[import]") {
+TEST_CASE("options that a log does not need are refused", "[import]") {
   CHECK_THROWS_WITH(imported("kw_watcher.csv", {{"a"}, {}}), Contains("names"));
   CHECK_THROWS_WITH(imported("kw_watcher.csv", {{}, 2.0}), Contains("period_s"));
 }
 
-TEST_CASE("corrections that operators entered are displacements of the other sign", "[import]") {
+TEST_CASE("operators' corrections are displacements of opposite sign", "[import]") {
   const std::string log =
       "date;time;tool;axis;correction [mm]\n20.11.2026;10:12:03;T5;Z;-0,012\n"
       "20.11.2026;11:02:44;T5;Z;-0,006\n20.11.2026;11:02:50;T5;X;0,004\n"
       "20.11.2026;13:40:11;T5;Z;0,005\n";
-  // By hand: Z -12, -18, -13 um entered in all; X +4.
+  // Calculated by hand: Z -12, -18, -13 um in total; X +4 um.
   const RunFile steps = displacements_of(import_text(log), CorrectionEntry::step);
   CHECK(steps.columns == std::vector<std::string>{"time_s", "z_um", "x_um"});
   const std::vector<double>& z = steps.column("z_um");
