@@ -73,7 +73,7 @@ int run_modelling(const std::string& command, const std::vector<std::string>& ar
 }
 
 /// structure, place, tiebar, plan, inspect, group, fit, diagnose, thermal-test: passes all
-/// arguments to `thermocomp-modelling` beside this program, in its libexec folder or in PATH.
+/// arguments to `thermocomp-modelling` next to this program, in its libexec folder or in PATH.
 void add_modelling_commands(CLI::App& app, Action& action) {
   for (const ModellingCommand& command : commands) {
     CLI::App* sub = app.add_subcommand(command.name, command.help);

@@ -111,7 +111,7 @@ function nearestNode(at) {
   return nearest;
 }
 
-// A point moves with the surface beside it.
+// A point moves with the nearest surface.
 function addPoints() {
   const list = place('points');
   let number = 0;

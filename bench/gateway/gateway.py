@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Cost of thermocomp-gateway beside a running daemon.
+"""Cost of thermocomp-gateway next to a running daemon.
 
 Memory, processor, bytes of the page, first paint, time for a month of history. Processes and
 devices are those of the integration tests.

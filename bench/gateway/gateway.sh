@@ -1,5 +1,5 @@
 #!/bin/sh
-# Cost of the gateway beside a running daemon, with five pages open: memory, processor, bytes of the page,
+# Cost of the gateway next to a running daemon, with five pages open: memory, processor, bytes of the page,
 # its first paint if chromium is installed, and the time for a month of history at 900 points.
 set -eu
 export THERMOCOMP_BIN="$THERMOCOMP_BENCH_BUILD/bin"

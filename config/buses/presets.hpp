@@ -13,8 +13,8 @@
 
 namespace thermocomp::sections {
 
-/// Search path for presets: the folder `devices` beside the configuration, /etc/thermocomp/devices,
-/// and share/thermocomp/devices beside the program's folder.
+/// Search path for presets: the folder `devices` next to the configuration,
+/// /etc/thermocomp/devices, and share/thermocomp/devices next to the program's folder.
 [[nodiscard]] std::vector<std::filesystem::path> preset_folders(
     const std::filesystem::path& configuration_folder);
 

@@ -36,7 +36,7 @@ struct NamedFile {
   std::string key;  ///< key in `table` that names the file; empty: the configuration itself
   std::filesystem::path path;
   FileUse use{FileUse::read};
-  /// Endings of further files created beside it.
+  /// Suffixes of further files created next to it.
   std::vector<std::string> endings{};
 };
 

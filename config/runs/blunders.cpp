@@ -27,7 +27,7 @@ constexpr std::size_t times_named_max = 6;
 
 using Values = std::vector<double>;
 
-/// Robust line (median of pairwise slopes) through the values beside an end, evaluated at the end.
+/// Robust line (median of pairwise slopes) through the values next to an end, evaluated at the end.
 double line_at_end(const Values& values, bool front) {
   const std::size_t count = 2 * side;
   const auto at = [&](std::size_t i) { return front ? values[i] : values[values.size() - 1 - i]; };
@@ -70,7 +70,7 @@ Blunders blunders_of(const RunFile& run, const std::string& column) {
     values.push_back(all[row]);
     times_s.push_back(run.time_s()[row]);
   }
-  // Repeated without the outliers found: one beside an end bends the line there.
+  // Repeated without the outliers found: one next to an end bends the line there.
   while (values.size() >= rows_min) {
     const Values leaps = leaps_of(values);
     const double usual_um = usual_deviations * robust_deviation(leaps);

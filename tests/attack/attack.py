@@ -165,7 +165,7 @@ def run_all(given):
 
 
 def repeat_broken(table, given):
-    """An attack that failed beside others must fail again on an idle machine."""
+    """An attack that failed in parallel with others must fail again on an idle machine."""
     for (name, link), row in table.rows.items():
         if not row["broken"]:
             continue

@@ -140,7 +140,7 @@ def reads_back_no_numbers(rig):
 
 @attack(links=("tcp", "rtu"))
 def two_daemons_on_one_controller(rig):
-    """Two correct daemons want different offsets: neither may leap; one must report it."""
+    """Two correct daemons send different offsets: neither may jump; one must report it."""
     if not rig.start(BEFORE_UM):
         return
     second = rig.another_daemon("two", unit=2)

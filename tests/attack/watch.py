@@ -1,4 +1,4 @@
-"""Observers beside the attacked daemon, with clocks of their own."""
+"""Independent observers of the attacked daemon, with their own clocks."""
 
 import bisect
 import contextlib

@@ -56,7 +56,7 @@ class Invariants {
   /// @param leap_um  allowed difference between the first offset and the last one before
   void booted(nanoseconds now, double leap_um);
   /// When power failed, the disk did not yet hold that the controller had lost this axis's offset
-  /// or that an operator had set it to zero: no start can know.
+  /// or that an operator had set it to zero: no restart can detect this.
   void lost(std::size_t axis) { is_lost_[axis] = true; }
   void reloaded(const MachineShape& shape);
   /// A probing of this axis reaches the estimator in the next cycle.

@@ -1,5 +1,5 @@
 /// A Modbus line in virtual time between the real connection and simulated units; applies the
-/// scheduled faults to frames. Its clock advances only while somebody waits.
+/// scheduled faults to frames. Its clock advances only during waits.
 #pragma once
 
 #include <cstdint>

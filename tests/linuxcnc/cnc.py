@@ -1,4 +1,4 @@
-"""A headless LinuxCNC with a simulated mill and the bridge, beside the daemon."""
+"""A headless LinuxCNC with a simulated mill and the bridge, next to the daemon."""
 
 import contextlib
 import json

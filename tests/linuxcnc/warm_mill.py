@@ -140,7 +140,7 @@ class WarmMill:
                            ("@RATE@", float(rate_um_per_s)), ("@SILENT@", float(silent_after_s))):
             config = config.replace(key, str(value))
         self.daemon = self.lab.daemon(config)
-        # LinuxCNC runs as nobody: only its group lets it report.
+        # LinuxCNC runs as user nobody: only its group lets it report.
         with self.daemon.config.open("a") as config:
             config.write('bridge_group = "nogroup"\n')
         self.cnc = LinuxCnc(self.folder / "cnc", way, "/mnt/run/status.sock")

@@ -43,7 +43,7 @@ def foreign():
 
 @pytest.fixture
 def folder(tmp_path):
-    """A short path, since it contains the socket; with the presets beside the configuration."""
+    """A short path, since it contains the socket; with the presets next to the configuration."""
     (tmp_path / "devices").symlink_to(SOURCE / "config" / "devices")
     return tmp_path
 

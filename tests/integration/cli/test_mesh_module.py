@@ -25,7 +25,7 @@ CUBE = pathlib.Path(__file__).parent / "cube"  # grows by 1.1 um/K
 
 @pytest.fixture
 def alone(tmp_path):
-    """The program without modules beside it."""
+    """The program without modules next to it."""
     (tmp_path / "bin").mkdir()
     return pathlib.Path(shutil.copy(BIN / "thermocomp-modelling", tmp_path / "bin"))
 

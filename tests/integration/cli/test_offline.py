@@ -210,7 +210,7 @@ def test_what_is_no_history_is_refused(tmp_path, command):
 
 @pytest.fixture
 def alone(tmp_path):
-    """The program without thermocomp-modelling beside it."""
+    """The program without thermocomp-modelling next to it."""
     (tmp_path / "bin").mkdir()
     return shutil.copy(PROGRAM, tmp_path / "bin")
 

@@ -1,4 +1,4 @@
-"""A daemon beside its machine, for the tests: processes, generated files, the status socket."""
+"""A daemon with its machine for the tests: processes, generated files, the status socket."""
 
 import contextlib
 import csv

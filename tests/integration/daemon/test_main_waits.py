@@ -223,7 +223,7 @@ def test_a_log_pipe_that_nobody_reads(lab, manager):
     obeys(watched)
     watched.ask_for(1.0)
     watched.judge()
-    # Once somebody reads, the rest arrives with the number of lost messages.
+    # Once the journal is read, the rest arrives with the number of lost messages.
     os.set_blocking(reading, False)
     text = b""
 

@@ -9,7 +9,7 @@ from plain_devices import Machine, PlainController
 
 
 class StubbornController(PlainController):
-    """Answers writes as told, without carrying them out."""
+    """Answers writes as configured, without executing them."""
 
     def start(self):
         self.writes_become = None  # "exception 1", "silence"

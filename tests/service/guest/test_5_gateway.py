@@ -1,4 +1,4 @@
-"""The gateway's package and unit beside the daemon's: start, answers, sandbox, purge."""
+"""The gateway's package and unit next to the daemon's: start, answers, sandbox, purge."""
 
 import contextlib
 import http.client

@@ -22,7 +22,7 @@ void check_all(const std::string& file, const std::vector<Broken>& table) {
   }
 }
 
-/// The problems after one edit of the CANopen example or a file beside it.
+/// The problems after one edit of the CANopen example or a file next to it.
 std::string told_after(const std::string& file, const std::string& from, const std::string& to) {
   const ExampleFolder folder({"canopen.toml", "two_channel_module.eds", "column_model.toml"});
   folder.edit(file, from, to);

@@ -255,8 +255,8 @@ def test_the_text_for_a_person_has_the_bytes_too(plan):
 
 
 def frames(interface, sent=None):
-    """Frames of an interface, with identifiers as displayed; `sent` is repeated, in case nobody
-    listened the first time."""
+    """Frames of an interface, with identifiers as displayed; `sent` is repeated, in case the
+    first was missed."""
     with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as link:
         link.bind((interface,))
         link.settimeout(0.5)
