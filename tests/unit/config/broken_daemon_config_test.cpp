@@ -273,8 +273,8 @@ const std::vector<Broken>& broken_small_machine() {
 
 const std::vector<Broken>& broken_can() {
   static const std::vector<Broken> table = {
-      {"baud on a CAN bus", "reconnect_s = 0.5                        # default; pause",
-       "baud = 9600                        # default; pause", "", "bus[machine_bus].baud",
+      {"baud on a CAN bus", "reconnect_s = 0.5                        # default, at",
+       "baud = 9600                        # default, at", "", "bus[machine_bus].baud",
        "makes no sense for kind = \"can\""},
       {"long pauses before a CAN interface is tried again", "reconnect_s = 0.5    ",
        "reconnect_s = 1.5    ", "", "bus[machine_bus].reconnect_s", "[0.01, 1]"},

@@ -131,21 +131,21 @@ TEST_CASE("names must be in the node's data sheet", "[canopen][config]") {
   CHECK(told_after("heartbeat_s = 1.0 ", "heartbeat_s = 1.0 ").empty());
   CHECK(
       told_after("\"AI input PV 1\"", "\"AI input PW 1\"") ==
-      "canopen.toml:77: sensor[table].object = \"AI input PW 1\": is no object of the data sheet; "
+      "canopen.toml:76: sensor[table].object = \"AI input PW 1\": is no object of the data sheet; "
       "did you mean AI input PV 1?\n");
   CHECK_THAT(
       told_after("\"AI input PV 1\"", "\"Number of entries\""),
       Catch::Contains("sensor[table].object = \"Number of entries\": is not clear; may be AI "
                       "sensor type/Number of entries or AI input PV/Number of entries"));
   CHECK(told_after("two_channel_module.eds\"", "one_channel_module.eds\"") ==
-        "canopen.toml:61: device[ai_module].eds = \"one_channel_module.eds\": no such file\n");
+        "canopen.toml:60: device[ai_module].eds = \"one_channel_module.eds\": no such file\n");
   CHECK_THAT(told_after("eds = \"two_channel_module.eds\"", "#"),
              Catch::Contains("sensor[table].object = \"AI input PV 1\": needs the data sheet"));
   CHECK_THAT(
       told_after("read_mappings = [1] ", "#"),
       Catch::Contains("sensor[table].object = \"AI input PV 1\": needs mappings of its device"));
   CHECK(told_after("two_channel_module.eds", "DataType=0x0003", "DataType=0x0009") ==
-        "canopen.toml:77: sensor[table].object = \"AI input PV 1\": is no number in the data "
+        "canopen.toml:76: sensor[table].object = \"AI input PV 1\": is no number in the data "
         "sheet; type makes it one\n");
   CHECK(told_after("two_channel_module.eds", "[7130sub1]\n", "[7130sub1]\nAccess\n") ==
         "two_channel_module.eds:75: Access: must be a section, an entry KEY=VALUE or a comment; "
