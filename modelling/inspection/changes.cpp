@@ -38,6 +38,12 @@ constexpr double taken_out_score_min = 5.0;
 constexpr double usual_level = 3.0;
 constexpr double loose_gain_max = 0.9;
 constexpr double loose_gain_min = -0.3;
+// A signal explains a step if, within so many rows of it, it changes by more than this share of its
+// range and by more than so many times its usual change: the current of a battery cell that is
+// discharged at a constant rate has no range but its noise.
+constexpr Index operated_reach = 3;
+constexpr double operated_share = 0.05;
+constexpr double times_usual = 3.0;  ///< also for the column itself, see is_sudden()
 
 struct Target {
   std::string name;
@@ -141,6 +147,8 @@ double wildness(const std::vector<Expectation::Evidence>& steps) {
 class ChangeSearch {
  public:
   ChangeSearch(Recording recording, Looked looked) : recording_(std::move(recording)) {
+    for (Index i = 0; i < recording_.values.cols(); ++i)
+      operating_change_.push_back(operating_change(recording_.values.col(i)));
     for (std::size_t i = 0; looked == Looked::all && i < recording_.temps.size(); ++i)
       targets_.push_back({recording_.temps[i], false, static_cast<Index>(i)});
     for (std::size_t i = 0; i < recording_.outputs.size(); ++i)
@@ -237,16 +245,28 @@ class ChangeSearch {
   }
 
   /// A signal changed nearby, so the machine moved, not the sensor.
-  [[nodiscard]] bool is_operated(Index row, std::size_t run, Index reach = 3) const {
+  [[nodiscard]] bool is_operated(Index row, std::size_t run, Index reach = operated_reach) const {
     const Index first = std::max(recording_.begins[run], row - reach);
     const Index last = std::min(recording_.begins[run + 1] - 1, row + reach);
-    for (Index i = 0; i < recording_.values.cols(); ++i) {
-      const auto part = recording_.values.col(i).segment(first, last - first + 1);
-      const auto whole = recording_.values.col(i);
-      if (part.maxCoeff() - part.minCoeff() > 0.05 * (whole.maxCoeff() - whole.minCoeff()))
+    for (Index i = 0; i < recording_.values.cols(); ++i)
+      if (range(recording_.values.col(i).segment(first, last - first + 1)) >
+          operating_change_[static_cast<std::size_t>(i)])
         return true;
-    }
     return false;
+  }
+
+  static double range(const Eigen::Ref<const VectorXd>& values) {
+    return values.maxCoeff() - values.minCoeff();
+  }
+
+  /// Change of a signal within 2 operated_reach + 1 rows above which the machine was operated.
+  static double operating_change(const Eigen::Ref<const VectorXd>& signal) {
+    constexpr Index rows = 2 * operated_reach + 1;
+    std::vector<double> usual;
+    for (Index row = 0; row + rows <= signal.size(); row += rows)
+      usual.push_back(range(signal.segment(row, rows)));
+    if (usual.empty()) return 0.0;
+    return std::max(operated_share * range(signal), times_usual * median(std::move(usual)));
   }
 
   /// A gap ends nearby, so its changes appear at once.
@@ -273,7 +293,6 @@ class ChangeSearch {
   [[nodiscard]] bool is_sudden(const Judged& judged, const Target& target, std::size_t run,
                                Index row, double size) const {
     constexpr Index beside = 15;
-    constexpr double times_usual = 3.0;
     const Index rows = judged.begins[run + 1] - judged.begins[run];
     const auto value = [&](Index i) {
       if (target.output) return judged.expectation.remainder()[judged.begins[run] + i];
@@ -403,6 +422,7 @@ class ChangeSearch {
   }
 
   Recording recording_;
+  std::vector<double> operating_change_;  ///< one a signal
   std::vector<Target> targets_;
   std::vector<Finding> taken_;
   Suspicions offers_;

@@ -118,6 +118,22 @@ TEST_CASE("only steps of displacements are removed before a fit, above or below 
   CHECK(without_steps({run}, {"z_um"}).notes.empty());
 }
 
+TEST_CASE("noise of a signal does not hide a step of a displacement, a change of the signal does",
+          "[inspection]") {
+  const bool operated = GENERATE(false, true);
+  RunFile run = recording();
+  run.columns.emplace_back("current_A");
+  run.values.emplace_back();
+  std::mt19937 random(2);
+  std::normal_distribution<double> noise_A(0.0, 0.03);
+  for (std::size_t row = 0; row < rows; ++row)
+    run.values.back().push_back((operated && row >= 500 ? 5.0 : 6.0) + noise_A(random));
+  for (std::size_t row = 500; row < rows; ++row) column(run, "z_um")[row] += 40.0;
+  const Inspection inspection = inspect({run});
+  INFO(inspection_text(inspection));
+  CHECK((find(inspection, "displacement_step") != nullptr) == !operated);
+}
+
 TEST_CASE("a module's outage is a gap, not a step of its sensors", "[inspection]") {
   RunFile run = recording();
   for (const char* name : {"t1_degC", "t2_degC"})
