@@ -54,6 +54,11 @@ class Tool:
         self.run("fit", *runs, "--outputs", ",".join(outputs), "-o", model, *options)
         return model
 
+    def series(self, sisters, outputs, *options):
+        series = self.path(".toml")
+        self.run("series", *sisters, "--outputs", ",".join(outputs), "-o", series, *options)
+        return series
+
     def residuals(self, model, runs, outputs):
         """RMS over the runs, one per output; and the share of rows within 1.96 claimed deviations."""
         squares, held, rows = np.zeros(len(outputs)), 0, 0
@@ -97,10 +102,8 @@ def mean_rms(series_file, runs, outputs):
     return np.sqrt(squares / rows)
 
 
-def compare(tool, name, sisters, train, test, oracle, outputs, series_options=()):
+def compare(tool, name, series, train, test, oracle, outputs):
     """RMS of own, mean, prior and oracle, and the coverage of the claimed intervals."""
-    series = tool.path(".toml")
-    tool.run("series", *sisters, "--outputs", ",".join(outputs), "-o", series, *series_options)
     own, _ = tool.residuals(tool.fit(train, outputs), test, outputs)
     prior, held = tool.residuals(tool.fit(train, outputs, "--prior", series), test, outputs)
     mean = mean_rms(series, test, outputs)
@@ -127,7 +130,7 @@ def simulated_sisters(tool):
 
 def simulated(tool):
     outputs = ["z_um", "y_um"]
-    sisters = simulated_sisters(tool)
+    series = tool.series(simulated_sisters(tool), outputs)
     for hours in PROBED_H:
         all_figures = []
         for seed in range(100, 100 + NEW):
@@ -135,7 +138,7 @@ def simulated(tool):
             train = tool.written(machine.day(0, 10))
             test = [tool.written(machine.day(1, 20))]
             oracle = [tool.written(machine.day(day, 20)) for day in (2, 3)] + [train]
-            all_figures.append(compare(tool, f"type, {hours} h, machine {seed}", sisters,
+            all_figures.append(compare(tool, f"type, {hours} h, machine {seed}", series,
                                        [f"{train}@:{hours * HOUR_S}"], test, oracle, outputs))
         yield f"type_{hours}_h", np.mean(all_figures, axis=0)
 
@@ -148,8 +151,9 @@ def strangers(tool, data):
         sister.mkdir()
         for path in focus[old]:
             (sister / path.name).symlink_to(path)
-        yield f"telescope_{new}", compare(tool, f"telescope {new}", [sister], [focus[new][0]],
-                                          focus[new][1:], None, ["focus_um"], ("--scatter", 0.15))
+        series = tool.series([sister], ["focus_um"], "--scatter", 0.15)
+        yield f"telescope_{new}", compare(tool, f"telescope {new}", series, [focus[new][0]],
+                                          focus[new][1:], None, ["focus_um"])
     rates = ("1C", "3C", "4C")
     cells = {c: {r: data / "cell_under_load" / f"Q30_{c}_{r}.csv" for r in rates}
              for c in ("S001", "S002")}
@@ -158,16 +162,16 @@ def strangers(tool, data):
         sister.mkdir()
         for path in cells[old].values():
             (sister / path.name).symlink_to(path)
-        yield f"cell_{new}", compare(tool, f"cell {new}", [sister], [cells[new]["1C"]],
-                                     [cells[new]["3C"], cells[new]["4C"]], None, ["diameter_um"],
-                                     ("--scatter", 0.15))
+        series = tool.series([sister], ["diameter_um"], "--scatter", 0.15)
+        yield f"cell_{new}", compare(tool, f"cell {new}", series, [cells[new]["1C"]],
+                                     [cells[new]["3C"], cells[new]["4C"]], None, ["diameter_um"])
     probes = sorted((data / "probe_drift").glob("*.csv"))
     for new in probes:
         time_s = measured_data.read(new)["time_s"]
         at_s = time_s[0] + 0.3 * (time_s[-1] - time_s[0])
         yield f"probe_{new.stem}", compare(
-            tool, f"probe {new.stem}", [p for p in probes if p != new], [f"{new}@:{at_s}"],
-            [f"{new}@{at_s}:"], None, ["z_um"])
+            tool, f"probe {new.stem}", tool.series([p for p in probes if p != new], ["z_um"]),
+            [f"{new}@:{at_s}"], [f"{new}@{at_s}:"], None, ["z_um"])
 
 
 def main():
