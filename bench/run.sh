@@ -35,7 +35,7 @@ if [ -z "${THERMOCOMP_BENCH_BUILD:-}" ]; then
   if [ ! -f "$THERMOCOMP_BENCH_BUILD/build.ninja" ]; then
     (cd "$source_dir" && cmake --preset release) >&2
   fi
-  (cd "$source_dir" && cmake --build --preset release) >&2
+  (cd "$source_dir" && cmake --build --preset release --target benchmarks) >&2
 fi
 export THERMOCOMP_BENCH_BUILD
 exec "$script"
