@@ -1,8 +1,9 @@
 #!/bin/bash
 # Builds everything and runs the tests of one build. .ci/run adds the sanitizers' builds, format and
 # static checks.
-#   ./test.sh [--quick | --all | --build-only] [--preset PRESET] [-- CTEST_OPTION...]
-#   --quick: for daily work: only test programs, without packages, processes, guests or campaigns
+#   ./test.sh [--quick | --packages | --all | --build-only] [--preset PRESET] [-- CTEST_OPTION...]
+#   --quick: for daily work: only test programs, without processes, guests or campaigns
+#   --packages: also builds the Debian packages and tests them in booted systems, as .ci/run does
 #   --all: also the longest tests, and those that plant bugs in copies of the sources
 #   --build-only: no tests
 #   --preset: debug, release (default), asan-ubsan, asan-ubsan-all (with the modelling), tsan, coverage
@@ -12,7 +13,7 @@ source scripts/common.sh
 exec </dev/null
 
 usage() {
-  sed -n 's/^# \{0,1\}//; 4,8p' "${BASH_SOURCE[0]}"
+  sed -n 's/^# \{0,1\}//; 4,9p' "${BASH_SOURCE[0]}"
 }
 
 preset=release
@@ -25,7 +26,7 @@ while (($#)); do
       preset=$2
       shift 2
       ;;
-    --quick | --all | --build-only)
+    --quick | --packages | --all | --build-only)
       extent=${1#--}
       shift
       ;;
@@ -153,9 +154,10 @@ test_processes_while_building() {
   left_out=(--label-exclude "${labels%)\$}|${left_out_labels})\$")
 }
 
-targets=(all) left_out_labels='nightly|planted'
+targets=(all) left_out_labels='nightly|planted|service'
 case $extent in
   quick) targets=(quick_tests) ;;
+  packages) left_out_labels='nightly|planted' ;;
   all) targets=(all planted_tests) left_out_labels=none ;;
 esac
 left_out=(--label-exclude "^($left_out_labels)\$")

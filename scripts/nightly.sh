@@ -29,7 +29,6 @@ part "packages of PETSc" scripts/setup.sh petsc
 for preset in release asan-ubsan-all tsan debug coverage; do
   part "$preset" ./test.sh --all --preset "$preset"
 done
-part "odr" scripts/check-odr.sh
 part "includes" scripts/check_includes.py
 part "format" scripts/check-format.sh
 part "clang-tidy" scripts/check-tidy.sh
