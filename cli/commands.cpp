@@ -27,13 +27,13 @@ constexpr std::array<ModellingCommand, 10> commands{{
     {"structure", "block matrix of a structure, by finite elements"},
     {"place", "sensor positions of a structure"},
     {"tiebar", "the coefficients of a gate-shaped machine with tie bars"},
-    {"plan", "test plan from factors and levels; --apart: for what always moved alike"},
-    {"inspect", "what is wrong with recordings themselves, and what they can tell at all"},
-    {"series", "what machines of one type have in common"},
+    {"plan", "test plan from factors and levels; --apart: to separate what always moved together"},
+    {"inspect", "faults of recordings, and the questions that they can answer"},
+    {"series", "common behaviour of machines of one type"},
     {"group", "similarity groups of measured temperatures"},
     {"fit", "sensor choice and model from measured runs"},
-    {"diagnose", "what a model gets wrong in measured runs, and why"},
-    {"thermal-test", "tests of thermal behaviour after ISO 230-3: a plan, and what one showed"},
+    {"diagnose", "errors of a model in measured runs, and their causes"},
+    {"thermal-test", "tests of thermal behaviour to ISO 230-3: plan and evaluation"},
 }};
 
 std::vector<fs::path> places_to_look() {
@@ -98,7 +98,8 @@ void declare_command_line(CLI::App& app, GlobalOptions& global, Action& action) 
       ->default_str(global.socket);
   app.require_subcommand(1);
   app.failure_message(command_slip_text);
-  app.footer("Exit status: 0 success, 1 the answer is no, 2 bad use, bad input or unreachable.");
+  app.footer(
+      "Exit status: 0 success, 1 the answer is no, 2 wrong usage, invalid input or unreachable.");
   add_init_command(app, action);
   add_check_command(app, action);
   add_scan_command(app, action);

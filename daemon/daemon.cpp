@@ -250,7 +250,7 @@ void Daemon::Parts::stop() noexcept {
   }
   cycle.finish_recording();
   if (history && !history->stop_within(history_ends_within)) {
-    spdlog::error("the history's disk does not answer: what it has not committed is lost");
+    spdlog::error("the history's disk does not respond: uncommitted records are lost");
     spdlog::info("stopped; {}", what_stays(config));
     static_cast<void>(flush_log(std::chrono::seconds(1)));
     std::_Exit(EXIT_SUCCESS);

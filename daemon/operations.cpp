@@ -48,9 +48,9 @@ bool is_done(Outcome outcome, const char* asked) {
   }
   throw RpcError(
       rpc::internal_error,
-      fmt::format("the cycle does not answer: it has the {} in hand and does not finish; "
-                  "the status tells whether it still does",
-                  asked));
+      fmt::format(
+          "the cycle does not respond: it has begun the {} and not finished it; see the status",
+          asked));
 }
 
 void add_recorder(CycleParts& parts, const DaemonConfig& config, HistoryWriter* history) {
@@ -117,7 +117,7 @@ Operations::~Operations() = default;
 
 RpcPending Operations::command(const Command& asked) {
   if (has_index(asked.kind) && cycle_.replacing())
-    throw RpcError(rpc::refused, "a reload is under way: ask again when it is done");
+    throw RpcError(rpc::refused, "a reload is in progress: retry when it has finished");
   if (asked.kind == CommandKind::enable && parts_.keeper.is_reference_lost())
     throw RpcError(rpc::refused,
                    "the machine's reference is lost: give `thermocomp reference` first, when the "
@@ -161,10 +161,11 @@ RpcPending Operations::reload(const std::optional<std::filesystem::path>& candid
       return json{{"done", true}};
     }
     if (Clock::now() < late) return std::nullopt;
-    throw RpcError(rpc::internal_error,
-                   fmt::format("the files are not read and the model is not built after {} s; "
-                               "the reload goes on",
-                               patience_s));
+    throw RpcError(
+        rpc::internal_error,
+        fmt::format(
+            "reading the files and building the model takes more than {} s; the reload continues",
+            patience_s));
   };
 }
 
@@ -179,7 +180,7 @@ void Operations::hang_up() {
 }
 
 void Operations::begin_reload(const std::optional<std::filesystem::path>& candidate) {
-  if (reload_) throw RpcError(rpc::refused, "a reload is under way: ask again when it is done");
+  if (reload_) throw RpcError(rpc::refused, "a reload is in progress: retry when it has finished");
   Reload reload;
   reload.answer = std::make_shared<ReloadAnswer>();
   reload.loaded = std::make_shared<Loaded>();

@@ -131,7 +131,7 @@ void refuse_impossible_offsets(const DaemonConfig& config, StartState& start) {
     if (same || state.corridor_um.erase(axis.name) == 0) continue;
     start.warnings.push_back(file + ": the offset of axis " + axis.name +
                              " was sent to another controller or with another sign, and is not "
-                             "taken for what was sent last");
+                             "used as the last offset sent");
   }
 }
 
@@ -149,7 +149,7 @@ StartState find(const DaemonConfig& config) {
   const std::string why =
       loaded.damaged ? loaded.warning
                      : "state file " + config.state_file.string() +
-                           " is missing, but the history says that this is not the first start";
+                           " is missing, but according to the history this is not the first start";
   start.is_on_disk = false;
   if (recorded.state) {
     take_recorded(recorded, why, start);

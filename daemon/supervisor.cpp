@@ -200,7 +200,7 @@ void Supervisor::ramp_to_zero() {
     spdlog::info("the offsets are at zero");
   else
     spdlog::warn("not all offsets are at zero: {}",
-                 again ? "asked to stop at once" : "stop_ramp_s_max is over");
+                 again ? "immediate stop requested" : "stop_ramp_s_max is over");
 }
 
 bool Supervisor::at_zero() {
@@ -225,9 +225,9 @@ StatusView Supervisor::view() {
   for (std::size_t i = 0; i < axes.size() && !parts_.keeper.error().empty(); ++i)
     if (axes[i].waits_for_disk)
       all.push_back("axis " + parts_.config.estimator.axes[i].name +
-                    " waits for the state file, by which alone a restart would know its offset");
+                    " waits for the state file, which a restart needs for its offset");
   if (const LogStatistics log = log_statistics(); log.stands)
-    all.push_back(fmt::format("nobody takes the log: {} lines are lost", log.dropped));
+    all.push_back(fmt::format("the log is not read: {} lines are lost", log.dropped));
   const HistoryStatistics statistics =
       parts_.history != nullptr ? parts_.history->statistics() : HistoryStatistics{};
   if (!statistics.last_error.empty()) all.push_back(statistics.last_error);

@@ -7,7 +7,7 @@ namespace thermocomp::gateway {
 void declare_gateway_command_line(CLI::App& app, GatewayOptions& options) {
   app.name("thermocomp-gateway");
   app.description(
-      "Shows what thermocompd does: a page for browsers, metrics for Prometheus, MQTT, an "
+      "Publishes the status of thermocompd: a page for browsers, metrics for Prometheus, MQTT, an "
       "MTConnect "
       "adapter, alarms");
   app.set_version_flag("--version", THERMOCOMP_VERSION);
@@ -15,17 +15,18 @@ void declare_gateway_command_line(CLI::App& app, GatewayOptions& options) {
       ->type_name("FILE")
       ->capture_default_str();
   app.add_option("--password-line", options.password_user,
-                 "reads a password from standard input and prints the line of this user for the "
-                 "file that http.passwords names")
+                 "reads a password from standard input and prints this user's line for the file in "
+                 "http.passwords")
       ->type_name("USER");
-  app.add_flag("--device-file", options.device_file,
-               "asks the daemon for its sensors and axes and prints the device file for the "
-               "MTConnect agent");
+  app.add_flag(
+      "--device-file", options.device_file,
+      "prints the device file for the MTConnect agent, with the daemon's sensors and axes");
   app.footer(
       "Runs in the foreground until SIGTERM or SIGINT; once it serves it prints a line of JSON "
       "with\n"
       "its ports. Check a configuration with: thermocomp check.\n"
-      "Exit status: 0 stopped as asked, 1 could not start or go on, 2 bad use or configuration.");
+      "Exit status: 0 stopped on request, 1 failed to start or continue, 2 wrong usage or "
+      "configuration.");
 }
 
 }  // namespace thermocomp::gateway

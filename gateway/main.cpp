@@ -49,7 +49,7 @@ sigset_t ending_signals() {
 void end_within(std::chrono::seconds time) {
   std::thread([time] {
     std::this_thread::sleep_for(time);
-    spdlog::warn("stopped without waiting any longer");
+    spdlog::warn("stopped after the timeout of an orderly stop");
     std::_Exit(0);
   }).detach();
 }
@@ -157,7 +157,7 @@ void run_gateway(const GatewaySettings& settings) {
     sd_notify(0, "WATCHDOG=1");
   }
   sd_notify(0, "STOPPING=1");
-  spdlog::info("stopped as asked");
+  spdlog::info("stopped on request");
   constexpr std::chrono::seconds end_max(5);
   end_within(end_max);
 }

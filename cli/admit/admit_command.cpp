@@ -192,8 +192,7 @@ class Admission {
     return name.empty() ? "by an operator at the machine" : "as ordered by " + name;
   }
   [[nodiscard]] std::string signed_by_nobody(const char* what) const {
-    return fmt::format("the {} is signed by none of the keys in {}", what,
-                       settings_.approvers.string());
+    return fmt::format("the {} is not signed by a key in {}", what, settings_.approvers.string());
   }
 
   /// An operator may have promoted the candidate, or the daemon may have restarted without it.
@@ -251,10 +250,10 @@ int run_admit(const std::string& file) {
 }  // namespace
 
 void add_admit_command(CLI::App& app, Action& action) {
-  CLI::App* sub = app.add_subcommand(
-      "admit",
-      "checks a model that the office offers on this machine's own days, runs it beside the one in "
-      "use, and promotes it or takes it back as approved");
+  CLI::App* sub =
+      app.add_subcommand("admit",
+                         "checks a model offered by the office on this machine's recent days, runs "
+                         "it as the candidate, and promotes it or rolls it back as approved");
   const auto file = std::make_shared<std::string>();
   sub->add_option("RELEASES", *file, "configuration, such as /etc/thermocomp/releases.toml")
       ->type_name("FILE")

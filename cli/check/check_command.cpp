@@ -235,9 +235,8 @@ std::string watch_text(const DaemonConfig& config) {
 /// States how well the model fits a machine, according to its file.
 std::string comparison_text(const ThermalModel& model) {
   if (!is_compared(model))
-    return "compared: NEVER, as far as the model file says (no [made_from] with errors on rows "
-           "left "
-           "out): size and sign may be those of no machine";
+    return "compared: NEVER, according to the model file (no [made_from] with errors on left-out "
+           "rows): size and sign may be wrong";
   std::string text("compared: left on rows that it was not fitted to");
   for (const auto& [name, output] : model.made_from->outputs)
     text += ", " + name + " " + fixed(output.left_out_rms_um, 1) + " rms of " +
@@ -348,9 +347,9 @@ void add_check_command(CLI::App& app, Action& action) {
   sub->add_option("CONFIG", options->file, "configuration of thermocompd or thermocomp-gateway")
       ->type_name("FILE")
       ->required();
-  sub->add_flag("--registers", options->registers,
-                "what the controller's side must provide: every register or bit, its unit, and who "
-                "writes it");
+  sub->add_flag(
+      "--registers", options->registers,
+      "lists what the controller must provide: every register or bit, its unit, and its writer");
   sub->callback([&action, options] { action = [options] { return run_check(*options); }; });
 }
 

@@ -168,7 +168,7 @@ std::string modbus_table(const DaemonConfig& config, const ModbusControllerConfi
     written.push_back({place_name(*valid), type_name(without_sign(*valid)), valid_text(axes), "-"});
   if (const auto& count = controller.heartbeat)
     written.push_back({place_name(*count), type_name(without_sign(*count)),
-                       "heartbeat; counts up with every write, begins anew when full", "-"});
+                       "heartbeat; counts up with every write, restarts when full", "-"});
   for (const ModbusSignal& signal : controller.signals) {
     const std::string& name = config.estimator.signals[signal.signal];
     values.push_back(signal.value);
@@ -257,8 +257,8 @@ std::string can_table(const DaemonConfig& config, const CanControllerConfig& con
     add_axis(controller.axes[i], axes[spans[i].first], written, read);
   if (controller.valid_bits) add(written, *controller.valid_bits, valid_text(axes), "-", true);
   if (controller.heartbeat)
-    add(written, *controller.heartbeat,
-        "heartbeat; counts up with every frame, begins anew when full", "-", true);
+    add(written, *controller.heartbeat, "heartbeat; counts up with every frame, restarts when full",
+        "-", true);
   for (const CanControllerSignal& signal : controller.signals) {
     const std::string& name = config.estimator.signals[signal.signal];
     add(read, signal.value, name,
@@ -295,11 +295,11 @@ std::string bounds_text(const DaemonConfig& config) {
 std::string missing_text(bool valid_bits, bool heartbeat, bool reads_back) {
   std::vector<std::string> lacks;
   if (!valid_bits)
-    lacks.emplace_back("valid_bits: the controller cannot tell an axis that must be left alone");
+    lacks.emplace_back("valid_bits: the controller cannot detect an axis that it must not move");
   if (!heartbeat)
-    lacks.emplace_back("heartbeat: the controller cannot tell that the daemon has stopped");
+    lacks.emplace_back("heartbeat: the controller cannot detect that the daemon has stopped");
   if (!reads_back)
-    lacks.emplace_back("applied: the daemon cannot tell what the controller applies");
+    lacks.emplace_back("applied: the daemon cannot check what the controller applies");
   std::string text;
   for (const std::string& lack : lacks)
     text.append(text.empty() ? "\nMissing:\n" : "").append("  no ").append(lack).append("\n");
@@ -331,7 +331,7 @@ struct TableText {
            bounds_text(config);
   }
   std::string operator()(const DryRunControllerConfig&) const {
-    return "kind = \"dry_run\": there is no controller, and no register\n" + bounds_text(config);
+    return "kind = \"dry_run\": no controller and no registers\n" + bounds_text(config);
   }
 };
 
@@ -347,7 +347,7 @@ std::string register_table(const DaemonConfig& config) {
       halves += "\naxis " + axis_name(axis) + " takes out " + half_of(*diameter) + ", a diameter\n";
   }
   return "controller " + name + ": " + std::visit(TableText{config}, config.controller) + halves +
-         (config.dry_run ? "\nDRY RUN: the daemon reads, and writes none of this\n" : "");
+         (config.dry_run ? "\nDRY RUN: the daemon only reads and writes none of these\n" : "");
 }
 
 }  // namespace thermocomp::cli

@@ -49,7 +49,7 @@ int tell_damage(const std::string& history, const std::vector<HistoryDamage>& da
 void refuse_onto_itself(const std::string& input, const std::string& output) {
   std::error_code error;
   if (output != "-" && std::filesystem::equivalent(input, output, error) && !error)
-    throw Failure(output + ": is what is read; the output must be another file");
+    throw Failure(output + ": is the input; the output must be another file");
 }
 
 int run_export(const ExportOptions& options) {
@@ -175,8 +175,8 @@ void add_history_commands(CLI::App& app, Action& action) {
   CLI::App* sub = app.add_subcommand(
       "export",
       "a daemon's history as a run file for predict, fit, diagnose and inspect: the model's inputs "
-      "as the daemon computed with them, signals, probed displacement, offsets; wall time, faults, "
-      "commands and damage stand in comment lines");
+      "as the daemon used them, signals, probed displacement, offsets; wall time, faults, commands "
+      "and damage are in comment lines");
   sub->add_option("HISTORY", export_options->history, "history of thermocompd")
       ->type_name("FILE")
       ->required();
@@ -185,7 +185,7 @@ void add_history_commands(CLI::App& app, Action& action) {
                   "\"8 hours ago\", -8h, or seconds since the history's start");
   sub->add_option("--to", export_options->to, "end, not included; as --from");
   sub->add_flag("--sensors", export_options->sensors,
-                "every sensor as it was read, in place of the model's inputs");
+                "raw readings of every sensor, instead of the model's inputs");
   sub->add_option("-o,--output", export_options->output, "run file; - is standard output")
       ->type_name("FILE")
       ->required();

@@ -37,7 +37,7 @@ void tell(const std::string& name, const std::vector<std::string>& lines) {
 void refuse_onto(const std::string& input, const std::string& output) {
   std::error_code error;
   if (output != "-" && std::filesystem::equivalent(input, output, error) && !error)
-    throw Failure(output + ": is what is read; the output must be another file");
+    throw Failure(output + ": is the input; the output must be another file");
 }
 
 /// Converts seconds since 1970 to seconds since the first row, since selections would be long.
@@ -55,7 +55,7 @@ RunFile read_log(const std::string& file, const ColumnMap& map) {
   RunFile run = load_run({file}, &map);
   if (run.understood.empty()) {
     run.understood.emplace_back("a run file already");
-    if (run.wall_zero) run.understood.emplace_back("a comment says when its time_s was 0");
+    if (run.wall_zero) run.understood.emplace_back("a comment gives the wall time of time_s = 0");
     count_from_first_row(run);
   }
   tell(run.name, run.understood);
@@ -98,10 +98,11 @@ int run_import(const ImportOptions& options) {
 
 void add_import_command(CLI::App& app, Action& action) {
   const auto options = std::make_shared<ImportOptions>();
-  CLI::App* sub = app.add_subcommand(
-      "import",
-      "any log as a run file: tables of PLCs, loggers and databases, JSON, workbooks, LinuxCNC's "
-      "halsampler and halscope; what was understood is printed line by line");
+  CLI::App* sub =
+      app.add_subcommand("import",
+                         "converts any log to a run file: tables of PLCs, loggers and databases, "
+                         "JSON, workbooks, LinuxCNC's "
+                         "halsampler and halscope; the interpretation is printed line by line");
   sub->add_option("LOG", options->log, "the log")->type_name("FILE")->required();
   sub->add_option("--names", options->names,
                   "columns of a log without a header, as a run file calls them: z_mm,t1_degC")
@@ -111,10 +112,8 @@ void add_import_command(CLI::App& app, Action& action) {
       ->check(CLI::PositiveNumber)
       ->type_name("S");
   sub->add_option("--columns", options->columns, columns_help)->type_name("FILE");
-  sub->add_option(
-         "--join", options->join,
-         "a second log of the same machine, by its own clock: temperatures there, probings "
-         "here")
+  sub->add_option("--join", options->join,
+                  "a second log of the same machine with its own clock, such as probings")
       ->type_name("FILE");
   sub->add_option(
          "--corrections", options->corrections,
@@ -123,9 +122,8 @@ void add_import_command(CLI::App& app, Action& action) {
       ->check(CLI::IsMember({"steps", "totals"}))
       ->type_name("HOW");
   sub->add_option("--shift-s", options->shift_s,
-                  "what makes the second's time_s that of the first, where neither dates nor "
-                  "columns that change "
-                  "alike say it")
+                  "seconds to add to the second's time_s, if neither dates nor columns that change "
+                  "alike give the shift")
       ->type_name("S");
   sub->add_option("-o,--output", options->output, "run file; - is standard output")
       ->type_name("FILE")

@@ -178,13 +178,13 @@ struct Shift {
 };
 
 Shift shift_of(const RunFile& first, const RunFile& second, std::optional<double> shift_s) {
-  if (shift_s) return {*shift_s, "as --shift-s says"};
+  if (shift_s) return {*shift_s, "given by --shift-s"};
   std::string why;
   for (const RunFile* run : {&second, &first})
     if (!run->wall_zero)
-      why = run->name + " has no dates, so nothing says how the two clocks belong together";
+      why = run->name + " has no dates, so the shift between the two clocks is unknown";
   if (why.empty() && first.wall_zero->is_utc != second.wall_zero->is_utc)
-    why = "one of the two says its time zone and the other does not";
+    why = "only one of the two gives its time zone";
   if (why.empty()) return {second.wall_zero->seconds - first.wall_zero->seconds, "by their dates"};
   const auto seen = seen_shift(first, second, why);
   return {seen->shift_s, "since " + seen->columns + " change alike there (correlation " +
@@ -345,10 +345,9 @@ RunFile displacements_of(RunFile corrections, CorrectionEntry entry) {
     has_axis = true;
   }
   if (!has_axis)
-    throw ConfigurationError(
-        {Problem{corrections.name, 0, "", "",
-                 "no column is called as an axis (x, y, z, a, b, c); of several "
-                 "tools or places each needs a log of its own"}});
+    throw ConfigurationError({Problem{corrections.name, 0, "", "",
+                                      "no column is named like an axis (x, y, z, a, b, c); several "
+                                      "tools or places need a log each"}});
   return corrections;
 }
 

@@ -22,7 +22,7 @@ void ask_for_buses(InitDraft& draft, Questions& questions) {
     std::string answer;
     questions.ask_until(
         is_first ? std::string("Bus of the sensors' modules: ") + link_forms
-                 : "Another bus? Enter: no more",
+                 : "Another bus? Enter: none",
         is_first ? "rtu:/dev/ttyUSB0:19200:even" : "", [&](const std::string& text) {
           answer = text;
           if (text.empty()) return;
@@ -118,7 +118,7 @@ void ask_for_module(InitDraft& draft, std::size_t bus, int unit, Questions& ques
       throw Failure(std::to_string(module.channels.size()) + " names, please: " + joined(proposed));
     for (std::size_t i = 0; i < names.size(); ++i) {
       if (is_used(draft, names[i]) || std::count(names.begin(), names.end(), names[i]) > 1)
-        throw Failure(names[i] + ": each sensor needs a name of its own");
+        throw Failure(names[i] + ": the names of sensors must be unique");
       module.channels[i].sensor = names[i];
     }
   });
@@ -142,7 +142,7 @@ void ask_for_modules(InitDraft& draft, Questions& questions, const InitEyes& eye
       continue;
     }
     if (draft.buses.size() == 1) throw Failure("a machine needs a module with a sensor");
-    questions.say(name + " is left out: no module is on it");
+    questions.say(name + " is left out: it has no module");
     draft.buses.erase(draft.buses.begin() + static_cast<std::ptrdiff_t>(bus));
   }
 }
@@ -156,12 +156,12 @@ void ask_for_places(InitController& controller, Questions& questions) {
     });
   };
   questions.ask_until(
-      "Offset of the first axis, the others behind it: TABLE:ADDRESS:TYPE:UM_A_COUNT (TYPE "
+      "Offset of the first axis, followed by the others: TABLE:ADDRESS:TYPE:UM_A_COUNT (TYPE "
       "int32/CDAB "
-      "where the low word comes first)",
+      "for low word first)",
       "holding:0:int32:0.01",
       [&](const std::string& text) { controller.offset = parse_place(text); });
-  optional_place("Where it shows what it applies, or none", "input:0:int32:0.01",
+  optional_place("Read-back of the applied offset, or none", "input:0:int32:0.01",
                  controller.applied);
   optional_place("Valid bits, or none", "holding:10:uint16", controller.valid_bits);
   optional_place("Heartbeat, or none", "holding:11:uint16", controller.heartbeat);
@@ -179,14 +179,14 @@ void ask_for_controller(InitDraft& draft, Questions& questions) {
   if (!draft.controller.is_modbus()) return;
   questions.ask_until(
       "Registers as in docs/controllers/plc.md? Offsets from holding 0 on, applied from input 0 on "
-      "(int32, 0.01 um a count), valid bits holding 10, heartbeat holding 11; yes or no",
+      "(int32, 0.01 um per count), valid bits holding 10, heartbeat holding 11; yes or no",
       "yes", [&](const std::string& text) {
         if (text == "no" || text == "n") return ask_for_places(draft.controller, questions);
         if (text != "yes" && text != "y") throw Failure("yes or no");
       });
   const std::vector<std::string> needed = missing_signals(draft);
   questions.ask_until(
-      "What else to read from it, NAME=TABLE:ADDRESS[:TYPE[:SCALE]], such as "
+      "Further values to read from it, NAME=TABLE:ADDRESS[:TYPE[:SCALE]], such as "
       "spindle_rpm=input:26:uint16, or none" +
           (needed.empty() ? "" : " (the model needs " + joined(needed) + ")"),
       "none", [&](const std::string& text) {
@@ -207,7 +207,7 @@ std::string Questions::ask(const std::string& question, const std::string& other
   out_ << question << (otherwise.empty() ? "" : " [" + otherwise + "]") << ": " << std::flush;
   std::string line;
   if (!std::getline(in_, line))
-    throw InputEnded("init: the input ended before everything was said");
+    throw InputEnded("init: the input ended before all questions were answered");
   const std::size_t first = line.find_first_not_of(" \t\r");
   if (first == std::string::npos)
     line = otherwise;

@@ -90,7 +90,7 @@ InitDraft draft_of(const InitOptions& options, const fs::path& folder) {
     InitModule module = parse_module(text);
     module.name = "module" + std::to_string(draft.modules.size() + 1);
     if (module.bus >= draft.buses.size())
-      throw Failure(text + ": there is no bus " + std::to_string(module.bus + 1) + " (--bus)");
+      throw Failure(text + ": no bus " + std::to_string(module.bus + 1) + " (--bus)");
     draft.modules.push_back(std::move(module));
   }
   if (!options.controller.empty()) draft.controller = parse_controller(options.controller);
@@ -112,7 +112,7 @@ void refuse_what_is_missing(const InitDraft& draft, const InitOptions& options) 
   if (options.controller.empty()) missing += " --controller";
   if (draft.axes.empty()) missing += " --axes";
   if (!missing.empty())
-    throw Failure("init: there is no terminal to ask on, and these options are missing:" + missing);
+    throw Failure("init: no terminal for questions, and these options are missing:" + missing);
 }
 
 /// Selects the channels of presets given without channels, by reading them.
@@ -125,11 +125,11 @@ void try_modules(InitDraft& draft, const InitOptions& options, const fs::path& f
     std::cout << module.name << ", unit " << module.unit << ", " << module.preset << ":\n";
     for (const std::string& line : lines) std::cout << "    " << line << '\n';
     if (module.channels.empty())
-      throw Failure("unit " + std::to_string(module.unit) + " (" + module.preset +
-                        "): no channel gives a temperature; name them to go on all the same, such "
-                        "as " +
-                        module.preset + ":1-4",
-                    exit_no);
+      throw Failure(
+          "unit " + std::to_string(module.unit) + " (" + module.preset +
+              "): no channel gives a temperature; name them to continue anyway, such as " +
+              module.preset + ":1-4",
+          exit_no);
   }
 }
 
@@ -202,7 +202,7 @@ void tell_next(const InitDraft& draft, const std::string& file) {
   if (is_dry)
     std::cout << model << "then, to let it move an axis:\n"
               << "  " << tool << " disable\n"
-              << "  dry_run = false in " << file << ", start it anew\n";
+              << "  dry_run = false in " << file << ", restart it\n";
   if (draft.controller.kind != "dry_run")
     std::cout << "  " << tool << " prove " << draft.axes.front()
               << " 5   # with an indicator, every axis\n";
@@ -230,7 +230,7 @@ int run_init(const InitOptions& options) {
     for (const fs::path& each :
          {fs::path(options.file), options.model.empty() ? model : fs::path()})
       if (!each.empty() && fs::exists(each))
-        throw Failure(each.string() + ": is there already; --force replaces it");
+        throw Failure(each.string() + ": already exists; --force replaces it");
   const auto settle_modules = [&](InitDraft& draft) {
     try_modules(draft, options, folder);
     name_sensors(draft, options.names);
@@ -269,7 +269,7 @@ int run_init(const InitOptions& options) {
   if (questions.count() > 0) std::cout << ", " << questions.count() << " questions";
   std::cout << '\n';
   if (!is_all_there)
-    std::cout << "Not everything is there yet: see above, then thermocomp scan " << options.file
+    std::cout << "Not everything answers yet: see above, then thermocomp scan " << options.file
               << '\n';
   tell_next(draft, options.file);
   return is_all_there ? exit_success : exit_no;
@@ -278,15 +278,15 @@ int run_init(const InitOptions& options) {
 }  // namespace
 
 void add_init_command(CLI::App& app, Action& action) {
-  CLI::App* sub = app.add_subcommand(
-      "init",
-      "writes a first configuration: asks for buses, modules, controller and axes (or takes "
-      "options), looks at them with the reads of scan, and names what is missing; exit status 1: "
-      "written, but not everything answers yet");
+  CLI::App* sub =
+      app.add_subcommand("init",
+                         "writes a first configuration: asks for buses, modules, controller and "
+                         "axes (or takes options), reads them like scan, and lists what is "
+                         "missing; exit status 1: written, but not everything answers yet");
   const auto options = std::make_shared<InitOptions>();
   sub->add_option("FILE", options->file,
-                  "the configuration; outside of /etc its state, history and socket are put beside "
-                  "it (default /etc/thermocomp/thermocompd.toml)")
+                  "the configuration; outside of /etc its state, history and socket are placed "
+                  "next to it (default /etc/thermocomp/thermocompd.toml)")
       ->type_name("FILE");
   sub->add_option(
          "--bus", options->buses,
@@ -309,14 +309,14 @@ void add_init_command(CLI::App& app, Action& action) {
                   "TABLE:ADDRESS:TYPE:UM_A_COUNT (default holding:0:int32:0.01)")
       ->type_name("PLACE");
   sub->add_option("--applied", options->applied,
-                  "where it shows what it applies, or none (default input:0:int32:0.01)")
+                  "read-back of the applied offset, or none (default input:0:int32:0.01)")
       ->type_name("PLACE");
   sub->add_option("--valid-bits", options->valid_bits, "or none (default holding:10:uint16)")
       ->type_name("PLACE");
   sub->add_option("--heartbeat", options->heartbeat, "or none (default holding:11:uint16)")
       ->type_name("PLACE");
   sub->add_option("--signal", options->signals,
-                  "what else to read from the controller, NAME=TABLE:ADDRESS[:TYPE[:SCALE]]")
+                  "further values to read from the controller, NAME=TABLE:ADDRESS[:TYPE[:SCALE]]")
       ->type_name("SIGNAL");
   sub->add_option("--axes", options->axes, "axes that get an offset, commas between")
       ->type_name("AXES");
@@ -328,9 +328,8 @@ void add_init_command(CLI::App& app, Action& action) {
       ->check(CLI::Range(0.001, 500.0));
   sub->add_flag("--dry-run", options->dry_run,
                 "with dry_run = true: the controller is read and nothing is written to it");
-  sub->add_flag("--no-scan", options->no_scan, "look at no bus; channels must then be named");
-  sub->add_flag("--force", options->force,
-                "replace files that are there; each is kept as FILE.old");
+  sub->add_flag("--no-scan", options->no_scan, "read no bus; channels must then be named");
+  sub->add_flag("--force", options->force, "replace existing files; each is kept as FILE.old");
   sub->callback([&action, options] { action = [options] { return run_init(*options); }; });
 }
 

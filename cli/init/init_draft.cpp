@@ -73,14 +73,14 @@ std::string module_text(const InitDraft& draft, const InitModule& module) {
                      key_number("unit", module.unit);
   if (!module.preset.empty()) {
     text += "preset = " + toml_string(module.preset) +
-            "   # what the manual of the module says; its file names what is not confirmed\n";
+            "   # from the module's manual; the preset's file lists what is not confirmed\n";
     if (!module.thermocouple.empty()) text += key_text("thermocouple", module.thermocouple);
     if (module.base_address) text += key_number("base_address", *module.base_address);
   } else {
     const InitPlace& place = module.registers;
     text += key_text("table", place.table) + key_text("encoding", place.encoding);
     if (place.word_order != "ABCD") text += key_text("word_order", place.word_order);
-    text += "scale = " + toml_number(place.scale) + "   # degC a count\n" +
+    text += "scale = " + toml_number(place.scale) + "   # degC per count\n" +
             codes_text(module.open_circuit_codes);
   }
   for (const InitChannel& channel : module.channels) {
@@ -92,9 +92,8 @@ std::string module_text(const InitDraft& draft, const InitModule& module) {
 
 std::string blocks_text(const InitDraft& draft) {
   std::string text =
-      "# ---------------------------------------------------------------- what the model gets\n"
-      "# Each block is one temperature of the model; several sensors in one block give their "
-      "mean.\n";
+      "# ---------------------------------------------------------------- inputs of the model\n"
+      "# Each block is one temperature of the model; several sensors in one block are averaged.\n";
   for (const InitModule& module : draft.modules) {
     for (const InitChannel& channel : module.channels) {
       const std::string input = input_name(channel.sensor);
@@ -127,7 +126,7 @@ std::string controller_text(const InitController& controller) {
   if (!controller.is_modbus()) {
     text += key_text("kind", controller.kind);
     if (controller.kind == "dry_run")
-      text += "# There is none yet: everything is computed and recorded, nothing is sent.\n";
+      text += "# None yet: everything is computed and recorded, nothing is sent.\n";
     else
       text += dry_run_text(controller);
     return text + "\n";
@@ -212,9 +211,8 @@ std::string input_name(const std::string& sensor) {
 
 std::string configuration_text(const InitDraft& draft) {
   std::string text =
-      "# Configuration of thermocompd, written by `thermocomp init`. Everything in it may be "
-      "changed;\n"
-      "# `thermocomp check` says whether it still fits, docs/configuration.md and\n"
+      "# Configuration of thermocompd, written by `thermocomp init`. It may be edited;\n"
+      "# `thermocomp check` checks it. docs/configuration.md and\n"
       "# config/examples/small_machine.toml have every key.\n"
       "format = 1\n";
   if (!draft.own_folder.empty())
@@ -236,10 +234,9 @@ std::string first_model_text(const InitDraft& draft) {
   for (const std::string& axis : draft.axes) outputs.push_back(output_name(draft, axis));
   const std::vector<std::vector<double>> rows(outputs.size(),
                                               std::vector<double>(inputs.size(), 0.0));
-  return "# The model of a machine of which nothing is known yet, written by `thermocomp init`: it "
-         "gives\n"
-         "# no displacement. Record, measure, and put in its place what `thermocomp fit` or\n"
-         "# `thermocomp structure` makes (docs/first_machine.md).\n"
+  return "# Placeholder model without displacement, written by `thermocomp init`. Record and\n"
+         "# measure, then replace it with the result of `thermocomp fit` or\n"
+         "# `thermocomp structure` (docs/first_machine.md).\n"
          "format = 1\ninputs = " +
          toml_list(inputs, toml_string) + "\noutputs = " + toml_list(outputs, toml_string) +
          "\nreference = \"first_sample\"\nmatrix_um_per_K = " + toml_rows(rows);

@@ -146,7 +146,7 @@ std::variant<ModbusTcp, ModbusRtu> parse_link(const std::string& text) {
     throw Failure("\"" + text + "\": must be " + link_forms);
   if (parts[0] != "rtu") {
     if (!is_host(parts[1]))
-      throw Failure("\"" + parts[1] + "\" is no host: must be letters, digits, ., - and _");
+      throw Failure("\"" + parts[1] + "\" is not a host: must be letters, digits, ., - and _");
     ModbusTcp tcp{parts[1], 502, parts[0] == "rtu_over_tcp", parts[0] == "udp"};
     if (parts.size() > 2) tcp.port = whole_number(parts[2], 1, 65535, "port of " + text);
     if (parts.size() > 3) throw Failure(text + ": must be " + parts[0] + ":HOST[:PORT]");

@@ -232,10 +232,10 @@ CourseFit fit_course(std::span<const RunFile> runs, const ThermalModel& given,
     }
   }
   if (taught.empty())
-    throw ConfigurationError(
-        {{runs.empty() ? "correction" : runs.front().name, 0, "rows", "none of them teaches a gain",
-          "must have measured values of an output of the model, at states in "
-          "which its groups contribute contribution_um_min or more"}});
+    throw ConfigurationError({{runs.empty() ? "correction" : runs.front().name, 0, "rows",
+                               "none of them determines a gain",
+                               "must have measured values of an output of the model, at states in "
+                               "which its groups contribute contribution_um_min or more"}});
   if (runs.size() > 1) choose_bandwidth(taught, model, correction.gain_sd, fit);
   for (const auto& [name, of_runs] : taught)
     fit.course.outputs[name] = thinned(of_runs, of_runs.size());

@@ -111,7 +111,7 @@ int run_correction(const CourseOptions& options) {
   const CorrectionConfig& correction = config.estimator.correction;
   if (correction.form == CorrectionForm::off) {
     throw Failure(options.config + ": [correction] form is \"off\"; choose \"two_phase\" or " +
-                  "\"recursive\" and its groups: a record is made of what they learn");
+                  "\"recursive\" and its groups: the record contains what they learn");
   }
   ThermalModel model = load_model(config.model_file);
   std::vector<RunFile> runs;
@@ -131,7 +131,7 @@ int run_correction(const CourseOptions& options) {
       std::fprintf(stderr, "; a run left out: RMS %.2f um (without a record %.2f um)",
                    fit.left_out_rms_um.at(name), fit.without_rms_um.at(name));
     } else {
-      std::fprintf(stderr, "; one run: nothing says how it does on another");
+      std::fprintf(stderr, "; one run: not tested on another");
     }
     std::fprintf(stderr, "\n");
   }
@@ -141,8 +141,7 @@ int run_correction(const CourseOptions& options) {
 void add_correction_command(CLI::App& app, Action& action) {
   const auto options = std::make_shared<CourseOptions>();
   CLI::App* sub = app.add_subcommand(
-      "correction",
-      "what probed courses taught about the gains of [correction], for when nothing is probed");
+      "correction", "learns gains of [correction] from probed courses, for use without probing");
   sub->add_option("RECORD", options->records,
                   "run files with probed displacement, RUN.csv[@T0:T1], or histories")
       ->type_name("FILE")
@@ -165,8 +164,7 @@ void add_correction_command(CLI::App& app, Action& action) {
 void add_covariance_command(CLI::App& app, Action& action) {
   const auto options = std::make_shared<CovarianceOptions>();
   CLI::App* sub = app.add_subcommand(
-      "covariance",
-      "what estimates a lost block: the covariance of a model's inputs, from records");
+      "covariance", "covariance of a model's inputs from records, for estimating lost blocks");
   sub->add_option("--model", options->model, "model file")->type_name("FILE")->required();
   sub->add_option("RECORD", options->records, "run files, RUN.csv[@T0:T1], or histories")
       ->type_name("FILE")
@@ -184,10 +182,9 @@ void add_covariance_command(CLI::App& app, Action& action) {
 
 void add_model_commands(CLI::App& app, Action& action) {
   const auto predict_options = std::make_shared<PredictOptions>();
-  CLI::App* sub = app.add_subcommand(
-      "predict",
-      "the model alone over a run file; of each measured output it prints the RMS and the largest "
-      "of what the model leaves, in um");
+  CLI::App* sub = app.add_subcommand("predict",
+                                     "applies the model to a run file; prints RMS and largest "
+                                     "remainder of each measured output, in um");
   sub->add_option("--model", predict_options->model, "model file")->type_name("FILE")->required();
   sub->add_option("RUN", predict_options->run, "run file, RUN.csv or RUN.csv@T0:T1")
       ->type_name("FILE")

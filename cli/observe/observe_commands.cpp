@@ -158,7 +158,7 @@ void add_observe_commands(CLI::App& app, const GlobalOptions& global, Action& ac
   const auto as_json = std::make_shared<bool>(false);
   const auto wanted = std::make_shared<StatusOptions>();
   CLI::App* status = app.add_subcommand(
-      "status", "whether the daemon compensates, by how much, since when, what is wrong");
+      "status", "shows whether and how much the daemon compensates, since when, and problems");
   status->add_flag("--json", wanted->as_json,
                    "the daemon's answer as JSON, with exit_status and why it is that");
   status->add_flag("--strict", wanted->strict,
@@ -166,15 +166,15 @@ void add_observe_commands(CLI::App& app, const GlobalOptions& global, Action& ac
                    "reached, a read-back that disagrees, a bad sensor, a silent unit");
   status->callback([&, wanted] { action = [&, wanted] { return run_status(global, *wanted); }; });
 
-  CLI::App* events = app.add_subcommand(
-      "events",
-      "what happened since the daemon started, or in all of a history: faults and how long they "
-      "lasted, changes of mode, commands and who gave them");
+  CLI::App* events =
+      app.add_subcommand("events",
+                         "events since the daemon's start or of a whole history: faults and their "
+                         "durations, changes of mode, commands and their users");
   const auto asked = std::make_shared<EventsOptions>();
   events
       ->add_option("HISTORY", asked->history,
-                   "history of thermocompd, earlier runs of the daemon too; left out: the running "
-                   "daemon's list")
+                   "history of thermocompd, including earlier runs of the daemon; default: the "
+                   "running daemon's list")
       ->type_name("FILE");
   events->add_option(
       "--from", asked->from,
@@ -192,7 +192,7 @@ void add_observe_commands(CLI::App& app, const GlobalOptions& global, Action& ac
   CLI::App* watch = app.add_subcommand("watch", "a live table of the running daemon");
   watch->add_option("--period", options->period_s, "seconds between two updates (default 1)")
       ->check(CLI::Range(0.1, 60.0));
-  watch->add_option("--for", options->for_s, "end after so many seconds")
+  watch->add_option("--for", options->for_s, "end after this many seconds")
       ->check(CLI::PositiveNumber);
   watch
       ->add_option("--truth", options->truth,

@@ -194,7 +194,7 @@ std::string model_error_lines(const ModelStatus& model) {
                      fixed(sd_um, 1) + " um (1 sd): " +
                      (rms_um <= worse * sd_um
                           ? "as good as claimed"
-                          : "WORSE than claimed -> thermocomp diagnose, or make the model anew"));
+                          : "WORSE than claimed -> thermocomp diagnose, or remake the model"));
   }
   return text;
 }
@@ -220,12 +220,12 @@ std::string reference_line(const ReferenceStatus& reference) {
 std::string model_lines(const ModelStatus& model) {
   std::string file = line("Model", model.file + " (SHA-256 " + model.checksum.substr(0, 16) + ")");
   if (!model.compared)
-    file += line("", "NEVER COMPARED with measured displacement, as far as its file says" +
+    file += line("", "NEVER COMPARED with measured displacement, according to its file" +
                          probed_text(model));
   file += model_error_lines(model);
   if (!model.outside.value_or(false)) return file;
   return file +
-         line("Domain", "outside of what the model was made from, " +
+         line("Domain", "outside the domain of the model, " +
                             fixed(100.0 * model.outside_share_24h, 0) + " % of the last 24 h");
 }
 

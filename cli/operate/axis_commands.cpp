@@ -109,7 +109,7 @@ json waited_for(const GlobalOptions& global, const std::string& name) {
   ProgressLine line("axis " + name);
   json mismatch = mismatch_now(global, name);
   while (flag_of(mismatch, "releasing") && Clock::now() - began < read_back_patience) {
-    line.update("waiting for what is read back");
+    line.update("waiting for the read-back");
     std::this_thread::sleep_for(look_period);
     mismatch = mismatch_now(global, name);
   }
@@ -124,8 +124,8 @@ void warn_of_trust(const json& before) {
   if (!(std::abs(read_um - sent_um) > same_um)) return;
   std::cout << "It read back " << fixed_signed(read_um, 2) << " um where "
             << fixed_signed(sent_um, 2)
-            << " um was sent last, and goes on from what it reads back.\nIf the controller adds "
-               "the difference by itself, the tool moves by it once more: mend that first.\n";
+            << " um was sent last, and continues from the read-back.\nIf the controller itself "
+               "adds the difference, the tool moves by it again: correct that first.\n";
 }
 
 }  // namespace
@@ -153,16 +153,15 @@ int run_release(const GlobalOptions& global, const std::string& axis) {
   }
   if (flag_of(after, "releasing")) {
     std::cout << "axis " << axis
-              << ": not released yet: it goes on by itself once the controller's read-backs allow "
-                 "it (thermocomp status)\n";
+              << ": not released yet: it continues by itself once the controller's read-backs "
+                 "allow it (thermocomp status)\n";
     return exit_no;
   }
   std::cout << "axis " << axis << ": NOT released: it reads back "
             << fixed_signed(number_of(after, "applied_um"), 2) << " um where "
             << fixed_signed(number_of(after, "sent_um"), 2) << " um was sent last ("
             << text_of(after, "likely")
-            << ").\nMend that, wait until it reads back what was sent, "
-               "and release again.\n";
+            << ").\nCorrect that, wait until it reads back what was sent, and release again.\n";
   return exit_no;
 }
 

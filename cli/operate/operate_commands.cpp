@@ -33,8 +33,8 @@ constexpr std::array<PlainCommand, 4> plain_commands{{
      "compensation switched on"},
     {"disable", "disable", "switches the compensation off; offsets go to zero at their slew rate",
      "compensation switched off; offsets go to zero at their slew rate"},
-    {"cycle-end", "cycle_end", "tells that a machining cycle has ended", "end of cycle noted"},
-    {"reload", "reload", "reads configuration and model anew, without a jump of the axes",
+    {"cycle-end", "cycle_end", "reports the end of a machining cycle", "end of cycle noted"},
+    {"reload", "reload", "reloads configuration and model without a jump of the axes",
      "configuration and model reloaded"},
 }};
 
@@ -103,7 +103,7 @@ int run_reference(const GlobalOptions& global, bool force) {
   // Earlier daemons do not report it.
   if (const double watched_s = number_of(answer, "watched_s"); watched_s < watched_enough_s)
     std::cout << "the temperatures have been watched for " << duration_text(watched_s)
-              << " only: whether the machine still warms slowly is not known\n";
+              << " only: slow warming cannot be excluded\n";
   return exit_success;
 }
 
@@ -164,13 +164,14 @@ void add_measured_command(CLI::App& app, const GlobalOptions& global, Action& ac
          "--sd", given->sd_um,
          "its standard deviation in um; else noise_um of [correction], of a part twice that")
       ->type_name("UM");
-  sub->add_option("--source", given->source,
-                  "probe; part: measured on a part; wear: the same, and its negative has been "
-                  "entered at the controller, so that the compensation must not take it out again")
+  sub->add_option(
+         "--source", given->source,
+         "probe; part: measured on a part; wear: the same, and its negative has been entered at "
+         "the controller, so that the compensation must not compensate it again")
       ->check(CLI::IsMember({"probe", "part", "wear"}));
-  sub->add_option("--ago", given->ago_min,
-                  "so many minutes ago the part was cut: what the compensation did since then is "
-                  "taken into account")
+  sub->add_option(
+         "--ago", given->ago_min,
+         "minutes since the part was cut: later changes of the compensation are taken into account")
       ->check(CLI::Range(0.0, 120.0))
       ->type_name("MIN");
   sub->add_flag("--confirm", given->confirm, "it is right though the model contradicts it");
@@ -191,18 +192,18 @@ int run_candidate(const GlobalOptions& global, const std::string& file) {
   const bool is_none = file == "none";
   run_beside(global.socket, is_none ? fs::path() : fs::absolute(file));
   if (is_none) {
-    std::cout << "no candidate runs beside the model\n";
+    std::cout << "no candidate is running\n";
     return exit_success;
   }
   std::cout << fs::absolute(file).string()
-            << ": runs beside the model, and thermocomp status says how it does. To keep it over a "
+            << ": runs as the candidate; thermocomp status shows its score. To keep it after a "
                "restart: [model] candidate in the configuration\n";
   return exit_success;
 }
 
 void add_candidate_command(CLI::App& app, const GlobalOptions& global, Action& action) {
-  CLI::App* candidate = app.add_subcommand(
-      "candidate", "a second model runs beside the one in use and is never sent");
+  CLI::App* candidate =
+      app.add_subcommand("candidate", "runs a second model that is scored and never sent");
   const auto file = std::make_shared<std::string>();
   candidate->add_option("FILE", *file, "model file that the daemon can read, or none")->required();
   candidate->callback([&global, &action, file] {
@@ -233,19 +234,18 @@ void add_operate_commands(CLI::App& app, const GlobalOptions& global, Action& ac
   add_measured_command(app, global, action);
   add_candidate_command(app, global, action);
   add_promote_command(app, global, action);
-  add_axis_command(
-      app, global, action, "prove",
-      "moves one axis a few um and back, to confirm the sign with an indicator; waits, and "
-      "says what was read back",
-      "by how much, in um", [](const GlobalOptions& options, const AxisValue& given) {
-        return run_prove(options, given.axis, given.value_um);
-      });
+  add_axis_command(app, global, action, "prove",
+                   "moves one axis a few um and back, to confirm the sign with an indicator; "
+                   "waits, and reports the read-back",
+                   "distance in um", [](const GlobalOptions& options, const AxisValue& given) {
+                     return run_prove(options, given.axis, given.value_um);
+                   });
   add_named_command(app, global, action, "release",
-                    "drives an axis again after what made it apply something else was mended",
-                    "AXIS", "name of the axis in the configuration", run_release);
+                    "drives an axis again after the cause of its mismatch was corrected", "AXIS",
+                    "name of the axis in the configuration", run_release);
   add_named_command(app, global, action, "accept",
-                    "confirms the value of a sensor that jumped, or that is too new to count",
-                    "SENSOR", "name of the sensor in the configuration", run_accept);
+                    "confirms the value of a sensor that jumped or is still unconfirmed", "SENSOR",
+                    "name of the sensor in the configuration", run_accept);
 }
 
 }  // namespace thermocomp::cli

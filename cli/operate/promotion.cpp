@@ -24,7 +24,7 @@ std::string text_of_model(const fs::path& path) {
 fs::path candidate_in(const json& status) {
   if (!status.contains("candidate"))
     throw Failure(
-        "no candidate runs beside the model: thermocomp candidate FILE, or [model] candidate in "
+        "no candidate is running: thermocomp candidate FILE, or [model] candidate in "
         "the configuration and thermocomp reload");
   const json& candidate = status["candidate"];
   const std::string problem = text_of(candidate, "problem");

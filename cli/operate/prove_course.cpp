@@ -70,11 +70,12 @@ std::string ProveCourse::verdict(const std::string& axis) const {
                            " at the end, from where it began";
   if (!over()) return name + "the move is not over: " + progress() + "\n";
   if (!reads_back())
-    return name + (went() ? "moved and came back, by what was sent: " : "was NOT sent as asked: ") +
+    return name +
+           (went() ? "moved and came back, by what was sent: " : "was NOT sent as commanded: ") +
            um(farthest_.sent_um) + "; the controller reads nothing back, so only an indicator " +
            "shows whether it moved\n";
   if (passed()) return name + "moved and came back: " + ends + "\n";
-  std::string what = went() ? "moved, but did NOT come back: " : "did NOT move as asked: ";
+  std::string what = went() ? "moved, but did NOT come back: " : "did NOT move as commanded: ";
   if (!went() && std::abs(farthest_.sent_um - move_um_) > tolerance_um_)
     what = "was NOT moved all the way by the daemon (its bound, or it was ended): ";
   else if (!went() && std::abs(farthest_.read_um + move_um_) <= tolerance_um_)

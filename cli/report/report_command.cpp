@@ -42,7 +42,7 @@ int run_report(const ReportOptions& options) {
   std::error_code error;
   if (options.output != "-" &&
       std::filesystem::equivalent(options.history, options.output, error) && !error)
-    throw Failure(options.output + ": is what is read; the output must be another file");
+    throw Failure(options.output + ": is the input; the output must be another file");
   const WallSpan recorded = recorded_span(options.history);
   WallSpan span;
   span.to_s = moment_of(options.to, recorded.to_s, recorded);
@@ -62,10 +62,10 @@ int run_report(const ReportOptions& options) {
 
 void add_report_command(CLI::App& app, Action& action) {
   const auto options = std::make_shared<ReportOptions>();
-  CLI::App* sub = app.add_subcommand(
-      "report",
-      "the last week of a machine for its owner, as a page: hours compensated and why not more, "
-      "offsets, probings, sensors, buses, what to do");
+  CLI::App* sub =
+      app.add_subcommand("report",
+                         "page about a machine's last week for its owner: compensated hours and "
+                         "reasons for the rest, offsets, probings, sensors, buses, actions");
   sub->add_option("HISTORY", options->history, "history of thermocompd")
       ->type_name("FILE")
       ->required();

@@ -149,8 +149,8 @@ void add_suspicions(const MachineWeek& week, std::vector<std::string>& lines) {
         "Sensor " + outages.subject.name + " is suspected: " + what_text(outages.last) + ", " +
         std::to_string(outages.count) + (outages.count == 1 ? " time, " : " times, ") +
         duration_text(outages.lasted_s) + " in all" + (outages.lasts ? ", and still" : "") +
-        ". Do: check its contact, its place and its wiring; hold a thermometer beside "
-        "it. Where it is right as it is, take a new reference: thermocomp reference.");
+        ". Do: check its contact, its place and its wiring; compare it with a thermometer. If the "
+        "reading is correct, take a new reference: thermocomp reference.");
   }
 }
 
@@ -169,7 +169,7 @@ void add_sensors(const MachineWeek& week, std::vector<std::string>& lines) {
     if (is_suspected(week, sensor.name) || is_suspected(week, sensor.neighbour)) continue;
     lines.push_back("Sensor " + sensor.name + " drifted by " + figure_text(sensor.drift_K) +
                     " K against " + sensor.neighbour +
-                    ", which otherwise moves like it: look at how both are fixed, and compare them "
+                    ", which otherwise moves like it: check how both are fixed, and compare them "
                     "with a thermometer.");
   }
 }
@@ -178,17 +178,17 @@ void add_axes(const MachineWeek& week, std::vector<std::string>& lines) {
   for (const AxisWeek& axis : week.axes) {
     const std::string unit = axis.unit == "urad" ? " µrad" : " µm";
     if (axis.sent.at_bound_share > bound_listed_share)
-      lines.push_back("Axis " + axis.name + " stood at its bound of " + figure_text(axis.bound_um) +
+      lines.push_back("Axis " + axis.name + " was at its bound of " + figure_text(axis.bound_um) +
                       unit + " for " + figure_text(100.0 * axis.sent.at_bound_share) +
-                      " % of the time: what lies beyond is not taken out. Find out why it is so "
-                      "much before the bound is raised.");
+                      " % of the time: displacement beyond it is not compensated. Find the cause "
+                      "before the bound is raised.");
     double claimed_um = 0.0;
     std::size_t count = 0;
     const double left_um = rms_left_um(week, axis.name, claimed_um, count);
     if (count > 0 && left_um > left_listed_um && left_um > left_listed_share * claimed_um)
       lines.push_back("Probings of " + axis.name + " found " + figure_text(left_um) + unit +
                       " left (RMS of " + std::to_string(count) +
-                      "): export the week and let thermocomp diagnose name what the model lacks.");
+                      "): export the week and find the missing effects with thermocomp diagnose.");
   }
 }
 
@@ -210,10 +210,10 @@ std::vector<std::string> advice(const MachineWeek& week) {
         "with measured displacement, then switch it on.");
   else if (week.probings.empty() && week.mode_s("compensating") > 0.0)
     lines.emplace_back(
-        "Nobody probed the tool in this time, so the error left at it is not known: "
+        "The tool was not probed in this time, so its remaining error is unknown: "
         "measure it once warm and enter it: thermocomp measured AXIS UM.");
   if (!week.damage.empty())
-    lines.emplace_back("Parts of the history are damaged: thermocomp history check says which.");
+    lines.emplace_back("Parts of the history are damaged: see thermocomp history check.");
   return lines;
 }
 

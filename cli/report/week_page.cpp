@@ -70,7 +70,7 @@ std::string time_table(const MachineWeek& week) {
     const double seconds = week.mode_s(mode);
     add(mode_words(mode), std::floor(seconds), std::floor(tenths * seconds / whole_s));
   }
-  add("mode not known, and what rounding leaves", rest_s, rest);
+  add("unknown mode, and rounding", rest_s, rest);
   rows.push_back({"the whole", duration_text(whole_s), "100 %"});
   return html_table(rows);
 }
@@ -149,11 +149,10 @@ std::string probings_part(const MachineWeek& week) {
   }
   html += html_table(rows);
   if (week.candidate)
-    html += html_paragraph(
-        "A model that runs beside and is not used: " + candidate_text(*week.candidate) + ".");
+    html += html_paragraph("Candidate model, not in use: " + candidate_text(*week.candidate) + ".");
   return html + html_paragraph(
-                    "Left: what the probing found with the offset of that moment. In a dry run "
-                    "nothing was sent: the offset and the rest that would have been.",
+                    "Left: displacement found by the probing with the offset of that time. In a "
+                    "dry run nothing was sent: both are hypothetical.",
                     "small");
 }
 
@@ -178,10 +177,10 @@ std::string sensors_part(const MachineWeek& week) {
   }
   return html_heading("Sensors") + html_table(rows) +
          html_paragraph(
-             "Suspected: the time in which the daemon found the sensor against what its neighbours "
-             "said of it. Drift: of the difference to the sensor that moved most like it, over the "
-             "whole time, beside what follows from that one's own course; ± two standard "
-             "deviations, six hours counted as one independent value.",
+             "Suspected: time during which the sensor contradicted its neighbours. Drift: of the "
+             "difference to the sensor that moved most like it, over the whole time, apart from "
+             "what that sensor's course explains; ± two standard deviations, six hours counted as "
+             "one independent value.",
              "small");
 }
 

@@ -69,21 +69,20 @@ void judge(const CanSignal& signal, const CanFrame& frame, const PlausibleRange&
   result.fault = decoded.fault;
   result.temp_degC = decoded.value;
   if (decoded.fault == Fault::bad_frame) {
-    result.why = "the frame has " + std::to_string(payload.size()) + " bytes, too few";
+    result.why = "the frame has " + std::to_string(payload.size()) + " bytes, which is too few";
     return;
   }
   if (decoded.fault != Fault::none) {
     CanSignal alone = signal;
     alone.status.reset();
-    result.why = decode(payload, alone).fault == Fault::none ? "the status beside it says so"
+    result.why = decode(payload, alone).fault == Fault::none ? "according to its status"
                                                              : "the device's code for it";
     return;
   }
   if (decoded.value >= range.min_degC && decoded.value <= range.max_degC) return;
   result.fault = Fault::out_of_range;
-  result.why = short_number(decoded.value) + " degC is no temperature of [" +
-               short_number(range.min_degC) + ", " + short_number(range.max_degC) +
-               "] ([screening])";
+  result.why = short_number(decoded.value) + " degC is outside [" + short_number(range.min_degC) +
+               ", " + short_number(range.max_degC) + "] ([screening])";
   CanSignal other = signal;
   other.byte_order = signal.byte_order == ByteOrder::little_endian ? ByteOrder::big_endian
                                                                    : ByteOrder::little_endian;
@@ -113,12 +112,12 @@ void add_id_hint(const CanSignal& signal, const Heard& heard, ScanChannel& resul
   for (const auto& [id, count] : heard.frames) {
     if (id.id == signal.id && id.extended != signal.extended_id)
       result.hints.push_back(id_name(id) +
-                             " came: extended_id = " + (id.extended ? "true" : "false"));
+                             " was received: extended_id = " + (id.extended ? "true" : "false"));
     if (!signal.extended_id || !id.extended || ((id.id ^ signal.id) & group) != 0) continue;
     if (id.id == signal.id) continue;
     result.hints.push_back(
         id_name(id) +
-        " came, the same J1939 group from another address: give "
+        " was received, the same J1939 group from another address: give "
         "the sensor that id, or the message of the DBC file VFrameFormat J1939PG");
   }
 }
@@ -152,8 +151,9 @@ void take(const CanSignal& signal, const Heard& heard, std::size_t index, ScanVa
   const CanId id{signal.id, signal.extended_id};
   const auto& frame = heard.of_signal[index];
   if (!frame) {
-    shown.why = heard.frames.contains(id) ? "frames " + id_name(id) + " came, but none carries it"
-                                          : "no frame with identifier " + id_name(id) + " came";
+    shown.why = heard.frames.contains(id)
+                    ? "frames " + id_name(id) + " were received, but none has this value"
+                    : "no frame with identifier " + id_name(id) + " was received";
     return;
   }
   const auto payload = frame->payload();
@@ -161,9 +161,9 @@ void take(const CanSignal& signal, const Heard& heard, std::size_t index, ScanVa
   const CanValue decoded = decode(payload, signal);
   shown.value = decoded.value;
   if (decoded.fault == Fault::bad_frame)
-    shown.why = "the frame has " + std::to_string(payload.size()) + " bytes, too few";
+    shown.why = "the frame has " + std::to_string(payload.size()) + " bytes, which is too few";
   else if (decoded.fault != Fault::none)
-    shown.why = "is no finite number: compare length and byte order with the controller's side";
+    shown.why = "is not a finite number: compare length and byte order with the controller's side";
 }
 
 }  // namespace
@@ -171,7 +171,7 @@ void take(const CanSignal& signal, const Heard& heard, std::size_t index, ScanVa
 std::string heard_text(const FrameCounts& frames) {
   constexpr std::size_t text_max = 200;
   if (frames.empty())
-    return "not a single frame came: bit rate, termination (two of 120 Ohm), or nobody sends";
+    return "no frame was received: bit rate, termination (two of 120 Ohm), or no node sends";
   std::string text = "identifiers on the bus:";
   for (const auto& [id, count] : frames) {
     text.append(" ").append(id_name(id)).append(" (").append(std::to_string(count)).append(")");
@@ -220,7 +220,7 @@ ScanBus scan_bus(const CanBusConfig& config, const ScanSensors& sensors, const S
     if (!socket.error().empty()) bus.error = socket.error();
     bus.note = heard_text(heard.frames);
     if (heard.frames.empty() && bus.error.empty()) {
-      bus.note = "not a single frame came: bit rate, termination (two of 120 Ohm), or nobody sends";
+      bus.note = "no frame was received: bit rate, termination (two of 120 Ohm), or no node sends";
     }
   }
   fill(config, sensors, heard, bus);

@@ -27,7 +27,7 @@ std::string why_not(const CanopenChannel& channel, Fault fault, const RawReading
   if (status && bytes.size() >= bytes_needed(status->field)) {
     const std::uint64_t number = extract_raw(bytes, status->field);
     if (fault_of(*status, number) == fault) {
-      return hexadecimal("the status beside it is ", static_cast<std::uint32_t>(number), 2);
+      return hexadecimal("its status is ", static_cast<std::uint32_t>(number), 2);
     }
   }
   return "the bytes would be a value, but the node is in trouble, see above";
@@ -83,7 +83,7 @@ void find_canopen_nodes(const CanopenBusConfig& config, CanSocket& socket, ScanB
     if (configured.contains(node)) continue;
     unknown.append(unknown.empty() ? "" : ", ").append(std::to_string(node));
   }
-  bus.found = "nodes 1 to 127 searched: " + (all.empty() ? "none is there" : all + " are there");
+  bus.found = "nodes 1 to 127 searched: " + (all.empty() ? "none found" : all + " found");
   if (!unknown.empty()) bus.found += "; not in the configuration: " + unknown;
 }
 

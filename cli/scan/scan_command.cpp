@@ -95,11 +95,11 @@ void add_scan_command(CLI::App& app, Action& action) {
   sub->add_option("--listen", options->listen_s, "seconds to listen to a CAN bus for (default 3)")
       ->check(CLI::Range(0.1, 600.0));
   sub->add_flag("--read-only", options->read_only,
-                "do not try whether the controller takes writes. Else what stands in its registers "
-                "is written once more where every axis applies it already");
+                "do not test writes. Default: the registers' present values are written back if "
+                "every axis applies them already");
   sub->add_flag("--find", options->search.wanted,
-                "also ask the units and CANopen nodes that the configuration does not name");
-  sub->add_option("--units", options->units, "Modbus units that --find asks (default 1-32)")
+                "also request units and CANopen nodes outside the configuration");
+  sub->add_option("--units", options->units, "Modbus units for --find (default 1-32)")
       ->type_name("A-B");
   sub->callback([&action, options] { action = [options] { return run_scan(*options); }; });
 }

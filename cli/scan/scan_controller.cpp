@@ -173,7 +173,7 @@ class ControllerScan {
            ScanController& result) {
     if (!connection_.connect()) {
       result.error = "cannot be opened: " + connection_.last_error();
-      mark_all(read, written, "was not asked");
+      mark_all(read, written, "was not requested");
       return;
     }
     if (!ask_together(read, result)) {
@@ -265,8 +265,8 @@ class ControllerScan {
       return;
     }
     result.writes =
-        "writes are answered: what stands in the registers was written once more (whether a new "
-        "offset is taken, thermocomp status shows)";
+        "writes are answered: the registers' present values were written back (thermocomp status "
+        "shows whether a new offset is taken over)";
   }
 
   void ask_alone(Place& place) {
@@ -304,7 +304,8 @@ class ControllerScan {
                format_in(value.table, {value.encoding, value.word_order, value.scale, 0.0}), {});
     shown.value = decoded.value;
     if (decoded.fault != Fault::none)
-      shown.why = "is no finite number: compare encoding and word_order with the controller's side";
+      shown.why =
+          "is not a finite number: compare encoding and word_order with the controller's side";
   }
 
   [[nodiscard]] std::string why_not(const Exchange& exchange) const {
@@ -340,7 +341,7 @@ ScanController scan_modbus_controller(const DaemonConfig& config,
                    ": two masters on one line garble each other. Stop it first (systemctl stop "
                    "thermocompd)";
     for (std::vector<Place>* places : {&read, &written})
-      for (Place& place : *places) place.shown.why = "was not asked";
+      for (Place& place : *places) place.shown.why = "was not requested";
   } else {
     progress("controller " + modbus.name + ": reading its registers");
     const bool may_write = writes_back && !config.dry_run && !ask_running_daemon(config, result);

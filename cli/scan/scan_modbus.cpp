@@ -171,7 +171,7 @@ ScanDevice ModbusScan::scan(std::size_t index) {
     result.note = std::all_of(values_.begin(), values_.end(), is_ok)
                       ? "refuses to be read in one request, but answers for each register: "
                         "gap_registers_max = 0 or one_register_a_request = true"
-                      : "refuses to be read in one request; asked for each value alone";
+                      : "refuses one request for all values; each was requested alone";
   }
   for (std::size_t i = 0; i < device.channels.size(); ++i) {
     result.channels.push_back(evaluate(device, i));
@@ -225,7 +225,7 @@ void ModbusScan::judge_value(const ModbusDeviceConfig& device, const ModbusChann
     result.fault = decoded.fault;
     result.why = "the device's code for it";
     if (decoded.fault == Fault::open_circuit) {
-      result.hints.emplace_back("look at this channel's terminals: a thermocouple has a few ohms");
+      result.hints.emplace_back("check this channel's terminals: a thermocouple has a few ohms");
     }
     return;
   }
@@ -235,16 +235,15 @@ void ModbusScan::judge_value(const ModbusDeviceConfig& device, const ModbusChann
     result.fault = Fault::none;
     if (decoded.value == channel.offset_degC) {
       result.hints.emplace_back(
-          "the register is 0 exactly, as it is where a channel is switched off: warm the sensor");
+          "the register is exactly 0, as for a channel that is switched off: warm the sensor");
     }
     return;
   }
   result.fault = Fault::out_of_range;
-  result.why = std::isnan(decoded.value)
-                   ? std::string(nan_text().meaning)
-                   : short_number(decoded.value) + " degC is no temperature of [" +
-                         short_number(range.min_degC) + ", " + short_number(range.max_degC) +
-                         "] ([screening])";
+  result.why = std::isnan(decoded.value) ? std::string(nan_text().meaning)
+                                         : short_number(decoded.value) + " degC is outside [" +
+                                               short_number(range.min_degC) + ", " +
+                                               short_number(range.max_degC) + "] ([screening])";
   result.hints = hints_for_words(channel, words, range);
   result.likely_open_code = likely_open_code(channel, words);
   if (result.hints.empty()) hint_neighbours(device, channel, result);
@@ -294,7 +293,7 @@ void ModbusScan::hint_refused(const ModbusDeviceConfig& device, const ModbusChan
     result.hints.emplace_back("compare table with the manual: another function reads it there");
   else if (code == illegal_address || code == illegal_value)
     result.hints.emplace_back(
-        "this register is not there: compare table and address with the manual");
+        "this register does not exist: compare table and address with the manual");
   else
     result.hints.emplace_back("look this exception up in the device's manual");
 }
@@ -360,15 +359,15 @@ void ModbusScan::judge_silence(ScanBus& bus) {
     else if (nothing_came)
       bus.note = is_serial()
                      ? "no unit answers: baud, parity, A and B swapped, termination, or the units' "
-                       "numbers; --find asks other numbers"
-                     : "connected, but no unit answers: the unit numbers; --find asks others";
+                       "numbers; --find tries other numbers"
+                     : "connected, but no unit answers: the unit numbers; --find tries others";
     return;
   }
   for (ScanDevice& device : bus.devices) {
     if (device.answers) continue;
     device.note +=
         "; others on this bus do, so it is this unit's number, supply or wires "
-        "(--find asks other numbers)";
+        "(--find tries other numbers)";
   }
 }
 
@@ -400,7 +399,7 @@ void ModbusScan::find(const UnitSearch& search, ScanBus& bus) {
   bus.found = "units " + std::to_string(search.first) + " to " + std::to_string(search.last) +
               " searched: " + (numbers.empty() ? "none answers" : numbers + " answer");
   if (static_cast<int>(bus.found_numbers.size()) == count && count > 2) {
-    bus.found += "; a device that answers to every number looks at none";
+    bus.found += "; the device ignores the unit number";
   } else if (!unknown.empty()) {
     bus.found += "; not in the configuration: " + unknown;
   }
@@ -418,8 +417,8 @@ ScanBus scan_bus(const ModbusBusConfig& config, const ScanSensors& sensors, cons
     const SerialHolder holder = holder_of(rtu->device);
     if (holder.is_daemon) {
       bus.error = "is in use by " + holder.name +
-                  ": two masters on one line garble each other. Stop it first (systemctl stop "
-                  "thermocompd), or look at `thermocomp sensors`";
+                  ": two masters on one line disturb each other. Stop it first (systemctl stop "
+                  "thermocompd), or use `thermocomp sensors`";
       for (const ModbusDeviceConfig& device : config.devices) {
         bus.devices.push_back(without_answer(device, sensors, ""));
       }

@@ -70,12 +70,13 @@ ScanChannel show(const Reading& reading, const RawReading& raw, const Why& why, 
     result.age_s = static_cast<double>((now - reading.taken_at).count()) * 1e-9;
   }
   if (reading.fault != Fault::none) {
-    result.why = raw.value.empty() ? "nothing came that carries it" : why(reading.fault, raw);
+    result.why =
+        raw.value.empty() ? "nothing with this value was received" : why(reading.fault, raw);
     return result;
   }
   if (reading.temp_degC >= range.min_degC && reading.temp_degC <= range.max_degC) return result;
   result.fault = Fault::out_of_range;
-  result.why = short_number(reading.temp_degC) + " degC is no temperature of [" +
+  result.why = short_number(reading.temp_degC) + " degC is outside [" +
                short_number(range.min_degC) + ", " + short_number(range.max_degC) +
                "] ([screening])";
   result.hints.emplace_back("compare type, scale and place with the manual");
@@ -91,7 +92,7 @@ std::string hexadecimal(const char* before, std::uint32_t value, int digits) {
 }
 
 std::string too_few(const RawReading& raw) {
-  return "only " + std::to_string(raw.value.size()) + " bytes came";
+  return "only " + std::to_string(raw.value.size()) + " bytes received";
 }
 
 ScanBus scan_protocol(ProtocolBus what, CanProtocol& protocol, const ScanSensors& sensors,

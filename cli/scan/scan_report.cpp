@@ -105,7 +105,7 @@ void append(std::string& text, const ScanController& controller, bool colours) {
   if (!controller.writes.empty()) text.append("    ").append(controller.writes).append("\n");
 }
 
-/// "9 of 11 places of the controller are there; missing: x_mm, heartbeat"
+/// "9 of 11 values of the controller are present; missing: x_mm, heartbeat"
 std::string controller_summary(const ScanController& controller) {
   std::string missing;
   std::size_t there = 0;
@@ -114,7 +114,7 @@ std::string controller_summary(const ScanController& controller) {
     if (!value.is_missing()) ++there;
   }
   return std::to_string(there) + " of " + std::to_string(controller.values.size()) +
-         " places of the controller are there" + missing + "\n";
+         " values of the controller are present" + missing + "\n";
 }
 
 ordered_json optional_number(const std::optional<double>& value) {
@@ -323,7 +323,7 @@ void hint_codes(const ModbusChannel& channel, std::span<const std::uint16_t> wor
   if (const auto code = likely_open_code(channel, words)) {
     const std::string number = std::to_string(*code);
     hints.push_back(number +
-                    " is what many modules send for a broken wire; if the manual says so: "
+                    " is what many modules send for a broken wire; if the manual confirms it: "
                     "open_circuit_codes = [" +
                     number + "]");
   }

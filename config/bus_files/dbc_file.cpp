@@ -136,7 +136,7 @@ class DbcReader {
         to_next_statement(line);
       }
       if (file_.flaws.size() < flaws_max) continue;
-      flaw(line, "", "", "has more than 1000 flaws before this line; is not read on", {});
+      flaw(line, "", "", "has more than 1000 flaws before this line; the rest is not read", {});
       drafts_.clear();
       return std::move(file_);
     }
@@ -250,7 +250,7 @@ class DbcReader {
 
   void read_signal(int line) {
     if (!in_message_) {
-      throw DbcSyntaxError{line, "SG_", "must stand below a message (BO_)"};
+      throw DbcSyntaxError{line, "SG_", "must follow a message (BO_)"};
     }
     if (in_broken_message_) return scan_.skip_line();
     Draft& draft = drafts_.back();
@@ -406,7 +406,8 @@ class DbcReader {
       long_names_.push_back(std::move(remark));
     } else if (attribute == frame_format) {
       if (scan_.word("BO_") != "BO_") {
-        throw DbcSyntaxError{line, std::string(frame_format), "must be said of a message (BO_)"};
+        throw DbcSyntaxError{line, std::string(frame_format),
+                             "must be an attribute of a message (BO_)"};
       }
       FormatRemark remark{read_remark(line), 0, {}};
       read_format(remark);
@@ -437,8 +438,7 @@ class DbcReader {
       const About about{draft->message.name, remark.signal};
       const auto place = static_cast<std::size_t>(draft - drafts_.data());
       if (!draft->multiplexing[index].page) {
-        flaw(remark.line, remark.signal, "", "is said to be multiplexed, but not by its SG_",
-             about);
+        flaw(remark.line, remark.signal, "", "has a multiplexor here, but not in its SG_", about);
       } else if (!pages.emplace(std::pair(place, index), &remark).second) {
         flaw(remark.line, remark.signal, "", "has two lists of ranges", about);
       }

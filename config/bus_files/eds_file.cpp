@@ -108,7 +108,7 @@ class EdsReader {
     }
     about_.reset();
     if (flaws_.size() >= flaws_max) objects_.clear();
-    if (objects_.empty()) flaw(0, "", "", "is no electronic data sheet: it has no object");
+    if (objects_.empty()) flaw(0, "", "", "is not an electronic data sheet: it has no objects");
     EdsFile file;
     for (auto& [address, object] : objects_) file.objects.push_back(std::move(object));
     file.flaws = std::move(flaws_);
@@ -155,7 +155,7 @@ class EdsReader {
     about_ = address_of(lower(name));
     const auto [found, is_new] = sections_.try_emplace(lower(name), Section{name, line, {}});
     if (is_new) return &found->second;
-    flaw(line, "", name, "stands there twice, first in line " + std::to_string(found->second.line));
+    flaw(line, "", name, "appears twice, first in line " + std::to_string(found->second.line));
     nowhere_ = {};
     return &nowhere_;
   }
@@ -167,13 +167,13 @@ class EdsReader {
       return;
     }
     if (section == nullptr) {
-      flaw(line, "", content, "must stand in a section");
+      flaw(line, "", content, "must be in a section");
       return;
     }
     const std::string key(trimmed(content.substr(0, equal)));
     const std::string value(trimmed(content.substr(equal + 1)));
     const bool is_new = section->entries.try_emplace(lower(key), Entry{value, line}).second;
-    if (!is_new) flaw(line, key, value, "stands twice in its section");
+    if (!is_new) flaw(line, key, value, "appears twice in its section");
   }
 
   /// The object of a section name; nullopt: another section.
@@ -223,7 +223,7 @@ class EdsReader {
     const bool is_sub = key.size() > 4;
     const auto parent = sections_.find(key.substr(0, 4));
     if (is_sub && parent == sections_.end())
-      flaw(section.line, "", section.name, "is a part of an object that is not there");
+      flaw(section.line, "", section.name, "is part of a missing object");
     if (kind && *kind != object_variable && *kind != object_domain) {
       if (const auto compact = number_of(section, "CompactSubObj", 0)) {
         add_compact(*address, section, own, *compact);
@@ -240,7 +240,7 @@ class EdsReader {
     if (type) object.type = type_of(*type);
     // 1018sub1 and 1018sub01 are the same address.
     if (!objects_.try_emplace(address, std::move(object)).second) {
-      flaw(section.line, "", section.name, "is an object that stands there already");
+      flaw(section.line, "", section.name, "is a duplicate object");
     }
   }
 

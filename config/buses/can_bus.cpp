@@ -30,7 +30,7 @@ class CanSection final : public BusSection {
     refuse_all(table,
                {"host", "port", "device", "baud", "parity", "data_bits", "stop_bits", "rs485",
                 "timeout_ms", "inter_frame_delay_ms", "backoff_s_max", "retries"},
-               "makes no sense for kind = \"can\"");
+               "does not apply to kind = \"can\"");
     database_ = files.dbc.read(table);
   }
 
@@ -38,13 +38,13 @@ class CanSection final : public BusSection {
     refuse_all(table,
                {"unit", "period_s", "registers_per_request_max", "gap_registers_max",
                 "one_register_a_request", "renewal", "table", "encoding", "word_order"},
-               "makes no sense on a CAN bus");
+               "does not apply on a CAN bus");
     bus_.devices.push_back({name, {}});
   }
 
   void read_channel(const ChannelTables& tables, std::size_t device) override {
     refuse_all(tables.sensor, {"table", "address", "encoding", "word_order"},
-               "makes no sense on a CAN bus");
+               "does not apply on a CAN bus");
     CanChannel channel = read_can_channel(tables.sensor, tables.device, database_);
     channel.sensor = tables.index;
     files_.note_place(tables, place_of(bus_.interface, channel.signal));

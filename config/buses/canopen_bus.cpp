@@ -60,7 +60,7 @@ void mark_flaws(EdsFile& eds, const TomlTable& table, std::optional<ObjectAddres
 Place by_name(const TomlTable& table, const CanopenDevice& known, const EdsFiles& eds_files) {
   Place place;
   const std::string name = table.text("object");
-  refuse_all(table, {"index", "sub"}, "cannot stand beside object");
+  refuse_all(table, {"index", "sub"}, "cannot be combined with object");
   if (name.empty()) return place;
   if (!known.eds) {
     place.unknown = true;
@@ -74,17 +74,17 @@ Place by_name(const TomlTable& table, const CanopenDevice& known, const EdsFiles
     place.type = found.front()->type;
     mark_flaws(*known.eds, table, place.object);
     place.unknown = !place.type && !table.has("type");
-    if (place.unknown) table.problem("object", "is no number in the data sheet; type makes it one");
+    if (place.unknown) table.problem("object", "is not a number in the data sheet; give its type");
     return place;
   }
   place.unknown = true;
   if (!found.empty()) {
-    table.problem("object", "is not clear; may be " + found[0]->name + " or " + found[1]->name);
+    table.problem("object", "is ambiguous: " + found[0]->name + " or " + found[1]->name);
     return place;
   }
   mark_flaws(*known.eds, table, std::nullopt);
   const std::string near = nearest_name(name, short_and_long_names(*known.eds));
-  std::string rule = "is no object of the data sheet";
+  std::string rule = "is not an object of the data sheet";
   if (!near.empty()) rule.append("; did you mean ").append(near).append("?");
   table.problem("object", rule);
   return place;
@@ -118,7 +118,7 @@ std::uint32_t read_cob_id(const TomlTable& own, const TomlTable& base, int node)
   const bool has_own = own.has("cob_id") || own.has("pdo");
   const TomlTable& table = has_own ? own : base;
   if (table.has("cob_id")) {
-    table.refuse("pdo", "cannot stand beside cob_id");
+    table.refuse("pdo", "cannot be combined with cob_id");
     const auto cob_id = table.integer<std::uint32_t>("cob_id", 0, standard_id_max, 0);
     if (!can_be_tpdo(cob_id)) {
       table.problem("cob_id", "is kept for other messages; a TPDO is in [0x101, 0x57F]");
@@ -209,7 +209,7 @@ void read_way(const TomlTable& sensor, const TomlTable& device, const CanopenDev
   const bool polled = sensor.has("poll_s") || (device.has("poll_s") && !sensor.has("start_bit"));
   if (place.object || place.unknown) {
     channel.object = place.object.value_or(ObjectAddress{});
-    refuse_all(sensor, {"start_bit", "cob_id", "pdo"}, "cannot stand beside an object");
+    refuse_all(sensor, {"start_bit", "cob_id", "pdo"}, "cannot be combined with an object");
     channel.way = polled ? CanopenWay::sdo : CanopenWay::pdo_object;
     const Range range = Range::between(0.02, 3600.0);
     channel.poll_s = sensor.number("poll_s", range, device.number("poll_s", range, 1.0));
@@ -286,7 +286,7 @@ CanopenDevice read_canopen_device(const TomlTable& table, const std::string& nam
     if (std::any_of(known.begin(), known.end(),
                     [&](const CanopenMapping& each) { return each.cob_id == mapping.cob_id; })) {
       entry.problem(entry.has("cob_id") ? "cob_id" : "pdo", std::to_string(mapping.cob_id),
-                    "is the COB-ID of a TPDO of this device already");
+                    "is already the COB-ID of a TPDO of this device");
     }
     node.mappings.push_back(std::move(mapping));
   }
@@ -294,7 +294,7 @@ CanopenDevice read_canopen_device(const TomlTable& table, const std::string& nam
     const int pdo = static_cast<int>(number);
     const auto& read = node.mappings_read;
     if (std::find(read.begin(), read.end(), pdo) != read.end()) {
-      table.problem("read_mappings", std::to_string(pdo), "is there twice");
+      table.problem("read_mappings", std::to_string(pdo), "is listed twice");
     } else {
       node.mappings_read.push_back(pdo);
     }
@@ -342,13 +342,13 @@ void check_canopen_node(const TomlTable& device, const CanopenBusConfig& bus,
   if (node.node == bus.own_node) device.problem("node", "is our own (own_node of the bus)");
   for (const CanopenNodeConfig& other : bus.nodes) {
     if (other.node == node.node) {
-      device.problem("node", "is that of the device " + other.name + " already");
+      device.problem("node", "is already that of the device " + other.name);
     }
     for (const CanopenMapping& a : other.mappings) {
       for (const CanopenMapping& b : node.mappings) {
         if (a.cob_id != b.cob_id) continue;
         device.problem("mapping", std::to_string(a.cob_id),
-                       "is the COB-ID of a TPDO of the device " + other.name + " already");
+                       "is already the COB-ID of a TPDO of the device " + other.name);
       }
     }
   }
@@ -369,7 +369,7 @@ void check_canopen_channel(const TomlTable& sensor, const CanopenBusConfig& bus,
                     [&](const CanopenMapping& each) { return each.cob_id == channel.signal.id; });
     if (!in_channel && !in_mapping) continue;
     sensor.problem(sensor.has("cob_id") ? "cob_id" : "pdo", std::to_string(channel.signal.id),
-                   "is the COB-ID of a TPDO of the device " + other.name + " already");
+                   "is already the COB-ID of a TPDO of the device " + other.name);
     return;
   }
 }

@@ -83,7 +83,7 @@ void to_degC(const TomlTable& own, const TomlTable& base, const std::string& in_
     (is_given ? source : own)
         .problem(is_given ? "unit" : "signal", text,
                  std::string(is_given ? "" : "the unit of the signal in the DBC file ") +
-                     "is none of temperatures; unit = \"degC\", \"K\" or \"degF\" says which");
+                     "is not a temperature unit; give unit = \"degC\", \"K\" or \"degF\"");
     return;
   }
   place.scale *= unit->factor;
@@ -111,7 +111,7 @@ const DbcMessage* find_message(const TomlTable& own, const TomlTable& base, DbcF
   const bool is_short = message->declared_fd == false && !own.has("fd") && !base.has("fd");
   if (several || (message->bytes > classic_bytes_max && is_short)) {
     std::string rule = "has " + std::to_string(message->bytes) + " bytes in the DBC file, " +
-                       (several ? "more than a frame" : "but is no CAN FD frame");
+                       (several ? "more than a frame" : "but is not a CAN FD frame");
     if (message->is_group) rule += "; a bus of kind = \"j1939\" reads it by pgn";
     source.problem("message", rule);
     return nullptr;
@@ -157,7 +157,7 @@ void add_group_codes(CanSignal& signal) {
 
 CanChannel read_by_name(const TomlTable& own, const TomlTable& base, const CanDatabase& database) {
   for (const TomlTable& table : {own, base}) {
-    refuse_all(table, {"multiplexor", "multiplexor_value"}, "is what the DBC file says");
+    refuse_all(table, {"multiplexor", "multiplexor_value"}, "is given by the DBC file");
   }
   CanChannel channel;
   const std::string name = own.text("signal");
@@ -201,7 +201,7 @@ CanDatabase DbcFiles::read(const TomlTable& bus) {
 CanChannel read_can_channel(const TomlTable& own, const TomlTable& base,
                             const CanDatabase& database) {
   if (own.has("signal")) return read_by_name(own, base, database);
-  refuse_all(own, {"message"}, "makes no sense without the signal's name (signal)");
+  refuse_all(own, {"message"}, "does not apply without the signal's name (signal)");
   CanChannel channel;
   channel.signal = read_can_signal(own, base, CanUse::temperature);
   channel.counter = read_can_field(own, base, "counter", channel.signal.fd);

@@ -79,10 +79,10 @@ J1939NodeConfig read_j1939_device(const TomlTable& table, const std::string& nam
   }
   for (const J1939NodeConfig& other : bus.nodes) {
     if (node.address && other.address == node.address) {
-      table.problem("address", "is that of the device " + other.name + " already");
+      table.problem("address", "is already that of the device " + other.name);
     }
     if (node.name_claimed && other.name_claimed == node.name_claimed) {
-      table.problem("j1939_name", "is that of the device " + other.name + " already");
+      table.problem("j1939_name", "is already that of the device " + other.name);
     }
   }
   // Reported already; completes the node for what is built from it.

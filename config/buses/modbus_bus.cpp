@@ -12,7 +12,7 @@ class ModbusSection final : public BusSection {
       : files_(files) {
     bus_.name = name;
     bus_.line = read_modbus_line(table, kind);
-    refuse_all(table, {"interface", "dbc"}, "makes no sense on a Modbus bus");
+    refuse_all(table, {"interface", "dbc"}, "does not apply on a Modbus bus");
     if (const auto* rtu = std::get_if<ModbusRtu>(&bus_.line.link)) {
       if (!rtu->device.empty() && !files.serial_lines.try_emplace(rtu->device, *rtu).second) {
         table.problem("device", "is used by two buses: put the devices of a line on one bus");

@@ -31,12 +31,12 @@ std::vector<std::string> names_in(const std::vector<fs::path>& folders) {
 std::string unknown_rule(const std::string& name, const std::vector<fs::path>& folders) {
   std::vector<std::string> names = names_in(folders);
   const std::string near = nearest_name(name, names);
-  if (!near.empty()) return "is no preset; did you mean \"" + near + "\"?";
+  if (!near.empty()) return "is not a preset; did you mean \"" + near + "\"?";
   const auto others = std::stable_partition(
       names.begin(), names.end(),
       [&](const std::string& known) { return known.find(name) != std::string::npos; });
   if (others != names.begin()) names.erase(others, names.end());
-  std::string rule = "is no preset; there are: ";
+  std::string rule = "is not a preset; available: ";
   for (const std::string& known : names) rule.append(known).append(" ");
   if (names.empty()) rule += "none ";
   rule += "(looked in";
@@ -62,7 +62,7 @@ Preset read_preset(const TomlDocument& document) {
       "protocol",
       {{"modbus", "modbus"}, {"can", "can"}, {"canopen", "canopen"}, {"j1939", "j1939"}});
   refuse_all(preset.device, {"name", "bus", "preset", "thermocouple"},
-             "belongs into the configuration");
+             "belongs in the configuration");
   std::set<std::string> types;
   for (const TomlTable& table : root.tables("thermocouple")) {
     preset.thermocouples.emplace(unique_name(table, types), table);
@@ -92,7 +92,7 @@ std::string list_keys(const Entries& entries) {
 const TomlTable* thermocouple_of(const TomlTable& table, const Preset& preset) {
   if (!table.has("thermocouple")) return nullptr;
   if (preset.thermocouples.empty()) {
-    table.problem("thermocouple", "makes no sense: the module sends degC whatever its type is");
+    table.problem("thermocouple", "does not apply: the module sends degC for every type");
     return nullptr;
   }
   const auto found = preset.thermocouples.find(table.text("thermocouple"));

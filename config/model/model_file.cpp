@@ -63,7 +63,7 @@ bool read_names(const TomlTable& root, std::string_view key, std::size_t count_m
 void read_reference(const TomlTable& root, ThermalModel& model) {
   if (root.is_text("reference")) {
     if (root.text("reference") != "first_sample") {
-      root.problem("reference", "must be \"first_sample\" or a list of numbers, one an input");
+      root.problem("reference", "must be \"first_sample\" or a list of numbers, one per input");
     }
     return;
   }
@@ -71,7 +71,7 @@ void read_reference(const TomlTable& root, ThermalModel& model) {
   const std::size_t count = model.reference_degC.size();
   if (root.has("reference") && count != model.inputs.size()) {
     root.problem("reference", std::to_string(count) + " values",
-                 "must be \"first_sample\" or have one value an input (" +
+                 "must be \"first_sample\" or have one value per input (" +
                      std::to_string(model.inputs.size()) + ")");
   }
 }
@@ -142,8 +142,8 @@ void check_column_and_temperature(const TomlTable& table, const SubjectColumns& 
   if (!(temperature(acts) || (is_column_name(acts) && is_operating(acts))) ||
       !temperature(columns.second)) {
     table.problem("subject",
-                  "must be what acts (a temperature or an operating signal) and the temperature "
-                  "that its effect depends on, as \"a_rpm|room_degC\"");
+                  "must be a cause (a temperature or an operating signal) and the temperature that "
+                  "its effect depends on, such as \"a_rpm|room_degC\"");
   }
 }
 
@@ -222,7 +222,7 @@ void read_bank_subjects(const TomlTable& table, LagBankSpec& bank) {
   bank.powers = table.numbers("powers", Range::between(1, 2), {});
   if (table.has("powers") && bank.powers.size() != bank.subjects.size()) {
     table.problem("powers", std::to_string(bank.powers.size()) + " values",
-                  "must have one value a subject (" + std::to_string(bank.subjects.size()) + ")");
+                  "must have one value per subject (" + std::to_string(bank.subjects.size()) + ")");
   }
   std::set<std::pair<std::string, double>> seen;
   for (std::size_t i = 0; i < bank.subjects.size(); ++i) {
@@ -328,7 +328,7 @@ std::vector<double> read_factors(const TomlTable& table, std::string_view key, s
   std::vector<double> factors = table.numbers(key, Range::between(0, 1e6), {});
   if (table.has(key) && factors.size() != inputs) {
     table.problem(key, std::to_string(factors.size()) + " values",
-                  "must have one value an input (" + std::to_string(inputs) + ")");
+                  "must have one value per input (" + std::to_string(inputs) + ")");
   }
   return factors;
 }

@@ -68,7 +68,7 @@ std::vector<RecordedCourse::Point> read_points(const TomlTable& table, std::size
   const std::vector<double> since_s = table.numbers("since_s", Range::between(0, 1e9));
   if (table.has("since_s") && since_s.size() != phases.size())
     table.problem("since_s", std::to_string(since_s.size()) + " values",
-                  "must have one value a point (" + std::to_string(phases.size()) + ")");
+                  "must have one value per point (" + std::to_string(phases.size()) + ")");
   const auto rise_K = table.matrix("rise_K", phases.size(), inputs);
   const auto gain = table.matrix("gain", phases.size(), groups);
   const auto sd = table.matrix("gain_sd", phases.size(), groups);
@@ -188,8 +188,8 @@ bool read_columns(const TomlTable& table, const ThermalModel& model, MadeFrom& m
     table.problem("columns", "must name at least one column");
   }
   if (!known) return false;
-  made_from.low = numbers_for(table, "low", made_from.columns.size(), "a column");
-  made_from.high = numbers_for(table, "high", made_from.columns.size(), "a column");
+  made_from.low = numbers_for(table, "low", made_from.columns.size(), "per column");
+  made_from.high = numbers_for(table, "high", made_from.columns.size(), "per column");
   for (std::size_t i = 0; i < std::min(made_from.low.size(), made_from.high.size()); ++i) {
     if (!(made_from.low[i] <= made_from.high[i])) {
       table.problem("high", "must not be below low");
@@ -231,7 +231,7 @@ void read_domain(const TomlTable& table, MadeFrom& made_from) {
     table.ignore_rest();
     return;
   }
-  made_from.mean = numbers_for(table, "mean", count, "a feature");
+  made_from.mean = numbers_for(table, "mean", count, "per feature");
   made_from.covariance = table.matrix("covariance", count, count);
   if (!made_from.covariance.empty() && !is_positive_definite(made_from.covariance)) {
     table.problem("covariance", "matrix", "must be symmetric and positive definite");

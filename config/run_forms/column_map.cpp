@@ -17,10 +17,10 @@ void read_column(const TomlTable& table, const std::string& key, ColumnMap& map)
     column.name = entry.text("name");
     column.unit = entry.text("unit", "");
     if (!column.unit.empty() && spelled_unit(column.unit) == nullptr)
-      entry.problem("unit", "is no unit that is known here; docs/run_files.md lists them");
+      entry.problem("unit", "is not a known unit; docs/run_files.md lists them");
   }
   if (!is_column_name(column.name)) table.problem(key, column.name, column_name_rule);
-  if (column.name == "time_s") table.problem(key, "is said by the key time, not here");
+  if (column.name == "time_s") table.problem(key, "belongs in the key time");
   map.columns.emplace(key, column);
 }
 
@@ -39,7 +39,7 @@ ColumnMap parse_column_map(const std::string& text, const std::string& name) {
   if (root.has("thousands"))
     map.thousands = root.choice<char>("thousands", {{".", '.'}, {",", ','}, {"'", '\''}});
   if (map.thousands && map.decimal == map.thousands)
-    root.problem("thousands", "must not be the decimal sign too");
+    root.problem("thousands", "must differ from the decimal sign");
   map.header_line = root.integer("header_line", 1, 100000, 0);
   map.date_order = root.choice<DateOrder>("date_order",
                                           {{"day.month.year", DateOrder::day_month_year},

@@ -164,11 +164,11 @@ class ForeignReader {
     const auto at = std::adjacent_find(time_s.begin(), time_s.end(), is_not_later);
     const auto row = static_cast<std::size_t>(at - time_s.begin()) + 1;
     const std::size_t column = time.columns.empty() ? 0 : time.columns.back();
-    problems_.add(table_.lines[row], table_.header[column], table_.field(row, column),
-                  "must be later than in the row before (" +
-                      shortened(table_.field(row - 1, column)) +
-                      "); of a row per value write pivot = \"the column that names the series\" in "
-                      "the file of --columns");
+    problems_.add(
+        table_.lines[row], table_.header[column], table_.field(row, column),
+        "must be later than in the row before (" + shortened(table_.field(row - 1, column)) +
+            "); for one row per value write pivot = \"the column that names the series\" in "
+            "the file of --columns");
   }
 
   /// In autumn, local time is set back by an hour once, while the rows continue.
@@ -202,7 +202,7 @@ class ForeignReader {
     for (std::size_t row = table_.rows(); row-- > 0;)
       for (std::size_t i = 0; i < table_.columns(); ++i) fields.push_back(table_.field(row, i));
     table_.fields = std::move(fields);
-    run_.understood.emplace_back("the newest row stands first: turned");
+    run_.understood.emplace_back("the newest row is first: order reversed");
   }
 
   void say_layout() {
@@ -282,8 +282,7 @@ class ForeignReader {
       if (!meaning) continue;
       if (!is_mapped(header)) number_name(*meaning, seen);
       if (!seen.insert(meaning->name).second) {
-        refuse(i, "becomes " + meaning->name + ", which is there twice: write " +
-                      toml_text(header) +
+        refuse(i, "becomes " + meaning->name + ", which appears twice: write " + toml_text(header) +
                       " = \"another name\" under [columns] in the file of --columns");
         continue;
       }
@@ -292,7 +291,7 @@ class ForeignReader {
       meanings_.push_back(*meaning);
     }
     if (meanings_.empty() && problems_.empty())
-      problems_.add(0, "", "", "has no column of numbers beside the time");
+      problems_.add(0, "", "", "has no column of numbers besides the time");
   }
 
   /// Numbers columns of equal names: Temp_degC, Temp_2_degC.
@@ -308,7 +307,7 @@ class ForeignReader {
     const auto check = [&](const std::string& key, const std::string& header) {
       const auto count = std::count(table_.header.begin(), table_.header.end(), header);
       if (count == 1) return;
-      std::string rule = count > 1 ? "stands twice in " : "is no column of ";
+      std::string rule = count > 1 ? "appears twice in " : "is not a column of ";
       rule += run_.name;
       std::string near = nearest_name(header, table_.header);
       for (const std::string& each : table_.header)
@@ -346,7 +345,7 @@ class ForeignReader {
                                       : plain_name(spelled.base + "_" + spelled.unit);
       refuse(i,
              (spelled.unit.empty() ? std::string("has no unit")
-                                   : "has a unit that is not known here, " + spelled.unit) +
+                                   : "has an unknown unit, " + spelled.unit) +
                  ": write " + toml_text(header) + " = " + toml_text(example) +
                  " (or what it is; without a unit it is a signal) under [columns], or ignore = [" +
                  toml_text(header) + "], in the file of --columns");
@@ -355,7 +354,7 @@ class ForeignReader {
     Meaning meaning{i, own_name(spelled), {}};
     const bool own_unit = unit_of(meaning.name).suffix == spelled.known->suffix;
     if (plain_name(spelled.base).empty() || !own_unit || !is_plain(meaning.name)) {
-      refuse(i, "is no name that says what it is: write " + toml_text(header) +
+      refuse(i, "is not a descriptive name: write " + toml_text(header) +
                     " = \"its name\" under [columns] in the file of --columns");
       return std::nullopt;
     }
@@ -454,7 +453,7 @@ class ForeignReader {
     problems_.add(word_at_.first, word_at_.second, *words_.begin(),
                   "must be a number with a decimal " +
                       std::string(form_.decimal == ',' ? "comma" : "point") +
-                      ", or empty: where it stands for a missing value write missing = [" + list +
+                      ", or empty: if it means a missing value, write missing = [" + list +
                       (count > words_max ? ", ..." : "") + "], to leave the column out ignore = [" +
                       toml_text(word_at_.second) + "] in the file of --columns");
   }

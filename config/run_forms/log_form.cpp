@@ -26,7 +26,7 @@ std::optional<PlainTable> plain_table(std::string_view text, const std::string& 
   const forms::Log log{text, name, map == nullptr ? none : *map};
   if (trimmed(text.substr(0, 100)).starts_with('<'))
     log.refuse(1, "", shortened(text.substr(0, text.find('\n'))),
-               "is XML, no table that is known here; write its values as CSV or JSON lines");
+               "is XML, which is not a known table; write its values as CSV or JSON lines");
   for (const Form& form : known_forms)
     if (form.is(text)) return form.plain(log);
   return std::nullopt;

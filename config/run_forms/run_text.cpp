@@ -94,7 +94,7 @@ RunText run_text(std::string_view bytes, const std::string& name) {
   // A logger that lost power leaves preallocated zeros.
   while (!bytes.empty() && bytes.back() == '\0') bytes.remove_suffix(1);
   if (bytes.substr(0, 4096).find('\0') != std::string_view::npos)
-    refuse("is no text and no form that is known here; docs/run_files.md lists them");
+    refuse("is neither text nor a known form; docs/run_files.md lists them");
   if (is_utf8(bytes)) return {with_line_ends(std::string(bytes)), false};
   RunText converted{{}, true};
   converted.text.reserve(bytes.size() + bytes.size() / 8);

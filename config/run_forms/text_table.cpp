@@ -259,7 +259,7 @@ class TableReader {
     const bool is_table = cut_.fields > 1 && (cut_.values >= values_share_min || judged() == 1);
     if (!is_table)
       problems_.add(lines_[0].number, "", lines_[0].text,
-                    "is no table that is known here: rows of numbers and times between ; , tab | "
+                    "is not a known table: rows of numbers and times between ; , tab | "
                     "or blanks; docs/run_files.md lists the forms that are read");
     return is_table;
   }

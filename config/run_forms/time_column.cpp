@@ -335,7 +335,7 @@ class TimeReader {
         return stamp.allows != stamps.front().allows;
       });
       refuse(static_cast<std::size_t>(other - stamps.begin()) % stamps.size(),
-             "has day and month the other way round than a row before");
+             "has day and month in another order than an earlier row");
       return std::nullopt;
     }
     if (possible.size() == 1) return possible[0];
@@ -375,9 +375,9 @@ class TimeReader {
     if (time_.columns.size() == 2) run_.note += " and '" + table_.header[time_.columns[1]] + "'";
     if (first.has_date && !order) {
       run_.note +=
-          ", seconds after the first row; the date may begin with the day or the month, which only "
-          "--join asks for (date_order = \"day.month.year\" or \"month.day.year\" in the file of "
-          "--columns)";
+          ", seconds after the first row; the date may begin with the day or the month, which "
+          "matters only for --join (date_order = \"day.month.year\" or \"month.day.year\" in the "
+          "file of --columns)";
     } else if (first.has_date) {
       run_.note += *order == DateOrder::year_month_day   ? ", year-month-day"
                    : *order == DateOrder::month_day_year ? ", month/day/year"
@@ -535,10 +535,10 @@ std::optional<TimeColumns> find_time(const TextTable& table, const ColumnMap* ma
   if (map != nullptr && map->period_s) return TimeColumns{};
   if (!table.has_header)
     problems.add(table.lines.empty() ? 1 : table.lines[0], "names", "(missing)",
-                 "has no header that says which column is the time: write names = [\"time_s\", "
+                 "has no header that names the time: write names = [\"time_s\", "
                  "\"t1_degC\", ...], one for each of the " +
                      std::to_string(table.columns()) +
-                     " fields of a row, in the file of --columns (of import: --names "
+                     " fields per row, in the file of --columns (of import: --names "
                      "time_s,t1_degC,...), and period_s where no field is the time");
   else
     problems.add(table.header_line, "time_s", "(missing)",

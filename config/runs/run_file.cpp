@@ -126,7 +126,7 @@ class RunParser {
       } else if (!is_column_name(name)) {
         add(line_number_, where, name.empty() ? "(empty)" : name, std::string(column_name_rule));
       } else if (!seen.insert(name).second) {
-        add(line_number_, where, name, "is there twice");
+        add(line_number_, where, name, "is listed twice");
       }
       run_.columns.push_back(name);
     }
@@ -276,8 +276,8 @@ const std::vector<double>& RunFile::column(std::string_view column_name) const {
       rule += "; there is " + position + ", a position, which --columns can make a displacement";
     else if (is_output(column_name) && !has_displacement(columns))
       rule =
-          "nothing was measured in this file: `thermocomp measured AXIS UM` reports what an "
-          "indicator shows, a column *_um of your own holds what was measured beside";
+          "this file has no measured displacement: report indicator readings with `thermocomp "
+          "measured AXIS UM`, or add a column *_um";
     throw ConfigurationError({{this->name, 0, std::string(column_name), "(missing)", rule}});
   }
   return values[*index];

@@ -147,7 +147,7 @@ std::optional<CanStatus> read_can_status(const TomlTable& own, const TomlTable& 
 std::vector<CanSelector> read_selectors(const TomlTable& own, const TomlTable& base, bool fd) {
   const auto field = read_can_field(own, base, "multiplexor", fd);
   if (!field) {
-    own.refuse("multiplexor_value", "makes no sense without a multiplexor");
+    own.refuse("multiplexor_value", "does not apply without a multiplexor");
     return {};
   }
   const std::int64_t greatest = greatest_of(*field);
@@ -178,7 +178,7 @@ CanSignal read_can_signal(const TomlTable& own, const TomlTable& base, CanUse us
   CanSignal signal = file != nullptr ? *file : CanSignal{};
   read_place(own, base, file == nullptr, signal);
   if (use == CanUse::bits) {
-    refuse_all(own, {"scale", "signed", "float"}, "makes no sense for a count or bits");
+    refuse_all(own, {"scale", "signed", "float"}, "does not apply to a count or bits");
     signal.is_signed = false;
     return signal;
   }

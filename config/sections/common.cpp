@@ -44,7 +44,7 @@ std::vector<Sentinel> read_status_codes(const TomlTable& table, std::int64_t hig
   for (const std::int64_t good : table.integers("good_codes", 0, high, {})) {
     for (std::size_t i = 0; i < faults; ++i) {
       if (codes[i].code != good) continue;
-      table.problem("good_codes", std::to_string(good), "must not be the code of a fault too");
+      table.problem("good_codes", std::to_string(good), "must not also be the code of a fault");
     }
     codes.push_back({good, Fault::none});
   }

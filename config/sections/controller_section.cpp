@@ -115,8 +115,8 @@ class ControllerReader {
 
   void read_dry_run() {
     constexpr std::string_view rule =
-        "makes no sense for a controller of kind = \"dry_run\", which is none; to read a real one "
-        "and write nothing, give its own kind and dry_run = true";
+        "does not apply to kind = \"dry_run\", which has no controller; to read a real one without "
+        "writing, give its kind and dry_run = true";
     for (const std::string& key : table_.keys()) {
       if (key != "name" && key != "kind") table_.refuse(key, rule);
     }
@@ -128,7 +128,7 @@ class ControllerReader {
   }
 
   void read_linuxcnc() {
-    constexpr std::string_view rule = "makes no sense for kind = \"linuxcnc\": the bridge knows it";
+    constexpr std::string_view rule = "does not apply to kind = \"linuxcnc\": the bridge has it";
     BridgeControllerConfig config;
     config.name = name_;
     config.silent_after_s =
@@ -193,7 +193,7 @@ class ControllerReader {
       const auto of_bus = serial_lines.find(rtu->device);
       if (of_bus != serial_lines.end() && of_bus->second != *rtu)
         table_.problem("device",
-                       "is the line of a bus too: baud, parity, data_bits, stop_bits and "
+                       "is also the line of a bus: baud, parity, data_bits, stop_bits and "
                        "rs485 must be the same in both");
     }
     config.unit = read_unit(table_, config.line);
@@ -203,7 +203,7 @@ class ControllerReader {
         table_.integer("gap_registers_max", 0, 124, config.gap_registers_max);
     config.write_function = read_write_function(config.write_function);
     config.period_s = table_.number("period_s", Range::between(0.005, 60), config.period_s);
-    refuse_all(table_, {"interface", "silent_after_s"}, "makes no sense for a Modbus controller");
+    refuse_all(table_, {"interface", "silent_after_s"}, "does not apply to a Modbus controller");
     read_places(std::move(config), volts);
   }
 
@@ -217,7 +217,7 @@ class ControllerReader {
     refuse_all(table_,
                {"interface", "silent_after_s", "unit", "write_function",
                 "registers_per_request_max", "gap_registers_max", "ignore_transaction"},
-               "makes no sense for kind = \"s7\"");
+               "does not apply to kind = \"s7\"");
     for (const TomlTable& axis : axis_tables_) refuse_travel(axis);
     read_value_ = read_s7_value;
     read_places(std::move(config), false);
@@ -242,13 +242,13 @@ class ControllerReader {
   [[nodiscard]] int read_write_function(int otherwise) const {
     const int function = table_.integer("write_function", 6, 16, otherwise);
     if (function != ModbusControllerConfig::one_register && function != otherwise)
-      table_.problem("write_function", "must be 6 (one register a request) or 16");
+      table_.problem("write_function", "must be 6 (one register per request) or 16");
     return function;
   }
 
   /// A value of several registers would be written in parts.
   void check_single(const ModbusControllerConfig& config) const {
-    constexpr std::string_view rule = "must be of one register: write_function = 6 writes no more";
+    constexpr std::string_view rule = "must fit in one register with write_function = 6";
     for (std::size_t i = 0; i < config.axes.size(); ++i) {
       if (config.axes[i].travel)
         travel_table(axis_tables_[i]).problem("values", rule);
@@ -285,7 +285,7 @@ class ControllerReader {
   /// For an axis with a travel.
   static void refuse_plain_places(const TomlTable& axis) {
     refuse_all(axis, {"offset", "applied", "piezo"},
-               "makes no sense beside `line` or `table`, which has places of its own");
+               "cannot be combined with `line` or `table`, which has its own registers");
   }
 
   static ModbusAxis read_piezo_axis(const TomlTable& table, const AxisConfig& axis,
@@ -359,7 +359,7 @@ class ControllerReader {
     refuse_all(table_,
                {"host", "port", "unit", "device", "baud", "parity", "data_bits", "stop_bits",
                 "rs485", "timeout_ms", "inter_frame_delay_ms", "backoff_s_max", "retries"},
-               "makes no sense for kind = \"can\"");
+               "does not apply to kind = \"can\"");
     TakenBits sent;
     std::vector<std::optional<CanTravelSection>> travels;
     for (std::size_t i = 0; i < axes_.size(); ++i) {

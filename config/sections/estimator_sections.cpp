@@ -161,7 +161,7 @@ std::vector<AxisConfig> nodes_of(const TomlTable& table, const AxisConfig& axis,
                                  const std::set<std::string>& names) {
   const bool is_line = table.has("line");
   const std::string_view key = is_line ? "line" : "table";
-  if (is_line && table.has("table")) table.refuse("table", "makes no sense beside `line`");
+  if (is_line && table.has("table")) table.refuse("table", "cannot be combined with `line`");
   const TomlTable travel = table.table(key);
   TravelNode node;
   node.axis = axis.name;
@@ -263,7 +263,7 @@ CompensationConfig read_compensation(const TomlTable& table,
   config.cycle_end_signal = read_signal("cycle_end_signal");
   if (config.update == UpdateRule::continuous)
     refuse_all(table, {"cycles_per_update", "cycle_ahead"},
-               "makes no sense with update = \"continuous\"");
+               "does not apply with update = \"continuous\"");
   if (config.hold_while_cutting && !table.has("cutting_signal")) {
     table.problem("hold_while_cutting", "needs a cutting_signal");
   }

@@ -108,7 +108,7 @@ ModbusTcp read_tcp(const TomlTable& table, std::string_view kind) {
   }
   tcp.port = table.integer("port", 1, 65535, tcp.port);
   refuse_all(table, {"device", "baud", "parity", "data_bits", "stop_bits", "rs485"},
-             "makes no sense for kind = \"" + std::string(kind) + "\"");
+             "does not apply to kind = \"" + std::string(kind) + "\"");
   return tcp;
 }
 
@@ -132,7 +132,7 @@ ModbusRtu read_rtu(const TomlTable& table) {
   rtu.rs485 = table.flag("rs485", rtu.rs485);
   refuse_all(
       table, {"host", "port"},
-      "makes no sense for kind = \"modbus_rtu\", which is a serial port; serial frames through "
+      "does not apply to kind = \"modbus_rtu\", which is a serial port; serial frames through "
       "a serial server are kind = \"modbus_rtu_over_tcp\"");
   return rtu;
 }
@@ -193,7 +193,7 @@ ModbusStatus read_status(const TomlTable& table, int base_address) {
   status.table = table.choice("table", all_tables());
   status.address = read_address(table, status.table);
   if (is_bit_table(status.table)) {
-    table.refuse("mask", "makes no sense for a bit");
+    table.refuse("mask", "does not apply to a bit");
     status.codes = read_status_codes(table, 1, 1);
     return status;
   }
@@ -220,7 +220,7 @@ ModbusLine read_modbus_line(const TomlTable& table, std::string_view kind) {
   if (kind == "modbus_tcp" || kind == "modbus_udp")
     line.ignore_transaction = table.flag("ignore_transaction", line.ignore_transaction);
   else if (kind != "s7")
-    table.refuse("ignore_transaction", "makes no sense for serial frames, which have no number");
+    table.refuse("ignore_transaction", "does not apply to serial frames, which have no number");
   line.timeout_ms = table.number("timeout_ms", Range::between(1, 60000), line.timeout_ms);
   line.inter_frame_delay_ms =
       table.number("inter_frame_delay_ms", Range::between(0, 1000), line.inter_frame_delay_ms);
@@ -236,7 +236,7 @@ int read_unit(const TomlTable& table, const ModbusLine& line) {
   const bool is_tcp = tcp != nullptr && !tcp->rtu_frames;
   const int unit = table.integer("unit", 0, 255);
   if (!is_tcp && unit == 0 && table.has("unit")) {
-    table.problem("unit", "0 is the broadcast, which nobody answers; must be in [1, 247]");
+    table.problem("unit", "0 is the broadcast address, which gets no answer; must be in [1, 247]");
   }
   if (unit > 247 && !(is_tcp && unit == 255)) {
     table.problem("unit", is_tcp ? "must be in [0, 247] or 255" : "must be in [1, 247]");
@@ -250,7 +250,7 @@ void read_number(const TomlTable& table, RegisterUse use, ModbusValue& value) {
   if (use == RegisterUse::written_bits) {
     value.encoding = table.choice<Encoding>(
         "encoding", {{"uint16", Encoding::uint16}, {"uint32", Encoding::uint32}});
-    table.refuse("scale", "makes no sense for a count or bits");
+    table.refuse("scale", "does not apply to a count or bits");
   } else {
     value.encoding = table.choice("encoding", encodings());
     value.scale = read_scale(table, value.scale);
@@ -268,7 +268,7 @@ ModbusValue read_modbus_value(const TomlTable& table, RegisterUse use) {
   value.table = table.choice("table", tables);
   value.address = read_address(table, value.table);
   if (is_bit_table(value.table)) {
-    refuse_all(table, {"encoding", "word_order", "scale"}, "makes no sense for a bit");
+    refuse_all(table, {"encoding", "word_order", "scale"}, "does not apply to a bit");
     value.encoding = Encoding::uint16;
     return value;
   }
@@ -285,7 +285,7 @@ ModbusValue read_s7_value(const TomlTable& table, RegisterUse use) {
   if (byte % 2 != 0)
     table.problem("address", "must be even: it is the byte where the value begins");
   value.address = static_cast<std::uint16_t>(byte / 2);
-  refuse_all(table, {"table", "word_order"}, "makes no sense for kind = \"s7\"");
+  refuse_all(table, {"table", "word_order"}, "does not apply to kind = \"s7\"");
   read_number(table, use, value);
   return value;
 }
@@ -323,7 +323,7 @@ ModbusChannel read_modbus_channel(const TomlTable& sensor, const TomlTable& devi
   if (device.has("status")) channel.status = read_status(device.table("status"), base_address);
   if (sensor.has("status")) channel.status = read_status(sensor.table("status"), base_address);
   refuse_all(sensor, {"id", "start_bit", "length_bits", "byte_order", "extended_id"},
-             "makes no sense on a Modbus bus");
+             "does not apply on a Modbus bus");
   return channel;
 }
 

@@ -75,7 +75,7 @@ void check_travel(const TomlTable& table, const AxisConfig& axis, const ThermalM
 void check_diameter(const TomlTable& table, const AxisConfig& axis, const ThermalModel& model) {
   const DiameterSpec* diameter = diameter_of(model, axis.output);
   if (diameter == nullptr || diameter->axis == axis_name(axis)) return;
-  std::string rule("is a diameter that the model gives to axis ");
+  std::string rule("is a diameter that the model assigns to axis ");
   rule.append(diameter->axis);
   table.problem("output", axis.output, rule);
 }
@@ -96,8 +96,8 @@ void check_signals(const TomlTable& root, const EstimatorConfig& config, const T
           .append("\"]");
     else
       rule +=
-          ", and kind = \"dry_run\" has none: give the controller's own kind and dry_run = "
-          "true, or until there is one a model that needs no signal";
+          ", and kind = \"dry_run\" has none: give the controller's kind and dry_run = true, or "
+          "for now a model without signals";
     root.problem("controller.signal", signal, rule);
   }
 }

@@ -144,8 +144,8 @@ CanTravelSection::CanTravelSection(const TomlTable& axis, const LimiterConfig& l
 
 void CanTravelSection::refuse_registers(const TomlTable& own) {
   refuse_all(own, {"begin", "end"},
-             "makes no sense in frames: each of them has the number of the set (set_numbers)");
-  own.refuse("p0_register_mm", "makes no sense in frames: it is called p0_signal_mm");
+             "does not apply in frames: each of them has the number of the set (set_numbers)");
+  own.refuse("p0_register_mm", "does not apply in frames: it is called p0_signal_mm");
 }
 
 void CanTravelSection::read_applied(const TakenBits& sent) {
@@ -177,7 +177,7 @@ void CanTravelSection::check_round(double period_s, double silent_after_s) const
   if (travel_.applied.values.empty() || travel_.sent.numbers.empty()) return;
   const double round_s = std::ldexp(period_s, travel_.sent.numbers.front().length_bits);
   if (round_s > silent_after_s) return;
-  section_.table().problem("set_numbers", "must have more bits: the numbers come round after " +
+  section_.table().problem("set_numbers", "must have more bits: the numbers repeat after " +
                                               number_text(round_s) + " s, within silent_after_s");
 }
 
@@ -196,7 +196,7 @@ std::vector<CanTravelSection::Place> CanTravelSection::read_values(const TomlTab
   const std::size_t nodes = section_.shape().nodes_mm.size();
   if (!places.empty() && places.size() != nodes)
     own.problem("offsets", std::to_string(places.size()) + " places",
-                "must be " + std::to_string(nodes) + ", one a node");
+                "must be " + std::to_string(nodes) + ", one per node");
   return places;
 }
 
@@ -355,7 +355,7 @@ ModbusTravel read_modbus_travel(const TomlTable& axis, const LimiterConfig& limi
                                 WrittenRegisters& written) {
   TravelReader reader{TravelSection(axis, limiter), written};
   reader.section.table().refuse("set_numbers",
-                                "makes no sense in registers: `begin` and `end` hold the number");
+                                "does not apply in registers: `begin` and `end` hold the number");
   reader.section.is_line() ? reader.read_line() : reader.read_table();
   const ModbusTravel& travel = reader.travel;
   if (travel.begin.encoding != travel.end.encoding)

@@ -359,7 +359,7 @@ std::vector<std::vector<double>> TomlTable::matrix(std::string_view key, std::si
   for_each_element(key, true, "rows", [&](const void* element, std::size_t position) {
     const toml::array* row = as_node(element)->as_array();
     if (row == nullptr) {
-      bad(shown(*as_node(element)), at_position(position, "must be a row of numbers"));
+      bad(shown(*as_node(element)), at_position(position, "must be an array of numbers"));
       return;
     }
     std::vector<double>& numbers = values.emplace_back();

@@ -49,14 +49,14 @@ BridgeReport read_report(const BridgeControllerConfig& config, const json& param
   for (const auto& [name, value] : applied.items()) number_or_null(value, "applied_um." + name);
   for (std::size_t i = 0; i < config.axes.size(); ++i) {
     const auto axis = applied.find(config.axes[i]);
-    if (axis == applied.end()) invalid("the bridge tells nothing of axis " + config.axes[i]);
+    if (axis == applied.end()) invalid("the bridge does not report axis " + config.axes[i]);
     report.applied_um[i] = number_or_null(*axis, config.axes[i]);
   }
   const json& signals = table(params, "signals");
   for (const auto& [name, value] : signals.items()) number_or_null(value, "signals." + name);
   for (std::size_t i = 0; i < config.signals.size(); ++i) {
     const auto signal = signals.find(config.signals[i]);
-    if (signal == signals.end()) invalid("the bridge tells nothing of " + config.signals[i]);
+    if (signal == signals.end()) invalid("the bridge does not report " + config.signals[i]);
     report.signals[i] = number_or_null(*signal, config.signals[i]);
   }
   return report;

@@ -171,8 +171,8 @@ Command measured_command(const StatusView& view, const json& params) {
       static_cast<std::uint32_t>(std::lround(number_in(params, "ago_s", 0.0, ago_s_max, 0.0)));
   refuse_unless((command.source != MeasuredSource::wear && command.ago_s == 0) ||
                     correction.measured == MeasuredMeaning::remaining,
-                "what is left on a part, or was left some time ago, is what remained: it needs "
-                "[correction] measured = \"remaining\"");
+                "a value measured on a part, or at an earlier time, needs [correction] measured = "
+                "\"remaining\"");
   const double known_s = view.report.remembered_s;
   refuse_unless(command.ago_s <= known_s,
                 fmt::format("where the axis was {:.0f} min ago is not known: the daemon remembers "
@@ -196,11 +196,11 @@ void ask_back(const StatusView& view, const Command& command, double expected_um
   const double sd_um = std::hypot(claimed_um, own_um);
   const Slip slip = slip_of(command.value_um, expected_um, sd_um);
   if (slip == Slip::none || is_confirmed) return;
-  throw RpcError(rpc::refused,
-                 fmt::format("asked back, nothing is taken over: {:+g} um was measured where "
-                             "{:+.1f} um are expected, +-{:.1f} um (1 sd); {}. If it is right, "
-                             "give it again with --confirm",
-                             command.value_um, expected_um, sd_um, text_of(slip)));
+  throw RpcError(
+      rpc::refused,
+      fmt::format("asked back, nothing is taken over: {:+g} um was measured, {:+.1f} +-{:.1f} um "
+                  "(1 sd) was expected; {}. If it is correct, repeat it with --confirm",
+                  command.value_um, expected_um, sd_um, text_of(slip)));
 }
 
 RpcPending note_measured(const DaemonActions& actions, const json& params) {
@@ -245,7 +245,7 @@ RpcPending prove(const DaemonActions& actions, const json& params) {
   refuse_unless(!any_node(view, command.axis, &AxisReport::proving),
                 "the axis is being proved already");
   refuse_unless(!has_reason(view.report.reasons, Reason::cutting),
-                "not while the controller says it is cutting");
+                "not while the controller reports cutting");
   const double rate_um_per_s = view.config.estimator.axes[command.axis].limiter.rate_um_per_s_max;
   const double takes_s = 2.0 * std::abs(command.value_um) / rate_um_per_s +
                          view.config.estimator.compensation.prove_hold_s;
@@ -349,7 +349,8 @@ void add_operator_methods(StatusServer& server, const DaemonActions& actions) {
       "candidate", [actions](const json& params) { return candidate(actions, params); },
       AccessClass::model);
   server.add_method("controller_state", AccessClass::bridge, [actions](const json& params) {
-    refuse_unless(bool(actions.controller_state), "this configuration's controller is no bridge");
+    refuse_unless(bool(actions.controller_state),
+                  "controller kind does not accept controller_state");
     return actions.controller_state(params);
   });
 }

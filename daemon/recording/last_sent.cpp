@@ -67,7 +67,7 @@ void* map(const std::filesystem::path& file, std::size_t size) {
     memory = mmap(nullptr, size, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE, fd, 0);
   const int error = no_room != 0 ? no_room : errno;
   close(fd);
-  if (!is_file) fail(file, "is no ordinary file");
+  if (!is_file) fail(file, "is not a regular file");
   if (memory == MAP_FAILED) fail(file, std::strerror(error));
   return memory;
 }
@@ -84,8 +84,8 @@ LastSent::LastSent(const std::filesystem::path& file, const std::string& control
     problem_ = "last-sent record " + file.string() + ": " +
                (file_->magic == magic ? "is of format " + std::to_string(file_->format) +
                                             ", this program reads format " + std::to_string(format)
-                                      : "is none of this program") +
-               "; it is not read, and replaced with the first offset that is sent";
+                                      : "was not written by this program") +
+               "; it is ignored and replaced with the first offset sent";
     return;
   }
   for (const Place& place : file_->places)

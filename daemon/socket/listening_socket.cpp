@@ -167,7 +167,8 @@ void ListeningSocket::remove_stale() const {
   struct stat status {};
   if (lstat(path_.c_str(), &status) != 0) return;
   if (!S_ISSOCK(status.st_mode)) {
-    throw SocketError("status socket " + path_.string() + ": there is a file that is no socket");
+    throw SocketError("status socket " + path_.string() +
+                      ": a file that is not a socket exists there");
   }
   const sockaddr_un address = address_of(path_);
   const int probe = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);

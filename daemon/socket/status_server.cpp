@@ -391,7 +391,7 @@ void StatusServer::Parts::check_time_outs(Clock::time_point now) {
     } else if (client.input.is_partial() && !client.queued && !client.owes() && !client.later &&
                now - client.line_begun > limits.partial_line_max) {
       cut_off(id, client,
-              "a request must be whole within " + seconds_text(limits.partial_line_max));
+              "a request must be complete within " + seconds_text(limits.partial_line_max));
     } else if (!client.access.any() && now - client.last_request > limits.stranger_max) {
       cut_off(id, client, "only for members of " + config.read_group);
     } else if (client.is_idle() && now - client.last_request > limits.idle_max) {
@@ -416,7 +416,7 @@ void StatusServer::Parts::keep_memory_bounded() {
           return a.second.counted_bytes < b.second.counted_bytes;
         });
     if (most == clients.end()) return;
-    cut_off(most->first, most->second, "all clients together hold too much memory");
+    cut_off(most->first, most->second, "the clients together use too much memory");
     close_broken();
   }
 }

@@ -46,10 +46,10 @@ json numbers(const std::map<std::string, double>& values) {
 std::map<std::string, double> numbers(const json& file, const char* key) {
   std::map<std::string, double> values;
   const json& object = file.at(key);
-  if (!object.is_object()) throw std::runtime_error(std::string(key) + " is no table");
+  if (!object.is_object()) throw std::runtime_error(std::string(key) + " is not a table");
   for (const auto& [name, value] : object.items()) {
     if (!value.is_number())
-      throw std::runtime_error(std::string(key) + "." + name + " is no number");
+      throw std::runtime_error(std::string(key) + "." + name + " is not a number");
     const auto number = value.get<double>();
     if (!std::isfinite(number)) {
       throw std::runtime_error(std::string(key) + "." + name + " is not finite");

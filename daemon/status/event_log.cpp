@@ -180,7 +180,7 @@ void EventLog::note_mismatches(const Report& report, const EstimatorConfig& conf
           config.axes[i].name);
     } else {
       journal_.recovery(subject);
-      spdlog::info("axis {}: released, goes on from {:.3f} um", config.axes[i].name,
+      spdlog::info("axis {}: released, continues from {:.3f} um", config.axes[i].name,
                    axis.offset_um);
     }
   }
@@ -267,7 +267,7 @@ void EventLog::note_history(const HistoryStatistics& history,
     lost_ = history.lost;
   } else if (!history.last_error.empty()) {
     note_fault({.subject = subject, .code = "not_written", .detail = history.last_error},
-               "; the compensation goes on, tried again");
+               "; compensation continues, retrying");
   }
 }
 
@@ -288,7 +288,7 @@ void EventLog::note_log(bool stands) {
   const Subject subject{SubjectKind::log, ""};
   if (stands)
     journal_.fault(
-        {.subject = subject, .code = "not_taken", .detail = "nobody takes it, lines are lost"});
+        {.subject = subject, .code = "not_taken", .detail = "it is not read, lines are lost"});
   else
     journal_.recovery(subject);
 }

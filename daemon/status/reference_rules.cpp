@@ -39,7 +39,7 @@ void add_axes(const StatusView& view, std::vector<std::string>& why) {
     const std::string& name = view.config.estimator.axes[i].name;
     const double um = in_effect_um(view, i);
     if (view.report.axes[i].proving) {
-      why.push_back(fmt::format("axis {} is being proved: wait until it has come back", name));
+      why.push_back(fmt::format("axis {} is being proved: wait until it has returned", name));
     } else if (std::abs(um) > at_nothing_um) {
       ++count;
       if (std::abs(um) <= std::abs(largest_um)) continue;
@@ -91,7 +91,7 @@ std::vector<std::string> against_reference(const StatusView& view) {
   // Without the controller it is held as if it were cutting.
   if (has_reason(view.report.reasons, Reason::cutting) &&
       !has_reason(view.report.reasons, Reason::controller_offline))
-    why.emplace_back("the controller says that it is cutting: wait for the end of the cut");
+    why.emplace_back("the controller reports cutting: wait for the end of the cut");
   add_warming(view, why);
   return why;
 }

@@ -82,7 +82,7 @@ class LogQueue {
  private:
   /// Logged before the first line after the lost ones.
   void tell_lost(const spdlog::details::log_msg& next, std::uint64_t lost) {
-    const std::string text = fmt::format("{} lines of the log were lost: nobody took them", lost);
+    const std::string text = fmt::format("{} lines of the log were lost: it was not read", lost);
     spdlog::details::log_msg line(next.time, next.source, next.logger_name, spdlog::level::warn,
                                   text);
     sink_->log(line);

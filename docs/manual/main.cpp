@@ -242,7 +242,7 @@ void write_run_format(const fs::path& examples, const fs::path& folder) {
       "is.\n"
       "\n"
       "Readers also take what people have: other separators, decimal commas, dates, units in\n"
-      "brackets; what was understood is printed on stderr, and what may mean two things is asked "
+      "brackets; the interpretation is printed on stderr, and what may mean two things is asked "
       "for\n"
       "with the line to write into a file of --columns.\n";
   page.examples = {{"A RUN FILE", content(examples / "run.csv")},

@@ -124,7 +124,7 @@ ModelDomain::ModelDomain(const ThermalModel& model) : metric_(std::make_unique<M
   }
   const std::size_t count = domain_features(made_from);
   require(made_from.mean.size() == count, "made_from.mean",
-          static_cast<double>(made_from.mean.size()), "must have one value a feature");
+          static_cast<double>(made_from.mean.size()), "must have one value per feature");
   metric_->taus_s = made_from.taus_s;
   metric_->mean = made_from.mean;
   metric_->lower = whitening(made_from);

@@ -12,7 +12,8 @@ void declare_page_command_line(CLI::App& app, std::string& file) {
   app.add_option("CONFIG", file, "the configuration (TOML)")
       ->type_name("FILE")
       ->capture_default_str();
-  app.footer("Exit status: 0 stopped as asked, 2 bad use, configuration, or a port that is taken.");
+  app.footer(
+      "Exit status: 0 stopped on request, 2 bad use, configuration, or a port that is taken.");
 }
 
 }  // namespace thermocomp::fleet

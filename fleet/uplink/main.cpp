@@ -73,7 +73,7 @@ int run(const UplinkOptions& options) {
     if (options.once) return run_once(uplink);
     run_on(uplink, settings, pace);
   } catch (const Stopped&) {
-    spdlog::info("stopped as asked");
+    spdlog::info("stopped on request");
   }
   return 0;
 }

@@ -88,7 +88,7 @@ bool Uplink::send_new(Source& source) {
     const Taken taken = source.rows->send(*batch);
     is_new = true;
     if (taken.refused > 0)
-      spdlog::warn("{} of {} rows refused: their time cannot be (a clock that was wrong?)",
+      spdlog::warn("{} of {} rows refused: their time is impossible (clock set wrong?)",
                    taken.refused, taken.sent);
     if (taken.repeated > 0)
       spdlog::info("{} of {} rows were there already", taken.repeated, taken.sent);

@@ -116,7 +116,7 @@ std::vector<std::string> HookRunner::Parts::environment(const AlarmChange& chang
 void HookRunner::Parts::begin(const AlarmChange& change) {
   if (!limit.take(steady_s())) {
     if (!is_over_limit)
-      spdlog::warn("alarm commands: more than {} in an hour; left out until there is room",
+      spdlog::warn("alarm commands: more than {} in an hour; dropped until the limit allows more",
                    settings.alarm.per_hour_max);
     is_over_limit = true;
     return;
@@ -133,7 +133,7 @@ void HookRunner::Parts::wait_for(pid_t pid) {
   while (waitpid(pid, &status, WNOHANG) == 0) {
     if (stops || Clock::now() >= end) {
       if (!stops)
-        spdlog::warn("the alarm command is ended after {} s", settings.alarm.command_s_max);
+        spdlog::warn("the alarm command is killed after {} s", settings.alarm.command_s_max);
       kill(-pid, SIGKILL);
       waitpid(pid, &status, 0);
       return;
@@ -161,7 +161,7 @@ HookRunner::~HookRunner() {
 void HookRunner::offer(const AlarmChange& change) {
   const std::lock_guard lock(parts_->mutex);
   if (parts_->waiting.size() >= waiting_max) {
-    spdlog::warn("alarm commands: {} wait; {} is left out", waiting_max,
+    spdlog::warn("alarm commands: {} are queued; {} is dropped", waiting_max,
                  change.alarm.condition.name);
     return;
   }

@@ -34,7 +34,8 @@ void AnswerThread::Parts::run() {
     const bool refuses = stops;
     lock.unlock();
     constexpr unsigned unavailable = 503;
-    job.done(refuses ? JsonAnswer{unavailable, R"({"error":"the gateway stops"})"} : job.work());
+    job.done(refuses ? JsonAnswer{unavailable, R"({"error":"the gateway is stopping"})"}
+                     : job.work());
   }
 }
 

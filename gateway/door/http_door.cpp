@@ -201,7 +201,7 @@ void HttpDoor::Exchange::later(AnswerThread& answers, AnswerThread::Work work) {
     MHD_resume_connection(connection);
   };
   if (!answers.ask(std::move(work), done))
-    done({MHD_HTTP_SERVICE_UNAVAILABLE, error_text("too many requests wait")});
+    done({MHD_HTTP_SERVICE_UNAVAILABLE, error_text("too many requests are waiting")});
   result_ = MHD_YES;
 }
 
@@ -301,8 +301,8 @@ std::optional<MHD_Result> HttpDoor::Parts::refuse_stranger(MHD_Connection* conne
   ++refused;
   if (checked == PasswordFile::Answer::too_many)
     return answer(connection, MHD_HTTP_TOO_MANY_REQUESTS, json_type,
-                  error_text("too many wrong passwords; try again in some seconds"));
-  const std::string text = error_text("user and password are needed");
+                  error_text("too many wrong passwords; try again in a few seconds"));
+  const std::string text = error_text("user and password are required");
   MHD_Response* response = MHD_create_response_from_buffer(
       text.size(), const_cast<char*>(text.data()), MHD_RESPMEM_MUST_COPY);
   if (response == nullptr) return MHD_NO;
@@ -338,7 +338,7 @@ MHD_Result HttpDoor::Parts::serve(MHD_Connection* connection, const char* path, 
   if (request.is_too_large) {
     ++refused;
     return answer(connection, MHD_HTTP_CONTENT_TOO_LARGE, json_type,
-                  error_text("a body has at most 4096 bytes"));
+                  error_text("a body must have at most 4096 bytes"));
   }
   if (request.answer)
     return answer(connection, request.answer->status, json_type, std::move(request.answer->text));
@@ -379,10 +379,11 @@ void HttpDoor::Parts::listen() {
                             MHD_OPTION_ARRAY, options.data(), MHD_OPTION_END);
   const std::string place = settings.address + " port " + std::to_string(settings.port);
   if (daemon == nullptr)
-    throw std::runtime_error("cannot listen on " + place +
-                             (settings.has_tls()
-                                  ? " (taken, not ours, or certificate and key do not fit)"
-                                  : " (taken, or not an address of this computer)"));
+    throw std::runtime_error(
+        "cannot listen on " + place +
+        (settings.has_tls()
+             ? " (in use, not an address of this computer, or certificate and key do not match)"
+             : " (in use, or not an address of this computer)"));
   const MHD_DaemonInfo* info = MHD_get_daemon_info(daemon, MHD_DAEMON_INFO_BIND_PORT);
   port = info != nullptr ? info->port : settings.port;
 }

@@ -21,7 +21,7 @@ constexpr std::size_t password_bytes_max = 256;
 std::string random_bytes(std::size_t count) {
   std::string bytes(count, '\0');
   if (getrandom(bytes.data(), count, 0) != static_cast<ssize_t>(count))
-    throw std::runtime_error("the kernel gives no random numbers");
+    throw std::runtime_error("the kernel provides no random numbers");
   return bytes;
 }
 
@@ -42,7 +42,7 @@ std::string PasswordFile::digest(const std::string& user, const std::string& pas
   std::array<unsigned char, EVP_MAX_MD_SIZE> bytes{};
   unsigned size = 0;
   if (EVP_Digest(text.data(), text.size(), bytes.data(), &size, EVP_sha256(), nullptr) != 1)
-    throw std::runtime_error("SHA-256 is not to be had");
+    throw std::runtime_error("SHA-256 is not available");
   return {bytes.begin(), bytes.begin() + size};
 }
 
@@ -71,14 +71,15 @@ PasswordFile::Answer PasswordFile::check(const std::string& user, const std::str
 
 std::string password_line(const std::string& user, const std::string& password) {
   if (!is_user_name(user))
-    throw std::runtime_error("a user's name has letters, digits and signs other than : and #");
+    throw std::runtime_error(
+        "a user name must consist of letters, digits and signs other than : and #");
   if (password.size() < 8 || password.size() > password_bytes_max)
-    throw std::runtime_error("a password has 8 to 256 characters");
+    throw std::runtime_error("a password must have 8 to 256 characters");
   const std::string salt = random_bytes(16);
   std::array<char, CRYPT_GENSALT_OUTPUT_SIZE> setting{};
   if (crypt_gensalt_rn("$y$", 0, salt.data(), static_cast<int>(salt.size()), setting.data(),
                        static_cast<int>(setting.size())) == nullptr)
-    throw std::runtime_error("yescrypt is not to be had");
+    throw std::runtime_error("yescrypt is not available");
   const std::string hash = crypted(password, setting.data());
   if (hash.empty()) throw std::runtime_error("the password cannot be hashed");
   return user + ":" + hash;

@@ -87,24 +87,24 @@ bool HostRules::allows(std::string_view host) const {
 
 std::optional<Refusal> judge_request(const RequestFacts& request, const HostRules& hosts) {
   if (request.method != "GET" && request.method != "HEAD" && request.method != "POST")
-    return Refusal{405, "only GET, HEAD and POST"};
+    return Refusal{405, "the method must be GET, HEAD or POST"};
   if (request.path.size() > path_bytes_max || request.query_bytes > query_bytes_max)
     return Refusal{414, "the address is too long"};
   if (request.path.empty() || request.path.front() != '/')
     return Refusal{400, "the path must begin with /"};
-  if (request.hosts_given != 1) return Refusal{400, "one header Host is needed"};
+  if (request.hosts_given != 1) return Refusal{400, "exactly one header Host is required"};
   // If a proxy uses another length than libmicrohttpd, the rest is parsed as someone else's
   // request.
   if (request.lengths_given > 1) return Refusal{400, "the length of a body must be given once"};
   if (!hosts.allows(request.host))
-    return Refusal{421, "this gateway is not known by that name: http.names of its configuration"};
+    return Refusal{421, "unknown host name: add it to http.names of the configuration"};
   // In a browser, only pages of this gateway may send requests.
   if (!request.origin.empty() && lower(host_of_origin(request.origin)) != lower(request.host))
-    return Refusal{403, "asked by the page of another site"};
+    return Refusal{403, "requested by a page of another site"};
   const bool is_elsewhere = request.fetch_site == "cross-site" || request.fetch_site == "same-site";
   // A link from another site to the page itself is allowed.
   if (is_elsewhere && (request.path != "/" || request.method == "POST"))
-    return Refusal{403, "asked by the page of another site"};
+    return Refusal{403, "requested by a page of another site"};
   return std::nullopt;
 }
 

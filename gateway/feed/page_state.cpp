@@ -38,17 +38,17 @@ json verdict_of(const Snapshot& snapshot, const json& problems) {
           {"meaning", now.meaning},
           {"since_s",
            std::isfinite(now.for_s) ? json(std::round(snapshot.wall_s - now.for_s)) : json()},
-          {"advice", now.compensating && !is_good ? "not all is well, see below" : now.advice},
+          {"advice", now.compensating && !is_good ? "there are problems, see below" : now.advice},
           {"level", level}};
 }
 
-/// "; the last offsets stay at the controller: X +5.5 um, Z -3.0 um"
+/// "; the controller keeps the last offsets: X +5.5 um, Z -3.0 um"
 std::string last_offsets(const Status& status) {
   std::vector<std::string> list;
   for (const AxisStatus& axis : status.axes)
     if (std::isfinite(axis.offset))
       list.push_back(axis.name + " " + fixed_signed(axis.offset, 1) + " " + axis.unit);
-  return list.empty() ? "" : "; the last offsets stay at the controller: " + joined(list);
+  return list.empty() ? "" : "; the controller keeps the last offsets: " + joined(list);
 }
 
 void keep(json& object, std::initializer_list<const char*> keys) {
@@ -126,7 +126,7 @@ std::optional<json> state_change(const json& before, const json& after) {
 json problems_json(const Snapshot& snapshot) {
   json list = json::array();
   if (!snapshot.is_here) {
-    list.push_back({{"what", "the program thermocompd does not run, or does not answer"},
+    list.push_back({{"what", "thermocompd is not running, or does not answer"},
                     {"remedy", "ask maintenance to start the service thermocompd" +
                                    last_offsets(snapshot.status)},
                     {"detail", snapshot.why}});

@@ -114,7 +114,7 @@ json events_json(const std::vector<RecordedEvent>& events, const HistoryRequest&
 
 JsonAnswer history_answer(const DaemonFeed& feed, const HistoryRequest& request) {
   const std::filesystem::path file = feed.history_file();
-  if (file.empty()) return error_answer(503, "it is not known where the history is");
+  if (file.empty()) return error_answer(503, "the location of the history is unknown");
   try {
     const ThinnedHistory history = thin_history(file, request.from_s, request.to_s, request.points);
     const double span_s = (request.to_s - history.from_s) / static_cast<double>(request.points);

@@ -30,10 +30,10 @@ std::string dumped(const json& value) {
 /// A further entry of page_state()'s problems. Compensation is not affected, so the verdict stays.
 json broker_is_away(const MqttSettings& mqtt) {
   return {{"what", "the MQTT broker on " + mqtt.host + ", port " + std::to_string(mqtt.port) +
-                       ", is away: nobody gets values or alarms from it"},
+                       ", is not connected: it gets no values or alarms"},
           {"remedy",
-           "start the broker; if it runs, the log of thermocomp-gateway says why it refuses. "
-           "The newest messages are kept, and sent when it is back"}};
+           "start the broker; if it is running, see the log of thermocomp-gateway. The newest "
+           "messages are kept and sent once it is connected"}};
 }
 
 }  // namespace
@@ -95,7 +95,7 @@ void HttpServer::Parts::serve(HttpExchange& exchange) {
   if (path == "/metrics")
     return exchange.answer(200, "text/plain; version=0.0.4; charset=utf-8",
                            metrics_text(*feed.newest(), figures()));
-  exchange.answer(404, json_type, error_text("there is no such page"));
+  exchange.answer(404, json_type, error_text("page not found"));
 }
 
 void HttpServer::Parts::take_command(HttpExchange& exchange) {

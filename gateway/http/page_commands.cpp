@@ -30,7 +30,7 @@ JsonAnswer error(unsigned status, const std::string& text) {
 std::string random_token() {
   std::array<unsigned char, 16> bytes{};
   if (getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size()))
-    throw std::runtime_error("the kernel gives no random numbers");
+    throw std::runtime_error("the kernel provides no random numbers");
   std::string text;
   constexpr std::string_view digits = "0123456789abcdef";
   for (const unsigned char byte : bytes) {
@@ -54,14 +54,13 @@ CommandRequest request_from(const json& object) {
 const AxisStatus& axis_named(const Status& status, const std::string& name) {
   for (const AxisStatus& axis : status.axes)
     if (axis.name == name) return axis;
-  throw std::invalid_argument("there is no axis " + name);
+  throw std::invalid_argument("unknown axis " + name);
 }
 
 void require_waiting(const SensorsAnswer& sensors, const std::string& name) {
   for (const SensorStatus& sensor : sensors.sensors)
     if (sensor.name == name && sensor.fault == Fault::unconfirmed) return;
-  throw std::invalid_argument("there is no sensor " + name +
-                              " with a value that waits to be confirmed");
+  throw std::invalid_argument("there is no sensor " + name + " with an unconfirmed reading");
 }
 
 /// "z from +1.2 um to -3.4 um, y ..."
@@ -82,21 +81,21 @@ std::string confirmation_text(const CommandRequest& asked, const Status& status)
   const std::string& method = asked.method;
   if (method == "enable")
     return "Switch the compensation on. The axes will move, no faster than their slew rates: " +
-           moves_to(status, true) + ", and go on following the model.";
+           moves_to(status, true) + ", and then follow the model.";
   if (method == "disable")
     return "Switch the compensation off. The axes will move, no faster than their slew rates: " +
            moves_to(status, false) + ".";
   if (method == "reference")
-    return "Take the machine as it is now as the reference: displacement is counted from here on. "
-           "Right only with the machine cold and even and the offsets at zero.";
+    return "Take the present state of the machine as the reference: displacement counts from here "
+           "on. Only with the machine cold and even and the offsets at zero.";
   if (method == "accept")
     return "Take the reading of sensor " + asked.sensor +
-           " for right, though it jumped. The axes will follow it, no faster than their slew "
+           " as correct in spite of its jump. The axes will follow it, no faster than their slew "
            "rates. Compare it with a hand-held thermometer first.";
   if (!std::isfinite(asked.value_um)) throw std::invalid_argument("value_um must be a number");
   return "Axis " + asked.axis + " will move by " + fixed_signed(asked.value_um, 1) + " " +
          axis_named(status, asked.axis).unit +
-         " and back, to show its sign. Nobody must be in the machine.";
+         " and back, to show its sign. Make sure that nobody is in the machine.";
 }
 
 PageCommands::PageCommands(const GatewaySettings& settings) : settings_(settings) {}
@@ -137,7 +136,7 @@ JsonAnswer PageCommands::take(const std::string& user, const std::string& body,
 JsonAnswer PageCommands::confirm(const std::string& user, const CommandRequest& asked,
                                  const Snapshot& snapshot) {
   const std::string& method = asked.method;
-  if (!may(user, method)) return error(403, "this command is not for this user");
+  if (!may(user, method)) return error(403, "this user may not give this command");
   if (!snapshot.is_here) return error(503, "the daemon does not answer");
   if (method == "accept") require_waiting(snapshot.sensors, asked.sensor);
   const std::string text = confirmation_text(asked, snapshot.status);
@@ -172,7 +171,7 @@ JsonAnswer PageCommands::carry_out(const std::string& user, const std::string& t
     const auto found = waiting_.find(token);
     if (found == waiting_.end() || found->second.user != user ||
         found->second.until < std::chrono::steady_clock::now())
-      return error(410, "not confirmed in time, or done already: ask again");
+      return error(410, "not confirmed in time, or already executed: request it again");
     asked = found->second;
     waiting_.erase(found);
   }

@@ -327,10 +327,10 @@ function showModel(now) {
   if (from) lines.push(['made from', (from.runs || []).length + ' runs, ' + fixed(from.hours, 0) + ' h' +
     Object.entries(from.outputs || {}).map(([name, o]) => '; ' + name.replace(/_u(m|rad)$/, '') + ': ' +
       fixed(o.left_out_rms_um, 1) + ' of ' + fixed(o.no_model_rms_um, 1) + ' \u00b5m left').join(''), false]);
-  else lines.push(['made from', 'its file does not say', false]);
+  else lines.push(['made from', 'not stated in its file', false]);
   if (model.compared === false) lines.push(['compared', 'never, with measured displacement', true]);
   if (model.outside === true)
-    lines.push(['valid', 'no: the machine is outside of what it was made from, ' +
+    lines.push(['valid', 'no: the machine is outside its domain, ' +
                 fixed(100 * model.outside_share_24h, 0) + ' % of the last 24 h', true]);
   if (model.outside === false) lines.push(['valid', 'yes', false]);
   const probed = Object.entries(model.probed_rms_um || {}).filter(([, rms]) => isNumber(rms))

@@ -163,7 +163,7 @@ class SettingsReader {
     if (!mqtt.password_file.empty() && mqtt.user.empty())
       table.problem("password_file", "needs user");
     if (!mqtt.certificate.empty() && mqtt.authority.empty())
-      table.problem("certificate", "needs authority, which says that TLS is used");
+      table.problem("certificate", "needs authority, which enables TLS");
     return mqtt;
   }
 

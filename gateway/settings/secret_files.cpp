@@ -64,7 +64,7 @@ std::map<std::string, std::string> read_passwords(const std::filesystem::path& f
       problems.push_back({file.string(), number, user, "",
                           "must be user:hash as thermocomp-gateway --password-line prints it"});
     else if (!hashes.emplace(user, hash).second)
-      problems.push_back({file.string(), number, user, "", "is there twice"});
+      problems.push_back({file.string(), number, user, "", "is listed twice"});
   }
   if (problems.empty() && hashes.empty())
     problems.push_back({file.string(), 0, "", "", "must have at least one line user:hash"});

@@ -108,7 +108,7 @@ void write_state(MetricsWriter& out, const Status& status) {
     out.flag(status.mode == mode && !(status.dry_run && mode == Mode::compensating),
              {{"mode", std::string(to_string(mode))}});
   out.flag(status.mode == Mode::compensating && status.dry_run, {{"mode", "dry_run"}});
-  write_gauge(out, "thermocomp_mode_duration_seconds", "How long it has been in its mode.",
+  write_gauge(out, "thermocomp_mode_duration_seconds", "Time since the last change of mode.",
               status.mode_since_s);
   out.gauge("thermocomp_reason", "1 for each reason not simply to compensate; none: no sample.");
   for (const Reason reason : members_of(status.reasons))
@@ -160,7 +160,7 @@ void write_axes(MetricsWriter& out, const Status& status) {
     for (const auto& [axis, due] : status.probe_due->axes) out.flag(due, {{"axis", axis}});
   }
   out.gauge("thermocomp_axis_warm_seconds",
-            "Until less than compensation.warm_um is to come; 0: warm, none: not known.");
+            "Time until less than compensation.warm_um remains; 0: warm, none: unknown.");
   for (const auto& [axis, warm] : status.warm)
     if (std::isfinite(warm.minutes)) out.sample(60.0 * warm.minutes, {{"axis", axis}});
   write_axis_flag(out, status, "thermocomp_axis_driven", &AxisStatus::driven,
@@ -168,7 +168,7 @@ void write_axes(MetricsWriter& out, const Status& status) {
   write_axis_flag(out, status, "thermocomp_axis_at_bound", &AxisStatus::at_bound,
                   "1: the target is beyond the bound.");
   write_axis_flag(out, status, "thermocomp_axis_disagrees", &AxisStatus::disagrees,
-                  "1: the read-back differs from what is sent.");
+                  "1: the read-back differs from the offset sent.");
 }
 
 std::string blocks_of(const SensorStatus& sensor) {
@@ -239,8 +239,7 @@ void write_rest(MetricsWriter& out, const Status& status) {
   out.count(controller.write.unanswered, {{"controller", controller.name}});
   if (status.model.outside) {
     write_gauge(out, "thermocomp_model_outside_domain",
-                "1: the machine is outside of what its model was made from.",
-                *status.model.outside);
+                "1: the machine is outside the domain of its model.", *status.model.outside);
     write_gauge(out, "thermocomp_model_outside_domain_ratio", "Share of the last 24 h outside.",
                 status.model.outside_share_24h);
   }

@@ -75,15 +75,15 @@ bool is_numbered(const Samples& samples, const Log& log) {
   const bool numbered = may_be_numbered(samples);
   if (names.empty())
     log.refuse(1, "--names", "(missing)",
-               "has no header, and nothing that says its time: write --names time_s," +
-                   example(columns - 1) + " where the first number is the time, or --names " +
+               "has no header and no time: write --names time_s," + example(columns - 1) +
+                   " where the first number is the time, or --names " +
                    example(numbered && columns > 1 ? columns - 1 : columns) +
-                   " --period-s S, with what its pins are and the seconds between two samples" +
+                   " --period-s S, with the names of its pins and the seconds between two samples" +
                    (numbered ? " (its first number counts samples, as with -t)" : ""));
   if (names.size() == columns) return false;
   if (names.size() + 1 == columns && numbered) return true;
   log.refuse(1, "--names", std::to_string(names.size()) + " names",
-             "must be one for each of the " + std::to_string(columns) + " numbers of a row" +
+             "must be one for each of the " + std::to_string(columns) + " numbers per row" +
                  (numbered ? ", or one fewer when the first counts samples" : ""));
 }
 
@@ -93,7 +93,7 @@ void check_names(const Log& log) {
     if (!is_column_name(names[i]))
       log.refuse(0, "--names", names[i], std::string(column_name_rule));
     for (std::size_t j = 0; j < i; ++j)
-      if (names[i] == names[j]) log.refuse(0, "--names", names[i], "is there twice");
+      if (names[i] == names[j]) log.refuse(0, "--names", names[i], "is listed twice");
   }
 }
 
@@ -152,8 +152,7 @@ PlainTable plain_halsampler(const Log& log) {
   table.text += '\n';
   if (overruns > 0 && !numbered)
     log.refuse(0, "", std::to_string(overruns) + " overruns",
-               "lost samples, and without their numbers nothing tells how many: record with "
-               "halsampler -t");
+               "lost an unknown number of samples: record with halsampler -t, which numbers them");
   table.notes.push_back(std::string("numbers between blanks, ") +
                         (numbered ? "samples numbered (-t)" : "samples not numbered"));
   if (!timed)

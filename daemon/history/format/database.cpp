@@ -142,7 +142,7 @@ void require_history(Database& database) {
   }
   if (version > history_version) {
     throw HistoryError(name + ": is a history of version " + std::to_string(version) +
-                       ", which a newer thermocompd wrote; this program knows up to version " +
+                       ", written by a newer thermocompd; this program supports up to version " +
                        std::to_string(history_version));
   }
 }

@@ -103,8 +103,8 @@ std::vector<SegmentInfo> sound_segments(std::vector<SegmentInfo> segments,
     if (is_wall_time(segments[i].wall_ns)) continue;
     segments[i].wall_ns = likely_wall_ns(segments, i);
     damage.push_back({segments[i].id,
-                      "its wall time cannot be (a clock set wrong?);"
-                      " what was recorded is taken, at the likely time"});
+                      "its wall time is impossible (clock set wrong?); its records are used, at "
+                      "the most likely time"});
   }
   HistoryPlaces places;
   std::vector<SegmentInfo> sound;

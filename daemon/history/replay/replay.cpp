@@ -221,7 +221,7 @@ void check_records(const HistoryReader& reader, const EstimatorConfig& config,
     goes_on = !is_sound && cursor.resume();
   }
   if (cursor.wall_time_was_impossible()) {
-    check.damage.push_back({check.segment.id, "a wall time cannot be (a clock set wrong?)"});
+    check.damage.push_back({check.segment.id, "a wall time is impossible (clock set wrong?)"});
   }
 }
 

@@ -122,7 +122,7 @@ bool SegmentExport::next(std::uint64_t& cycle) {
     advance();
   }
   if (cursor_.wall_time_was_impossible())
-    note("a wall time cannot be (a clock set wrong?); what was recorded is taken");
+    note("a wall time is impossible (clock set wrong?); the records are used");
   return false;
 }
 
@@ -307,8 +307,7 @@ void SegmentExport::follow(std::uint64_t cycle) {
 void SegmentExport::give_up_following(const std::string& why) {
   steps_.reset();
   not_followed_ =
-      "from here on the inputs are means of what the sensors read, neither screened nor "
-      "smoothed: " +
+      "from here on the inputs are means of the raw readings, neither screened nor smoothed: " +
       why;
 }
 

@@ -194,7 +194,7 @@ void HistoryStore::rescue(const std::string& changed) {
   }
   ++replaced_;
   news_.push_back(changed + " was removed, replaced or cut while the history was written; " +
-                  (has_database ? "opened anew" : "a new history begins"));
+                  (has_database ? "reopened" : "a new history begins"));
 }
 
 /// Held until the end, also while the file is closed, moved aside or missing.
@@ -311,7 +311,7 @@ void HistoryStore::read_back(const PendingRows& pending) {
   Database reader(config_.file, DatabaseMode::read_only);
   const auto require = [this](Statement& row) {
     if (!row.step())
-      throw HistoryError(config_.file.string() + ": what was committed cannot be read back");
+      throw HistoryError(config_.file.string() + ": committed records cannot be read back");
   };
   for (const PendingRows::Row& row : pending.rows()) {
     if (const auto* segment = std::get_if<SegmentRow>(&row)) {
@@ -382,7 +382,7 @@ bool HistoryStore::is_known(std::int64_t segment, const ChunkRow& row) {
   if (known.blob(0) != row.records)
     throw HistoryError(config_.file.string() + ": chunk " + std::to_string(row.number) +
                        " of segment " + std::to_string(segment) +
-                       " is there already with other records; does another program write it?");
+                       " already exists with other records; is another program writing it?");
   return true;
 }
 

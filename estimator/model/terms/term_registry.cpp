@@ -71,7 +71,7 @@ std::vector<double> bank_gains(const LagBankSpec& bank, const ThermalModel& mode
   const std::size_t taus = bank.taus_s.size();
   const auto size = [](const auto& list) { return static_cast<double>(list.size()); };
   require(bank.powers.empty() || bank.powers.size() == subjects, "term.powers", size(bank.powers),
-          "must have one value a subject");
+          "must have one value per subject");
   std::vector<double> gains(model.outputs.size() * subjects * taus, 0.0);
   for (const auto& [output, table] : bank.gain_um_per_unit) {
     const std::size_t begin =
@@ -81,7 +81,7 @@ std::vector<double> bank_gains(const LagBankSpec& bank, const ThermalModel& mode
             "must have one row a subject");
     for (std::size_t i = 0; i < subjects; ++i) {
       require(table[i].size() == taus, "term.gain_um_per_unit", size(table[i]),
-              "must have one value a time constant");
+              "must have one value per time constant");
       for (std::size_t j = 0; j < taus; ++j) gains[begin + j * subjects + i] = table[i][j];
     }
   }

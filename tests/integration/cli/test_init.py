@@ -114,7 +114,7 @@ def test_what_is_no_bus_no_axis_and_another_word_for_a_sensor(foreign, folder):
                f"tcp:127.0.0.1:{plc}", "yes", "none", "spindle", "z"]
     status, shown = converse(["init", folder / "thermocompd.toml"], answers)
     assert status == 0, shown
-    assert '"?pt100" is no host' in shown and "spindle: must be an axis" in shown
+    assert '"?pt100" is not a host' in shown and "spindle: must be an axis" in shown
     lists = [part.split("Module of")[0].split("\n", 1)[1]
              for part in shown.split("presets:")[1:3]]
     assert lists[0] == lists[1] and "pt100" in lists[0].lower() and "rtd" in lists[0].lower()
@@ -153,10 +153,10 @@ def test_nothing_answered_is_lost_to_a_mistake_or_a_step_back(foreign, folder):
                "Z"]
     status, shown = converse(["init", config], answers)
     assert status == 0, shown
-    for said in ("    wago_750_464: WAGO, 750-464, two or four RTD", "wago_750 is no preset",
-                 "bed: each sensor needs a name of its own",
+    for said in ("    wago_750_464: WAGO, 750-464, two or four RTD", "wago_750 is not a preset",
+                 "bed: the names of sensors must be unique",
                  f"Module of unit 4 on bus1 (127.0.0.1:{modules})", "In word order CDAB all give",
-                 "is left out: no module is on it"):
+                 "is left out: it has no module"):
         assert said in shown, (said, shown)
     assert "pixsys" not in shown  # does not match "Wago"
     text = config.read_text()
@@ -282,7 +282,7 @@ def test_what_is_not_there_is_named(foreign, folder):
     answer = run("init", config, "--bus", f"tcp:127.0.0.1:{free_port()}", "--module",
                  "3=wago_750_458:1-2", "--controller", f"tcp:127.0.0.1:{plc}", "--axes", "z")
     assert answer.returncode == 1, answer.stdout + answer.stderr
-    assert "Not everything is there yet" in answer.stdout
+    assert "Not everything answers yet" in answer.stdout
     assert run("check", config).returncode == 0
     answer = run("init", folder / "other" / "c.toml", "--axes", "z", stdin=subprocess.DEVNULL)
     assert answer.returncode == 2

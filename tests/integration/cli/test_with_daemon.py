@@ -118,7 +118,7 @@ def offsets(offset_um, applied_um, proving):
 
 
 @pytest.mark.parametrize("there_um, status, words", [
-    (5.0, 0, "moved and came back"), (0.1, 1, "did NOT move as asked"),
+    (5.0, 0, "moved and came back"), (0.1, 1, "did NOT move as commanded"),
     (-5.0, 1, "moved the OTHER way")])
 def test_prove_waits_until_the_move_is_over_and_tells_what_was_read(daemon, there_um, status,
                                                                     words):

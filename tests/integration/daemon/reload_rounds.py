@@ -59,7 +59,7 @@ class ReloadRounds:
         try:
             checksum = self.daemon.call("reload")["checksum"]
         except Refused as refusal:
-            if "under way" not in str(refusal):
+            if "in progress" not in str(refusal):
                 self.wrong.append(f"reload {number}: {refusal}")
             time.sleep(0.2 / self.rate_hz)
             return

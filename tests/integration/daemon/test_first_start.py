@@ -136,7 +136,7 @@ def test_a_reference_is_refused_where_it_would_be_wrong_unless_forced(day):
     moving = subprocess.Popen([BIN / "thermocomp", "--socket", daemon.socket, "prove", "z", "4"],
                               stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     eventually(lambda: daemon.axis()["proving"], "it moves")
-    with pytest.raises(Refused, match="axis z is being proved: wait until it has come back"):
+    with pytest.raises(Refused, match="axis z is being proved: wait until it has returned"):
         daemon.call("reference")
     out, said = moving.communicate(timeout=60)
     assert moving.returncode == 0, (out, said)

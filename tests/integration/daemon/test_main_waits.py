@@ -117,7 +117,7 @@ def test_a_disk_that_takes_seconds_to_commit_the_history(lab, manager):
     assert watched.ask("disable") == {"done": True}
     watched.judge()
     watched.end(within_s=10.0)
-    assert "has not committed is lost" in watched.daemon.log_text()
+    assert "uncommitted records are lost" in watched.daemon.log_text()
 
 
 def test_files_on_a_disk_that_does_not_answer_hold_a_reload_and_nothing_else(lab, manager):
@@ -126,7 +126,7 @@ def test_files_on_a_disk_that_does_not_answer_hold_a_reload_and_nothing_else(lab
     watched.stands.touch()
     watched.daemon.hang_up()
     watched.ask_for(2.0)
-    assert "a reload is under way" in watched.ask("reload")
+    assert "a reload is in progress" in watched.ask("reload")
     assert watched.ask("disable") == {"done": True}
     watched.judge()
     watched.stands.unlink()
@@ -163,7 +163,7 @@ def test_a_large_model_is_taken_within_a_second(lab, manager):
 
 
 def warns_of_log(watched):
-    return any("nobody takes the log" in warning for warning in watched.ask()["warnings"])
+    return any("the log is not read" in warning for warning in watched.ask()["warnings"])
 
 
 def fill_log(watched):

@@ -147,7 +147,7 @@ def test_a_candidate_is_named_while_the_daemon_runs(machine, lab):
     daemon = machine.start()
     assert "candidate" not in daemon.status()
     status, out, said = daemon.cli("candidate", new)
-    assert status == 0 and "runs beside the model" in out, said
+    assert status == 0 and "runs as the candidate" in out, said
     assert daemon.status()["candidate"]["file"] == str(new)
     machine.warm_by(12.0)
     daemon.wait_for_offset(12.0, 0.05)

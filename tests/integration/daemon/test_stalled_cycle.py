@@ -91,8 +91,8 @@ def test_others_are_answered_while_somebody_waits_and_a_second_reload_is_refused
             took_s.append(time.monotonic() - begun)
         print(f"slowest status beside a waiting reload: {1000 * max(took_s):.1f} ms")
         assert max(took_s) < 1.0
-        assert "a reload is under way" in asked(daemon, "reload")
-        with pytest.raises(Refused, match="a reload is under way"):
+        assert "a reload is in progress" in asked(daemon, "reload")
+        with pytest.raises(Refused, match="a reload is in progress"):
             daemon.call("measured", axis="z", value_um=1.0)
         waiting.join(10)
     assert len(answers) == 1 and "withdrawn" in answers[0]

@@ -361,7 +361,7 @@ def test_a_named_user_confirms_what_will_move(guarded, machine):
     assert post(guarded, {"method": "prove", "axis": "q", "value_um": 1}, MARIA)[0] == 400
     for sensor in ("spindle", "none_such"):
         status, refused = post(guarded, {"method": "accept", "sensor": sensor}, MARIA)
-        assert status == 400 and f"no sensor {sensor} with a value that waits" in refused["error"]
+        assert status == 400 and f"no sensor {sensor} with an unconfirmed reading" in refused["error"]
     event = next(each for each in machine.daemon.call("events")["events"] if each["code"] == "disable")
     assert event["for"] == "maria"
     status, asked = post(guarded, {"method": "enable"}, MARIA)

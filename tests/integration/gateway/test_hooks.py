@@ -45,4 +45,4 @@ def test_a_command_that_hangs_is_ended_and_the_page_goes_on(lab, machine):
     eventually(lambda: out.exists() and len(out.read_text().split()) >= 2,
                "the next one gets its turn")
     assert gateway.ask("/")[0] == 200
-    assert "is ended after 1" in gateway.log.read_text()
+    assert "is killed after 1" in gateway.log.read_text()

@@ -127,7 +127,7 @@ def test_it_says_what_is_wrong_and_recovers(machine, gateway, browser):
     machine.daemon.kill()
     took["daemon gone"] = within_s(lambda: "daemon does not answer" in text(browser, "detail"),
                                    "the daemon is away")
-    assert "the last offsets stay at the controller: z " in text(browser, "problem-list")
+    assert "the controller keeps the last offsets: z " in text(browser, "problem-list")
     assert "systemctl" not in text(browser, "problem-list")
     assert "last known: 0.0 of" in text(browser, "axes")
     assert "grayscale" in browser.execute_script(

@@ -126,9 +126,9 @@ def test_every_register_is_read_and_none_is_changed(simulate, relay, tmp_path):
     assert "controller cnc (modbus_tcp, 127.0.0.1:" in done.stdout
     assert "-> 250.00 mm" in done.stdout
     assert done.stdout.endswith(
-        "    writes are answered: what stands in the registers was written once more (whether a new "
-        "offset is taken, thermocomp status shows)\n"
-        "1 of 1 channels give a temperature\n7 of 7 places of the controller are there\n")
+        "    writes are answered: the registers' present values were written back (thermocomp status "
+        "shows whether a new offset is taken over)\n"
+        "1 of 1 channels give a temperature\n7 of 7 values of the controller are present\n")
     assert 16 in between.functions
     assert written(simulator) == before
 
@@ -167,7 +167,7 @@ def test_a_register_that_is_not_there_is_named_with_the_exception(simulate, rela
     assert "exception 2 (illegal data address)" in missing[0]["why"]
     done = thermocomp("scan", path, "--bus", "cnc")
     assert done.returncode == 1
-    assert "7 of 8 places of the controller are there; missing: y_mm\n" in done.stdout
+    assert "7 of 8 values of the controller are present; missing: y_mm\n" in done.stdout
     assert "channels give a temperature" not in done.stdout  # only the controller was tested
 
 
@@ -187,4 +187,4 @@ def test_a_controller_that_is_silent_or_gone_is_told_so(simulate, relay, tmp_pat
     gone.close()
     report, _ = scan(configuration(tmp_path, sensors, DEVICES, SENSORS, controller(port)))
     assert "cannot be opened" in report["controller"]["error"]
-    assert all(each["why"] == "was not asked" for each in report["controller"]["values"])
+    assert all(each["why"] == "was not requested" for each in report["controller"]["values"])

@@ -42,7 +42,7 @@ TEST_CASE("a controller that does not move fails, with what was read", "[cli][pr
   course.take(axis(0.0, 0.01, false));
   CHECK_FALSE(course.passed());
   CHECK_THAT(course.verdict("z"),
-             Contains("did NOT move as asked") &&
+             Contains("did NOT move as commanded") &&
                  Contains("sent +5.00 um at the farthest, read back +0.02 um"));
 }
 

@@ -38,8 +38,9 @@ ScanReport report_of(std::vector<ScanValue> values) {
 TEST_CASE("a scan with every value of the controller is complete", "[cli][scan]") {
   const ScanReport report = report_of({there("spindle_rpm", 10.0), there("heartbeat", 0.0)});
   CHECK(is_complete(report));
-  CHECK_THAT(scan_text(report, false), Contains("spindle_rpm  input 10 uint16  00 0A  -> 10.00") &&
-                                           Contains("2 of 2 places of the controller are there\n"));
+  CHECK_THAT(scan_text(report, false),
+             Contains("spindle_rpm  input 10 uint16  00 0A  -> 10.00") &&
+                 Contains("2 of 2 values of the controller are present\n"));
   CHECK(scan_json(report)["controller"]["complete"] == true);
   CHECK(scan_json(ScanReport{})["controller"].is_null());
   CHECK(is_complete(ScanReport{}));
@@ -49,9 +50,10 @@ TEST_CASE("missing values of a controller are listed with its answers", "[cli][s
   const ScanReport report =
       report_of({there("spindle_rpm", 10.0), missing("x_mm"), missing("heartbeat")});
   CHECK_FALSE(is_complete(report));
-  CHECK_THAT(scan_text(report, false),
-             Contains("-> missing\n        the controller answers with exception 2") &&
-                 Contains("1 of 3 places of the controller are there; missing: x_mm, heartbeat\n"));
+  CHECK_THAT(
+      scan_text(report, false),
+      Contains("-> missing\n        the controller answers with exception 2") &&
+          Contains("1 of 3 values of the controller are present; missing: x_mm, heartbeat\n"));
   const auto values = scan_json(report)["controller"]["values"];
   ScanValue unreadable = missing("heartbeat");
   unreadable.is_needed = false;  // the daemon only writes it

@@ -66,9 +66,9 @@ const std::vector<Broken>& broken_small_machine() {
        "not empty"},
       {"port out of range", "port = 502 ", "port = 65536 ", "", "bus[cabinet].port", "[1, 65535]"},
       {"baud on TCP", "port = 502 ", "baud = 9600 ", "", "bus[cabinet].baud",
-       "makes no sense for kind = \"modbus_tcp\""},
+       "does not apply to kind = \"modbus_tcp\""},
       {"host on a serial line", "rs485 = false", "host = \"a\"", "", "bus[column_line].host",
-       "makes no sense for kind = \"modbus_rtu\""},
+       "does not apply to kind = \"modbus_rtu\""},
       {"unusual baud", "baud = 19200", "baud = 19201", "", "bus[column_line].baud", "usual rate"},
       {"parity", "parity = \"even\"", "parity = \"mark\"", "", "bus[column_line].parity",
        "\"none\" \"even\" \"odd\""},
@@ -140,7 +140,7 @@ const std::vector<Broken>& broken_small_machine() {
        "sensor[spindle_rear].address", "pass register 65535"},
       {"status bit with a mask", "address = 6\n",
        "address = 6\nstatus = { table = \"discrete_input\", address = 0, mask = 1 }\n",
-       "status = {", "sensor[spindle_rear].status.mask", "makes no sense for a bit"},
+       "status = {", "sensor[spindle_rear].status.mask", "does not apply to a bit"},
       {"mask that hides a code", "address = 6\n",
        "address = 6\nstatus = { table = \"holding\", address = 0, mask = 1, error_codes = [2] }\n",
        "status = {", "sensor[spindle_rear].status.mask", "hides bits of the code 2"},
@@ -223,7 +223,7 @@ const std::vector<Broken>& broken_small_machine() {
       {"bit with an encoding", "table = \"discrete_input\"\naddress = 0\n",
        "table = \"discrete_input\"\nencoding = \"int16\" # bit\naddress = 0\n",
        "encoding = \"int16\" # bit", "controller.signal[cutting_on].encoding",
-       "makes no sense for a bit"},
+       "does not apply to a bit"},
       {"axis name used twice", "name = \"y\"\noutput", "name = \"x\"\noutput",
        "name = \"x\"\noutput = \"y_um\"", "axis[x].name", "used twice"},
       {"output not in the model", "output = \"y_um\"", "output = \"w_um\"", "", "axis[y].output",
@@ -275,7 +275,7 @@ const std::vector<Broken>& broken_can() {
   static const std::vector<Broken> table = {
       {"baud on a CAN bus", "reconnect_s = 0.5                        # default, at",
        "baud = 9600                        # default, at", "", "bus[machine_bus].baud",
-       "makes no sense for kind = \"can\""},
+       "does not apply to kind = \"can\""},
       {"long pauses before a CAN interface is tried again", "reconnect_s = 0.5    ",
        "reconnect_s = 1.5    ", "", "bus[machine_bus].reconnect_s", "[0.01, 1]"},
       {"interface with a slash", "interface = \"can0\"\nreconnect_s = 0.5    ",
@@ -299,10 +299,10 @@ const std::vector<Broken>& broken_can() {
        "start_bit = 0\nmessage = \"NODE\"\n", "message = \"NODE\"", "sensor[column].message",
        "without the signal's name"},
       {"unit on a CAN node", "signed = true   ", "unit = 1 ", "", "device[node].unit",
-       "makes no sense on a CAN bus"},
+       "does not apply on a CAN bus"},
       {"address on a CAN node", "start_bit = 16\n\n[[block]]",
        "address = 1\nstart_bit = 16\n\n[[block]]", "", "sensor[spindle].address",
-       "makes no sense on a CAN bus"},
+       "does not apply on a CAN bus"},
       {"identifier of 12 bits", "id = 0x181", "id = 0x800", "", "device[node].id", "[0, 2047]"},
       {"start bit missing", "start_bit = 16\n\n[[block]]", "\n[[block]]",
        "[[sensor]]\nname = \"spindle\"", "sensor[spindle].start_bit", "must be given"},
@@ -329,7 +329,7 @@ const std::vector<Broken>& broken_can() {
       {"hold while cutting without a signal", "cutting_signal = \"cutting_on\"\n", "",
        "hold_while_cutting = true", "compensation.hold_while_cutting", "needs a cutting_signal"},
       {"host on a CAN controller", "silent_after_s = 2.0", "host = \"a\"", "", "controller.host",
-       "makes no sense"},
+       "does not apply"},
   };
   return table;
 }
@@ -367,13 +367,13 @@ TEST_CASE("a dry run accepts no place for offsets", "[config]") {
   const std::string good = example("modbus_rtu.toml");
   const std::vector<Broken> table = {
       {"host", "kind = \"dry_run\"", "host = \"a\"\nkind = \"dry_run\"", "", "controller.host",
-       "makes no sense"},
+       "does not apply"},
       {"dry run twice", "kind = \"dry_run\"", "dry_run = true\nkind = \"dry_run\"", "",
-       "controller.dry_run", "give its own kind and dry_run = true"},
+       "controller.dry_run", "give its kind and dry_run = true"},
       {"signal", "[[axis]]", "[[controller.signal]]\nname = \"x_mm\"\n[[axis]]", "",
-       "controller.signal", "makes no sense"},
+       "controller.signal", "does not apply"},
       {"offset", "output = \"z_um\"", "offset = { address = 0 }\noutput = \"z_um\"", "",
-       "axis[z].offset", "makes no sense"},
+       "axis[z].offset", "does not apply"},
   };
   for (const Broken& broken : table) {
     check_refused(broken, good, "machine.toml",
@@ -436,7 +436,7 @@ TEST_CASE("a model that needs a signal is refused without a controller", "[confi
                             "[[term]]\nkind = \"speed_growth\"\nsubject = \"spindle_rpm\"\n"
                             "gain_um_per_unit2 = { z_um = 1e-7 }\n";
   CHECK(mentions(problems_of([&] { return parse(example("modbus_rtu.toml"), model); }),
-                 "controller.signal", "own kind and dry_run = true"));
+                 "controller.signal", "kind and dry_run = true"));
 }
 
 TEST_CASE("an edit that breaks several rules is reported once per rule", "[config]") {

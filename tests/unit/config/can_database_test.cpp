@@ -65,7 +65,7 @@ TEST_CASE("a key overrides the DBC file, and the rest is taken from there", "[db
     s.start_bit = 23;
   });
   CHECK_THAT(told_after("signal = \"Column\"", "signal = \"Column\"\nmultiplexor_value = 1"),
-             Catch::Contains("sensor[column].multiplexor_value = 1: is what the DBC file says"));
+             Catch::Contains("sensor[column].multiplexor_value = 1: is given by the DBC file"));
   CHECK_THAT(told_after("signal = \"Column\"",
                         "signal = \"Column\"\nlength_bits = 12\nbyte_order = \"big_endian\""),
              Catch::Contains("start_bit = (missing): must be given: the value is not in whole"));
@@ -157,7 +157,7 @@ TEST_CASE("a named signal without a temperature unit is refused, one in degF is 
   folder.edit("can_dbc.dbc", "\"degC\"", "\"bar\"");
   CHECK_THAT(folder.told(),
              Catch::Contains("sensor[column].signal = bar: the unit of the signal in the DBC file "
-                             "is none of temperatures; unit = \"degC\", \"K\" or \"degF\""));
+                             "is not a temperature unit; give unit = \"degC\", \"K\" or \"degF\""));
   folder.edit("can_dbc.dbc", "(0.1,0) [-100|400] \"bar\"",
               "(1,32) [0|0] \"\xB0"
               "F\"");
@@ -171,5 +171,5 @@ TEST_CASE("a message of more bytes than its frame format is refused", "[dbc]") {
   folder.edit("can_dbc.dbc", "BO_ 2566844926 15;", "BO_ 2566844926 1;");
   CHECK_THAT(folder.told(),
              Catch::Contains("sensor[spindle].message = \"NODE_PAGES\": has 16 bytes "
-                             "in the DBC file, but is no CAN FD frame"));
+                             "in the DBC file, but is not a CAN FD frame"));
 }

@@ -62,7 +62,7 @@ const std::vector<Broken>& broken_frames() {
       in_line("a number with a scale",
               "set_numbers = [{ id = 0x210, start_bit = 48, length_bits = 16 }]",
               "set_numbers = [{ id = 0x210, start_bit = 48, length_bits = 16, scale = 2.0 }]",
-              "set_numbers[1].scale", "makes no sense for a count"),
+              "set_numbers[1].scale", "does not apply to a count"),
       in_line("no number at all",
               "set_numbers = [{ id = 0x210, start_bit = 48, length_bits = 16 }]", "", "set_numbers",
               "must be given", "[axis.line]"),
@@ -85,10 +85,10 @@ const std::vector<Broken>& broken_frames() {
               "applied.set_numbers[1].length_bits", "it is the same number"),
       in_table("too few places",
                "  { id = 0x212, start_bit = 16, length_bits = 16, scale = 0.01 },\n", "", "offsets",
-               "must be 5, one a node", "offsets = [ "),
+               "must be 5, one per node", "offsets = [ "),
       in_table("too few places are shown",
                "  { id = 0x292, start_bit = 16, length_bits = 16, scale = 0.01 },\n", "",
-               "applied.offsets", "must be 5, one a node", "offsets = [\n  { id = 0x291"),
+               "applied.offsets", "must be 5, one per node", "offsets = [\n  { id = 0x291"),
       in_table("an offset that cannot hold the bound",
                "{ id = 0x211, start_bit = 0, length_bits = 16, scale = 0.01 }",
                "{ id = 0x211, start_bit = 0, length_bits = 16, scale = 0.001 }",
@@ -111,7 +111,7 @@ const std::vector<Broken>& broken_frames() {
               "p0_register_mm", "it is called p0_signal_mm", "p0_register_mm"),
       {"an offset beside the line", "[axis.line] ",
        "offset = { id = 0x201, start_bit = 0, length_bits = 16 }\n[axis.line] ", "offset = { id",
-       "axis[x].offset", "makes no sense beside"},
+       "axis[x].offset", "cannot be combined with"},
       {"valid bits over a value", "valid_bits = { id = 0x200, start_bit = 0,",
        "valid_bits = { id = 0x212, start_bit = 24,", "", "controller.valid_bits",
        "shares bits with another value"},
@@ -191,7 +191,7 @@ TEST_CASE("set numbers must not repeat while a read-back is still valid", "[conf
   REQUIRE(problems.size() == 2);  // 65536 periods of 0.05 s, for each axis
   CHECK(problems[0].key == "axis[x].line.set_numbers");
   CHECK(problems[0].rule ==
-        "must have more bits: the numbers come round after 3276.8 s, within "
+        "must have more bits: the numbers repeat after 3276.8 s, within "
         "silent_after_s");
 }
 

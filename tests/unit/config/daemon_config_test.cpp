@@ -301,8 +301,8 @@ TEST_CASE("places in a data block are bytes, each written for one purpose", "[co
       {{"db = 100", "db = 0"}, "[1, 65535]"},
       {{"db = 100", ""}, "must be given"},
       {{"slot = 1", "slot = 32"}, "[0, 31]"},
-      {{"db = 100", "db = 100\nunit = 1"}, "makes no sense for kind = \"s7\""},
-      {{"address = 12\n", "address = 12\ntable = \"holding\"\n"}, "makes no sense"},
+      {{"db = 100", "db = 100\nunit = 1"}, "does not apply to kind = \"s7\""},
+      {{"address = 12\n", "address = 12\ntable = \"holding\"\n"}, "does not apply"},
   };
   for (const auto& [edit, rule] : bad) {
     INFO(edit.second);
@@ -393,7 +393,7 @@ TEST_CASE("an invalid travel is refused with key and rule", "[config][travel]") 
       {{"[axis.table] ",
         "offset = { table = \"holding\", address = 1, encoding = \"int16\" }\n"
         "[axis.table] "},
-       "makes no sense beside"},
+       "cannot be combined with"},
       {{"name = \"z\"", "name = \"x_2\""}, "nodes"},
   };
   for (const auto& [edit, rule] : bad) {
@@ -435,7 +435,7 @@ TEST_CASE("a register with too coarse steps for the offset is refused", "[config
 TEST_CASE("keys of cycles are refused if the offset follows the model", "[config]") {
   CHECK_THROWS_WITH(
       edited_machine("update = \"continuous\"", "update = \"continuous\"\ncycles_per_update = 2"),
-      Catch::Contains("makes no sense"));
+      Catch::Contains("does not apply"));
   const DaemonConfig config =
       edited_machine("update = \"continuous\"",
                      "update = \"each_cycle\"\ncycles_per_update = 2\ncycle_ahead = 1.0");

@@ -127,7 +127,8 @@ TEST_CASE("invalid content of a DBC file is refused by line and rule", "[dbc]") 
               "x.dbc:7: T = 4: is more than its multiplexor can be"));
   CHECK(tells(message(" SG_ P m0M : 0|2@1+ (1,0) [0|0] \"\" B\n") + "SG_MUL_VAL_ 385 P P 0-1;\n",
               "x.dbc:6: P: must not be selected by itself"));
-  CHECK(tells(placed("0|8@1+") + "SG_MUL_VAL_ 385 T T 0-1;\n", "x.dbc:7: T: is said to be"));
+  CHECK(
+      tells(placed("0|8@1+") + "SG_MUL_VAL_ 385 T T 0-1;\n", "x.dbc:7: T: has a multiplexor here"));
   CHECK(tells("BA_DEF_ BO_ \"VFrameFormat\" ENUM \"a\",\"b\";\n" + placed("0|8@1+") +
                   "BA_ \"VFrameFormat\" BO_ 385 2;\n",
               "x.dbc:8: VFrameFormat = 2: must be one of the formats"));
@@ -139,7 +140,7 @@ TEST_CASE("a syntax error of a DBC file is refused at its position", "[dbc]") {
     return problems_of(body).find(start) == 0;
   };
   CHECK(tells(placed("0|8@1+") + "HELLO\n", "x.dbc:7: HELLO: must be a keyword of DBC files"));
-  CHECK(tells(" SG_ T : 0|8@1+ (1,0) [0|0] \"\" B\n", "x.dbc:5: SG_: must stand below a message"));
+  CHECK(tells(" SG_ T : 0|8@1+ (1,0) [0|0] \"\" B\n", "x.dbc:5: SG_: must follow a message"));
   CHECK(tells(placed("0|8@2+"), "x.dbc:6: 2+ (1,0) [0|0] \"\" B: must be 1 (Intel) or 0"));
   CHECK(tells(placed("0|8@1 "), "x.dbc:6: (1,0) [0|0] \"\" B: must be '+'"));
   CHECK(tells(message(" SG_ T : 0|8@1+ (nan,0) [0|0] \"\" B\n"), "x.dbc:6: nan,0) [0|0] \"\" B: "));

@@ -96,18 +96,18 @@ TEST_CASE("CompactSubObj makes as many objects, named by its list or numbered", 
 }
 
 TEST_CASE("a malformed line of a data sheet is refused", "[eds]") {
-  CHECK(told("") == "x.eds: is no electronic data sheet: it has no object\n");
+  CHECK(told("") == "x.eds: is not an electronic data sheet: it has no objects\n");
   CHECK_THAT(told("[FileInfo]\nFileName=x\n"), Catch::Contains("it has no object"));
   CHECK_THAT(told(array + "PDOMapping\n"),
              Catch::Contains("x.eds:14: PDOMapping: must be a section, an entry KEY=VALUE or a"));
   CHECK_THAT(told(array + "=1\n"), Catch::Contains("x.eds:14: =1: must be a section, an entry"));
   CHECK_THAT(told("FileName=x\n" + array),
-             Catch::Contains("x.eds:1: FileName=x: must stand in a section"));
+             Catch::Contains("x.eds:1: FileName=x: must be in a section"));
   CHECK_THAT(told(array + "[1018\n"), Catch::Contains("x.eds:14: [1018: must be a section's name"));
   CHECK_THAT(told(array + "DataType=0x0004\n"),
-             Catch::Contains("x.eds:14: DataType = 0x0004: stands twice in its section"));
+             Catch::Contains("x.eds:14: DataType = 0x0004: appears twice in its section"));
   CHECK_THAT(told(array + "[7130SUB1]\nParameterName=again\n"),
-             Catch::Contains("x.eds:14: 7130SUB1: stands there twice, first in line 8"));
+             Catch::Contains("x.eds:14: 7130SUB1: appears twice, first in line 8"));
 }
 
 TEST_CASE("invalid objects of a data sheet are refused", "[eds]") {
@@ -117,9 +117,9 @@ TEST_CASE("invalid objects of a data sheet are refused", "[eds]") {
              Catch::Contains("x.eds:3: 2000.DataType = int16: must be a whole number"));
   CHECK_THAT(told("[2000]\nParameterName=x\nDataType=-3\n"), Catch::Contains("whole number"));
   CHECK_THAT(told("[2000sub1]\nParameterName=x\nDataType=3\n"),
-             Catch::Contains("x.eds:1: 2000sub1: is a part of an object that is not there"));
+             Catch::Contains("x.eds:1: 2000sub1: is part of a missing object"));
   CHECK_THAT(told(array + "[7130sub01]\nParameterName=y\nDataType=3\n"),
-             Catch::Contains("is an object that stands there already"));
+             Catch::Contains("is a duplicate object"));
 }
 
 TEST_CASE("reading a data sheet stops after too many flaws", "[eds]") {

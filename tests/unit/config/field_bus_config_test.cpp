@@ -10,7 +10,7 @@ using namespace thermocomp::test;
 
 namespace {
 
-const std::string twice_given = "is the COB-ID of a TPDO of the device cantrans already";
+const std::string twice_given = "is already the COB-ID of a TPDO of the device cantrans";
 
 /// Edits that are refused without the data sheet.
 void check_all(const std::string& file, const std::vector<Broken>& table) {
@@ -38,24 +38,24 @@ TEST_CASE("two senders of one number or COB-ID are refused", "[canopen][config]"
   const std::string spindle = "index = 0x7130\nsub = 2\ntype";
   check_all("canopen.toml",
             {{"a number twice", "node = 6", "node = 0x5", "", "device[ai_module].node",
-              "is that of the device cantrans already"},
+              "is already that of the device cantrans"},
              {"our own number", "node = 7", "node = 0x7F", "", "device[spindle_module].node",
               "is our own (own_node of the bus)"},
              {"a sensor's COB-ID", spindle, "cob_id = 0x185\nstart_bit = 0\ntype", "",
               "sensor[spindle].cob_id", twice_given},
              {"a mapping's COB-ID", "start_bit = 16", "start_bit = 16\ncob_id = 0x1A7", "cob_id",
               "sensor[column_back].cob_id",
-              "is the COB-ID of a TPDO of the device spindle_module already"},
+              "is already the COB-ID of a TPDO of the device spindle_module"},
              {"a COB-ID in two mappings of two devices", "read_mappings = [1]",
               "read_mappings = [1]\nmapping = [{cob_id = 0x1A7, object = [{index = 0x2000, "
               "length_bits = 8}]}]",
               "[[device.mapping]]", "device[spindle_module].mapping",
-              "is the COB-ID of a TPDO of the device ai_module already"},
+              "is already the COB-ID of a TPDO of the device ai_module"},
              {"a COB-ID in two mappings of one device", "[[device.mapping]]",
               "[[device.mapping]]\ncob_id = 0x1A7\nobject = [{index = 0x2000, length_bits = "
               "8}]\n[[device.mapping]]",
               "cob_id = 0x1A7   ", "device[spindle_module].mapping[2].cob_id",
-              "is the COB-ID of a TPDO of this device already"}});
+              "is already the COB-ID of a TPDO of this device"}});
 }
 
 TEST_CASE("a CANopen bus and its nodes are refused by key and rule", "[canopen][config]") {
@@ -74,7 +74,7 @@ TEST_CASE("a CANopen bus and its nodes are refused by key and rule", "[canopen][
        {"misspelled key", "sdo_timeout_s", "sdo_timout_s", "", "bus[module_bus].sdo_timout_s",
         "did you mean \"sdo_timeout_s\"?"},
        {"a TPDO asked for twice", "read_mappings = [1]", "read_mappings = [1, 1]", "",
-        "device[ai_module].read_mappings", "is there twice"},
+        "device[ai_module].read_mappings", "is listed twice"},
        {"a setting beyond its type", "type = \"uint16\"\nvalue = 1",
         "type = \"uint16\"\nvalue = 65536", "value = 65536", "device[ai_module].write[2].value",
         "[0, 65535]"},
@@ -98,12 +98,12 @@ TEST_CASE("a CANopen sensor is refused by key and rule", "[canopen][config]") {
              {"nothing says where", "start_bit = 16", "#", "[[sensor]]\nname = \"column_back\"",
               "sensor[column_back].start_bit", "must be given, or an object"},
              {"two places", spindle, spindle + "\nstart_bit = 8", "start_bit = 8",
-              "sensor[spindle].start_bit", "cannot stand beside an object"},
+              "sensor[spindle].start_bit", "cannot be combined with an object"},
              {"bits cannot be asked for", "start_bit = 16", "start_bit = 16\npoll_s = 1.0",
               "poll_s = 1.0\nemergency", "sensor[column_back].poll_s", "needs an object"},
              {"a name beside an address", "object = \"AI input PV 1\"",
               "index = 0x7130\nobject = \"AI input PV 1\"", "index = 0x7130\nobject",
-              "sensor[table].index", "cannot stand beside object"},
+              "sensor[table].index", "cannot be combined with object"},
              {"unknown type", spindle, "sub = 2\ntype = \"int15\"", "type = \"int15\"",
               "sensor[spindle].type", "must be one of"},
              {"no type", spindle, "sub = 2", "[[sensor]]\nname = \"spindle\"",
@@ -129,14 +129,13 @@ TEST_CASE("a CANopen sensor is refused by key and rule", "[canopen][config]") {
 
 TEST_CASE("names must be in the node's data sheet", "[canopen][config]") {
   CHECK(told_after("heartbeat_s = 1.0 ", "heartbeat_s = 1.0 ").empty());
-  CHECK(
-      told_after("\"AI input PV 1\"", "\"AI input PW 1\"") ==
-      "canopen.toml:76: sensor[table].object = \"AI input PW 1\": is no object of the data sheet; "
-      "did you mean AI input PV 1?\n");
-  CHECK_THAT(
-      told_after("\"AI input PV 1\"", "\"Number of entries\""),
-      Catch::Contains("sensor[table].object = \"Number of entries\": is not clear; may be AI "
-                      "sensor type/Number of entries or AI input PV/Number of entries"));
+  CHECK(told_after("\"AI input PV 1\"", "\"AI input PW 1\"") ==
+        "canopen.toml:76: sensor[table].object = \"AI input PW 1\": is not an object of the data "
+        "sheet; "
+        "did you mean AI input PV 1?\n");
+  CHECK_THAT(told_after("\"AI input PV 1\"", "\"Number of entries\""),
+             Catch::Contains("sensor[table].object = \"Number of entries\": is ambiguous: AI "
+                             "sensor type/Number of entries or AI input PV/Number of entries"));
   CHECK(told_after("two_channel_module.eds\"", "one_channel_module.eds\"") ==
         "canopen.toml:60: device[ai_module].eds = \"one_channel_module.eds\": no such file\n");
   CHECK_THAT(told_after("eds = \"two_channel_module.eds\"", "#"),
@@ -145,8 +144,8 @@ TEST_CASE("names must be in the node's data sheet", "[canopen][config]") {
       told_after("read_mappings = [1] ", "#"),
       Catch::Contains("sensor[table].object = \"AI input PV 1\": needs mappings of its device"));
   CHECK(told_after("two_channel_module.eds", "DataType=0x0003", "DataType=0x0009") ==
-        "canopen.toml:76: sensor[table].object = \"AI input PV 1\": is no number in the data "
-        "sheet; type makes it one\n");
+        "canopen.toml:76: sensor[table].object = \"AI input PV 1\": is not a number in the data "
+        "sheet; give its type\n");
   CHECK(told_after("two_channel_module.eds", "[7130sub1]\n", "[7130sub1]\nAccess\n") ==
         "two_channel_module.eds:75: Access: must be a section, an entry KEY=VALUE or a comment; "
         "type in the configuration replaces it\n");
@@ -181,10 +180,10 @@ TEST_CASE("a J1939 bus and its devices are refused by key and rule", "[j1939][co
        {"our own address", "address = 0x80", "address = 0xF9 # ours", "", "device[front].address",
         "is our own (own_address of the bus)"},
        {"an address twice", "j1939_name = ", "address = 0x80 #", "", "device[back].address",
-        "is that of the device front already"},
+        "is already that of the device front"},
        {"a NAME twice", "address = 0x80", "j1939_name = \"0x8000FF0012345678\" #",
         "j1939_name = \"0x8000FF0012345678\"  ", "device[back].j1939_name",
-        "is that of the device front already"},
+        "is already that of the device front"},
        {"neither", "address = 0x80", "#", "[[device]]\nname = \"front\"", "device[front].address",
         "must be given, or j1939_name"}});
 }

@@ -98,7 +98,7 @@ const std::vector<Broken>& broken_models() {
       {"input no string", "\"b_degC\"]", "5]", "", "inputs", "must be a string"},
       {"input with a comma", "\"b_degC\"]", "\"b,_degC\"]", "", "inputs", "comma"},
       {"reference too short", "reference = [20.0, 21.0]", "reference = [20.0]", "", "reference",
-       "one value an input (2)"},
+       "one value per input (2)"},
       {"reference not a number", "reference = [20.0, 21.0]", "reference = [20.0, nan]", "",
        "reference", "finite"},
       {"reference unknown word", "reference = [20.0, 21.0]", "reference = \"last_sample\"", "",
@@ -157,7 +157,7 @@ const std::vector<Broken>& broken_models() {
       {"covariance not positive", "[[4.0, 1.0], [1.0, 9.0]]", "[[4.0, 7.0], [7.0, 9.0]]", "",
        "covariance.matrix_K2", "positive semidefinite"},
       {"covariance with a factor too few", "[covariance]", "[covariance]\ndrift_factor = [1.0]",
-       "drift_factor = [1.0]", "covariance.drift_factor", "must have one value an input"},
+       "drift_factor = [1.0]", "covariance.drift_factor", "must have one value per input"},
       {"covariance with a factor below 0", "[covariance]",
        "[covariance]\nscatter_factor = [1.0, -1.0]", "scatter_factor", "covariance.scatter_factor",
        "must be in [0, "},
@@ -194,9 +194,9 @@ const std::vector<Broken>& broken_terms() {
        "subject = \"oil_rpm\"\ngain_um_per_K2", "subject = \"oil_rpm\"", "term[9].subject",
        "must be a temperature"},
       {"a day that begins by a signal", "\"speed_rpm|oil_degC\"", "\"oil_degC|speed_rpm\"", "",
-       "term[11].subject", "what acts"},
+       "term[11].subject", "must be a cause"},
       {"what acts alone", "\"speed_rpm|oil_degC\"", "\"speed_rpm\" # one", "", "term[11].subject",
-       "what acts"},
+       "must be a cause"},
       {"half at the start", "at_start = 1", "at_start = 2", "", "term[11].at_start", "[0, 1]"},
   };
   return table;
@@ -355,7 +355,7 @@ TEST_CASE("a recorded course is read and written bit for bit", "[config][model]"
 TEST_CASE("a broken course is named by key and rule", "[config][model]") {
   const auto [from, to, said] = GENERATE(table<std::string, std::string, std::string>(
       {{"\"cooling\"", "\"cold\"", "must be \"heating\", \"turned\" or \"cooling\""},
-       {"since_s = [60.0, 1e3]", "since_s = [60.0]", "must have one value a point (2)"},
+       {"since_s = [60.0, 1e3]", "since_s = [60.0]", "must have one value per point (2)"},
        {"[1.2, 0.9]", "[1.2, 1e308]", "must be in [0, 10]"},
        {"[2.0, 1.0]]", "[2.0]]", "must have 2"},
        {"[0.1, 0.05]]", "[0.1, nan]]", "finite"},

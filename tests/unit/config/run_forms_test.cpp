@@ -196,7 +196,7 @@ TEST_CASE("an ambiguity is reported with the line to write", "[config][run]") {
       {"a column of words", "time_s;z [um];note [-]\n0;1;cold\n", 2, "ignore = [\"note [-]\"]"},
       {"no header", "0;20.5\n1;20.6\n", 1, "names = [\"time_s\", "},
       {"words", "time_s;z [um]\n0;1\n1;cold\n2;warm\n", 3, "missing = [\"cold\", \"warm\"]"},
-      {"no table", "one line\nand another\n", 1, "no table that is known"},
+      {"no table", "one line\nand another\n", 1, "is not a known table"},
       {"XML", "<?xml version=\"1.0\"?>\n<a/>\n", 1, "is XML"},
       {"an archive", "\x1F\x8B rest", 0, "gunzip"},
   };

@@ -59,7 +59,7 @@ TEST_CASE(
   CHECK(machine.writer().statistics().working);
   CHECK(machine.writer().statistics().lost == 0);
   CHECK_THAT(told(machine.writer().take_news()),
-             Catch::Contains("opened anew") && !Catch::Contains("lost"));
+             Catch::Contains("reopened") && !Catch::Contains("lost"));
   commit();
   CHECK(records_in(config.file) == machine.writer().statistics().records);
   CHECK(machine.writer().statistics().replaced == 1);
@@ -107,7 +107,7 @@ TEST_CASE("rows whose only copy was in a removed -wal wait until they can be wri
   CHECK(told(machine.writer().take_news()).empty());
   now += std::chrono::minutes(1);
   commit();
-  CHECK_THAT(told(machine.writer().take_news()), Catch::Contains("opened anew"));
+  CHECK_THAT(told(machine.writer().take_news()), Catch::Contains("reopened"));
   CHECK(machine.writer().statistics().replaced == 1);
   CHECK(machine.writer().statistics().lost == 0);
   machine.stop();

@@ -149,7 +149,7 @@ TEST_CASE("a clock set beyond the year 2116 costs only the wall time", "[history
   std::ostringstream out;
   const ExportSummary after = export_run(config.file, {}, {}, out, {}, parse_test_setup);
   CHECK(after.rows == before.rows);
-  CHECK_THAT(told(after.damage), Catch::Contains("segment 2: its wall time cannot be"));
+  CHECK_THAT(told(after.damage), Catch::Contains("segment 2: its wall time is impossible"));
   CHECK(replay_quietly(config.file).segments == 2);
 }
 

@@ -111,7 +111,8 @@ TEST_CASE("a record of another format is reported, and replaced once an offset i
   std::string back = bytes_of(file);
   CHECK(back[8] == 1);
   write(file, "something else that is long enough to have a format");
-  CHECK_THAT(LastSent(file, "cnc", two_axes()).problem(), Catch::Contains("none of this program"));
+  CHECK_THAT(LastSent(file, "cnc", two_axes()).problem(),
+             Catch::Contains("not written by this program"));
 }
 
 TEST_CASE("a process that ends while recording leaves the old or the new record", "[last_sent]") {

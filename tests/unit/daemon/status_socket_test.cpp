@@ -196,7 +196,7 @@ TEST_CASE("a socket path is taken over only from a dead daemon", "[socket]") {
   SECTION("another file is left alone") {
     std::ofstream(path) << "text";
     CHECK_THROWS_WITH(StatusServer(SocketConfig{path, "a", "b", "c"}),
-                      Catch::Contains("no socket"));
+                      Catch::Contains("not a socket"));
     CHECK(std::filesystem::file_size(path) == 4);
   }
   SECTION("the file goes when the daemon ends") {

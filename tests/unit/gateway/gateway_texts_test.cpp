@@ -193,7 +193,7 @@ TEST_CASE("the page uses the texts of thermocomp status", "[gateway][page]") {
   CHECK(state["verdict"]["answer"] == "not known");
   CHECK(state["axes"].size() == 2);  // last known values
   CHECK_THAT(state["problems"][0]["remedy"].get<std::string>(),
-             Catch::Contains("the last offsets stay at the controller: "));
+             Catch::Contains("the controller keeps the last offsets: "));
   CHECK(state["verdict"]["since_s"] == std::round(snapshot.since_s));
   CHECK_FALSE(page_state(Snapshot(), "mill").contains("axes"));
 }

@@ -317,7 +317,7 @@ TEST_CASE("operators' corrections are displacements of opposite sign", "[import]
     std::string two = log;
     two.replace(two.find("T5;Z;0,005"), 2, "T7");
     CHECK_THROWS_WITH(displacements_of(import_text(two), CorrectionEntry::step),
-                      Contains("of several tools or places each needs a log of its own"));
+                      Contains("several tools or places need a log each"));
   }
   SECTION("an axis has one column") {
     CHECK_THROWS_WITH(displacements_of(import_text("time_s,z_um,Z_mm\n0,1,0.001\n1,2,0.002\n"),

@@ -204,10 +204,10 @@ def plan(tmp_path_factory):
 # Displayed raw value of a first channel: (preset, event, code): bytes, reason.
 SHOWN = {
     ("jumo_cantrans_t", None, None): ("FA 00 00 00 00", ""),
-    ("jumo_cantrans_t", "over_range", 2): ("FA 00 00 00 02", "the status beside it is 0x02"),
+    ("jumo_cantrans_t", "over_range", 2): ("FA 00 00 00 02", "its status is 0x02"),
     ("esd_can_cbx_thermo", None, None): ("A8 61 00 00, status 00", ""),
     ("esd_can_cbx_thermo", "open_circuit", 1): ("A8 61 00 00, status 01",
-                                                "the status beside it is 0x01"),
+                                                "its status is 0x01"),
     ("axiomatic_axtc4co", "open_circuit", -512): ("00 FE", "the device's code for it"),
     ("j1939_exhaust_ports", "open_circuit", 0xFE00): ("00 FE 40 25 40 25 40 25",
                                                       'the standard\'s "error"'),

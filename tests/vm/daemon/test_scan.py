@@ -172,7 +172,7 @@ applied = { id = 0x281, start_bit = 7, length_bits = 16, byte_order = "big_endia
     assert found["kind"] == "can" and found["error"] == "" and not found["complete"]
     values = {each["what"]: each for each in found["values"]}
     assert values["applied of axis z"]["value"] == -2.5 and values["cutting_on"]["value"] == 1
-    assert values["x_mm"]["why"] == "the frame has 1 bytes, too few"
-    assert values["y_mm"]["why"] == "no frame with identifier 0x283 came"
+    assert values["x_mm"]["why"] == "the frame has 1 bytes, which is too few"
+    assert values["y_mm"]["why"] == "no frame with identifier 0x283 was received"
     with pytest.raises(BlockingIOError), listener:
         listener.recv(16)

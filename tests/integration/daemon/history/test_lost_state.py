@@ -79,7 +79,7 @@ def test_a_newer_history_is_refused_once_and_everything_stays_as_it_is(machine):
     before = {file.name: file.read_bytes() for file in (daemon.state, daemon.history)}
     daemon.start(wait=False)
     assert daemon.process.wait(PATIENCE_S) == 2
-    assert "history of version 2, which a newer thermocompd wrote" in daemon.log_text()
+    assert "history of version 2, written by a newer thermocompd" in daemon.log_text()
     assert {name: (daemon.folder / name).read_bytes() for name in before} == before
     assert machine.controller.applied_um() == pytest.approx(9.0, abs=0.01)
     with contextlib.closing(sqlite3.connect(daemon.history)) as base:

@@ -64,7 +64,7 @@ def test_a_second_sigterm_does_not_wait_for_zero(machine):
     daemon.wait_for_mode("ramping_to_zero")
     daemon.end()
     assert machine.controller.applied_um() > 0.0
-    assert "asked to stop at once" in daemon.log_text()
+    assert "immediate stop requested" in daemon.log_text()
 
 
 def test_a_controller_that_restarts_from_zero_is_brought_back_slowly(machine, lab):
