@@ -195,6 +195,9 @@ class HttpDoor::Exchange final : public HttpExchange {
 
 /// When the answer is ready, libmicrohttpd calls on_request() again.
 void HttpDoor::Exchange::later(AnswerThread& answers, AnswerThread::Work work) {
+  // The request is complete: the time of its answer counts, not the idle time before it.
+  door_.connections.is_at(socket_of(connection_), SlowConnections::Stage::answer,
+                          SlowConnections::Clock::now());
   MHD_suspend_connection(connection_);
   const auto done = [&request = request_, connection = connection_](JsonAnswer made) {
     request.answer = std::move(made);
