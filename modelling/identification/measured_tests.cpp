@@ -13,16 +13,16 @@
 namespace thermocomp::identification {
 namespace {
 
-constexpr std::size_t rows_min = 3;  // of a test; fewer say nothing of a course
-/// A place that has fewer of its values than this would take the other places' rows with it.
+constexpr std::size_t rows_min = 3;  // of a test
+/// A place with a smaller share of values would remove the rows of the other places too.
 constexpr double share_present_min = 0.5;
-/// A signal that stays so close to a level within each run, as a share of it, has not moved.
+/// A signal has moved if its deviation within the runs exceeds this share of its RMS.
 constexpr double still_share = 0.03;
-/// What a temperature moves by less than is the rounding of its text.
+/// Smaller movements of a temperature are rounding of its text.
 constexpr double still_K = 1e-6;
-/// Of a signal's size: what varies by less is the rounding of its text.
+/// Smaller variations, as a share of a signal's magnitude, are rounding of its text.
 constexpr double rounding_share = 1e-9;
-/// Of a signal's range: what goes back by less goes on.
+/// Smaller reversals, as a share of a signal's range, are ignored.
 constexpr double way_share = 0.1;
 
 [[noreturn]] void refuse(const std::string& file, const std::string& key, const std::string& rule) {
@@ -46,7 +46,7 @@ constexpr std::size_t near = 5;
 constexpr double end_spike_K_min = 100.0;
 constexpr double ranges_beyond = 10.0;
 
-/// Whether the value stands off the median of itself and its four neighbours by more than the
+/// True if the value differs from the median of itself and its four neighbours by more than the
 /// limit.
 bool is_spike(const std::vector<double>& values, std::size_t row, double limit_K) {
   std::array<double, near> five{};
@@ -57,8 +57,8 @@ bool is_spike(const std::vector<double>& values, std::size_t row, double limit_K
   return std::abs(values[row] - five[2]) > limit_K;
 }
 
-/// At an end nothing tells a spike from a heater that has just been switched on, and the first row
-/// is what rises count from. So only what is far beyond all that the reading ever shows.
+/// At an end of the run a spike looks like a heater that was just switched on, and the first row is
+/// the reference of all rises. Only values far outside the reading's range are removed.
 bool is_end_spike(const std::vector<double>& values, std::size_t row) {
   double least = std::numeric_limits<double>::infinity();
   double most = -least;
@@ -70,7 +70,7 @@ bool is_end_spike(const std::vector<double>& values, std::size_t row) {
   return values[row] < least - limit_K || values[row] > most + limit_K;
 }
 
-/// 10 K, or 30 of the reading's usual steps where these are more; NaN: it has none.
+/// 10 K, or 30 times the reading's median step if that is more; NaN without steps.
 double spike_limit_K(const std::vector<double>& values) {
   std::vector<double> steps_K;
   for (std::size_t row = 1; row < values.size(); ++row)
@@ -82,7 +82,7 @@ double spike_limit_K(const std::vector<double>& values) {
   return std::max(spike_K_min, usual_steps * *middle);
 }
 
-/// Readings that no structure can show become missing values.
+/// Replaces spikes, which are faster than any structure, by NaN.
 void leave_out_spikes(RunFile& run, std::vector<std::string>& notes) {
   for (std::size_t i = 0; i < run.columns.size() && run.rows() >= near; ++i) {
     if (!is_temperature(run.columns[i])) continue;
@@ -102,7 +102,7 @@ void leave_out_spikes(RunFile& run, std::vector<std::string>& notes) {
   }
 }
 
-/// The columns that all runs have and that hold enough. Rows in which one is missing are left out:
+/// Columns that every run has with enough values. Rows in which one is missing are left out:
 /// `predict` and the daemon have no value there.
 template <class Wanted>
 std::vector<std::string> usable(const std::vector<RunFile>& runs, Wanted wanted,
@@ -123,7 +123,7 @@ std::vector<std::string> usable(const std::vector<RunFile>& runs, Wanted wanted,
   return names;
 }
 
-/// Beyond the rounding of a position that was converted or summed up.
+/// True if the column varies by more than the rounding of a converted or summed position.
 bool varies(const std::vector<RunFile>& runs, const std::string& column) {
   double least = std::numeric_limits<double>::infinity();
   double most = -least;
@@ -194,7 +194,7 @@ TestRun make_run(const RunFile& run, const std::vector<std::string>& places,
   return test;
 }
 
-/// Takes out of `tests` what moves nowhere: it has no shape to be like another's.
+/// Removes places that never move: they have no shape to compare.
 void leave_out_still_places(MeasuredTests& tests) {
   std::vector<Eigen::Index> kept;
   std::vector<std::string> names;
@@ -232,8 +232,8 @@ bool stands_still(const MeasuredTests& tests, std::size_t signal) {
   return !(within > still_share * still_share * size);
 }
 
-/// Whether all runs together have it go up or down once at most: what it does then cannot be told
-/// from what the time since then does.
+/// True if the signal goes up or down at most once in all runs together: its effect cannot be
+/// separated from that of time.
 bool goes_one_way(const MeasuredTests& tests, std::size_t signal) {
   const auto column = static_cast<Eigen::Index>(signal);
   const auto selected = [column](const TestRun& run) {

@@ -1,5 +1,5 @@
-/// Measured runs as the material of similarity and fit: rises over the reference, in tests that can
-/// be left out one at a time.
+/// Measured runs as input of similarity and fit: rises over the reference, split into tests that
+/// can be left out one at a time.
 #pragma once
 
 #include <string>
@@ -11,8 +11,8 @@
 
 namespace thermocomp::identification {
 
-/// One run from the row of its reference (the file's first row in which nothing is missing) to the
-/// end of its selection; rows in which something is missing are left out.
+/// One run from its reference row (the file's first row without missing values) to the end of its
+/// selection; rows with missing values are left out.
 struct TestRun {
   std::string name;
   Eigen::VectorXd time_s;
@@ -23,33 +23,32 @@ struct TestRun {
   Eigen::Index begin{0};              ///< first selected row
 };
 
-/// What is left out as one: a whole run, or a stretch of the only run.
+/// Rows that are left out together: a whole run, or a stretch of the only run.
 struct Fold {
   std::size_t run{0};
   Eigen::Index begin{0};
   Eigen::Index end{0};
 };
 
-/// Rows of the only run whose places, taken together, are further from the reference than in the
-/// other half. Predicting them from the cooler half shows what an equation does beyond what it was
-/// fitted to - as it must when the machine is loaded more than it was in the test.
+/// Half of the rows of a single run with the larger sum of absolute rises. Predicting it from the
+/// other half shows how an equation extrapolates to higher loads than those of the fit.
 struct HotHalf {
-  std::vector<Eigen::Index> rows;  ///< empty: there are several tests, which serve for that
+  std::vector<Eigen::Index> rows;  ///< empty with several tests, which show the same
 };
 
 struct MeasuredTests {
   std::vector<std::string> places;
   std::vector<std::string> outputs;
-  std::vector<std::string> signals;  ///< that all runs have and that vary
-  /// Those that stay at a level within each run, or go up or down once in all: they get no gain,
-  /// and what they do elsewhere is another state of the machine.
+  std::vector<std::string> signals;  ///< common to all runs, and varying
+  /// Signals that stay at a level within each run, or change in one direction once in all runs:
+  /// they get no gain.
   std::vector<std::string> unmoved;
   std::vector<TestRun> runs;
   std::vector<Fold> folds;
   HotHalf hot;
-  std::vector<std::string> notes;  ///< for a person: what was left out and why
+  std::vector<std::string> notes;  ///< what was left out and why
 
-  [[nodiscard]] Eigen::Index rows() const;  ///< selected ones of all runs
+  [[nodiscard]] Eigen::Index rows() const;  ///< selected rows of all runs
   [[nodiscard]] std::string fold_name(std::size_t fold) const;
   [[nodiscard]] bool moved(const std::string& signal) const;  ///< not among the unmoved
 };
@@ -58,14 +57,15 @@ struct TestOptions {
   std::vector<std::string> places;   ///< empty: every temperature that all runs have
   std::vector<std::string> outputs;  ///< may be empty
   std::size_t folds_of_one_run{6};
-  bool signals{false};  ///< operating signals too
-  /// Rows without an output stay, after the first that has them all: temperatures between two
-  /// probings, for low passes. Their outputs are NaN.
+  bool signals{false};  ///< include operating signals
+  /// Keep rows without an output after the first complete row: temperatures between two probings,
+  /// for low passes. Their outputs are NaN.
   bool between_probings{false};
 };
 
-/// A place that no run has a value of, or that moves in none, is left out with a note.
-/// @throws ConfigurationError when a run lacks a column that was asked for, or has too few rows
+/// Leaves out, with a note, places and signals that a run lacks or mostly lacks, and places that
+/// never move.
+/// @throws ConfigurationError if a run lacks a requested column or has too few rows
 [[nodiscard]] MeasuredTests measured_tests(const std::vector<RunFile>& runs,
                                            const TestOptions& options);
 

@@ -1,11 +1,11 @@
-/// Text by printf's rules.
+/// Text formatted as by printf.
 #pragma once
 
 #include <string>
 
 namespace thermocomp::identification {
 
-/// At most 500 characters; the rest is cut off.
+/// At most 500 characters; longer text is truncated.
 [[gnu::format(printf, 1, 2)]] std::string printed(const char* format, ...);
 
 }  // namespace thermocomp::identification

@@ -15,11 +15,11 @@ namespace thermocomp::identification {
 namespace {
 
 constexpr double combinations_max = 2e9;
-constexpr double as_good_as = 1.02;       // fewer terms win within this
-constexpr double condition_max = 1000.0;  // beyond, coefficients balance each other
+constexpr double as_good_as = 1.02;       // on RMS; within it fewer terms win
+constexpr double condition_max = 1000.0;  // above it, coefficients cancel each other
 constexpr double sensor_error_K_of_one_run = 0.1;
 
-/// Two-sided 95 % points of Student's t; beyond thirty degrees the normal's.
+/// Two-sided 95 % points of Student's t; above thirty degrees of freedom the normal's.
 double student_95(std::size_t freedom) {
   constexpr std::array<double, 31> points{0.0,   12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365,
                                           2.306, 2.262,  2.228, 2.201, 2.179, 2.160, 2.145, 2.131,
@@ -28,11 +28,11 @@ double student_95(std::size_t freedom) {
   return freedom < points.size() ? points[std::max<std::size_t>(freedom, 1)] : 1.96;
 }
 
-/// Rows of the folds stacked in order, of the equation's columns and of the outputs.
+/// Rows of the folds stacked in order: columns of the equation, and outputs.
 struct Stacked {
   Eigen::MatrixXd x;
   Eigen::MatrixXd y;
-  std::vector<Eigen::Index> begin;  ///< of each fold, and the end
+  std::vector<Eigen::Index> begin;  ///< first row of each fold, and the end
 };
 
 Stacked stack(const MeasuredTests& tests, const std::vector<FitColumn>& columns) {
@@ -77,8 +77,8 @@ double rms(const Eigen::VectorXd& values) {
   return std::sqrt(values.squaredNorm() / static_cast<double>(values.size()));
 }
 
-/// Rows of one test hang together, so its sum of x e counts as one observation (a sandwich with
-/// one slice a fold); t with folds - 1 degrees of freedom.
+/// Rows of one test are correlated, so its sum of x e counts as one observation (sandwich
+/// estimator, clustered by fold); t with folds - 1 degrees of freedom.
 Eigen::VectorXd confidence(const Stacked& data, const Eigen::VectorXd& residual) {
   const std::size_t folds = data.begin.size() - 1;
   Eigen::VectorXd half_width =
@@ -156,7 +156,7 @@ std::vector<double> rms_of_sums(const Eigen::MatrixXd& sums, double rows) {
   return result;
 }
 
-/// The equation's columns of the pool, place `lost` replaced by `by` (the same: left out).
+/// Columns of the equation with place `lost` replaced by `by`; by = lost: removed.
 std::vector<std::size_t> columns_without(const ColumnPool& pool,
                                          const std::vector<std::size_t>& columns, std::size_t lost,
                                          std::size_t by) {
@@ -226,8 +226,8 @@ SubsetOptions subset_options(const MeasuredTests& tests, const FitOptions& optio
   return subset;
 }
 
-/// The best equation of each number of terms; of those the one with the fewest terms that is as
-/// good as the best.
+/// Best equation of each number of terms; of those, the one with the fewest terms within
+/// `as_good_as` of the best.
 std::vector<std::size_t> choose_columns(const ColumnPool& pool, const FitOptions& options,
                                         Fit& fit) {
   std::vector<LaggedSubset> best;
@@ -247,7 +247,7 @@ std::vector<std::size_t> choose_columns(const ColumnPool& pool, const FitOptions
   double lowest = best[0].score;
   for (const LaggedSubset& each : best) lowest = std::min(lowest, each.score);
   const auto found = std::find_if(best.begin(), best.end(), [&](const LaggedSubset& each) {
-    // Of squares; what is left of an exact equation may be rounded below nothing.
+    // Scores are squares; rounding can make that of an exact equation negative.
     return each.score <= lowest + std::abs(lowest) * (as_good_as * as_good_as - 1.0);
   });
   return found->columns;
@@ -271,7 +271,6 @@ SubsetSearch search_relaxing(const NormalEquations& equations, SubsetOptions sub
   return search_subsets(equations, subset);
 }
 
-/// What the columns of an equation are chosen from, and the choice.
 struct Chosen {
   ColumnPool pool;
   std::vector<std::size_t> columns;

@@ -1,4 +1,5 @@
-/// Sensor choice and equation from measured runs (JP7689460B2), and how far it can be believed.
+/// Sensor choice and equation from measured runs (JP7689460B2), with left-out errors and confidence
+/// intervals.
 #pragma once
 
 #include <string>
@@ -14,7 +15,7 @@
 namespace thermocomp::identification {
 
 enum class Choice {
-  published,  ///< at most two places of a group, the largest group among them
+  published,  ///< at most two places per group, at least one of the largest
   free        ///< any places
 };
 
@@ -22,39 +23,39 @@ struct FitOptions {
   std::size_t terms_min{3};
   std::size_t terms_max{5};
   Choice choice{Choice::published};
-  double threshold{-1.0};  ///< of similarity; negative: chosen
+  double threshold{-1.0};  ///< of similarity; negative: automatic
   bool lags{false};
-  /// What a reading may be wrong by, each place for itself. Negative: 0 with several tests, whose
-  /// left-out errors hold it already (each has a reference of its own); 0.1 K with one run, all
-  /// of whose stretches share one.
+  /// Error of each place's reading, independent of the others. Negative: 0 with several tests,
+  /// whose left-out errors include it (each has its own reference); 0.1 K with one run, whose
+  /// stretches share one reference.
   double sensor_error_K{-1.0};
-  double lag_gain_min{0.05};  ///< share of the left-out sum of squares that a lag must take away
-  /// Where groups allow nothing: fewer terms, then any places, each with a warning.
+  double lag_gain_min{0.05};  ///< least share of the left-out sum of squares that a lag removes
+  /// If the groups allow no combination: fewer terms, then any places, each with a warning.
   bool relaxes{false};
-  /// Share of its own mean square that each column counts for as error: columns that nearly say the
-  /// same then share what is theirs, instead of gains that balance each other. 0: least squares.
+  /// Ridge penalty of each column, as a share of its mean square: nearly collinear columns share
+  /// their effect instead of having gains that cancel each other. 0: least squares.
   double penalty{0.0};
-  std::size_t kept_for_lags{3000};  ///< combinations of each number of terms that get lags
+  std::size_t kept_for_lags{3000};  ///< combinations per number of terms that are tried with lags
 };
 
-/// What the equation says and does for one output.
+/// Equation and errors of one output.
 struct OutputFit {
-  Eigen::VectorXd coefficients;  ///< one a column [um/K]
+  Eigen::VectorXd coefficients;  ///< one per column [um/K]
   Eigen::VectorXd ci95;          ///< half width of the 95 % interval
   double train_rms_um{0.0};
   double left_out_rms_um{0.0};
   double left_out_peak_um{0.0};
   double no_model_rms_um{0.0};
-  std::vector<double> fold_rms_um;           ///< left out
-  std::vector<double> fold_no_model_rms_um;  ///< of the same rows
-  double hot_rms_um{0.0};                    ///< of the hot half, from the other; NaN: none
+  std::vector<double> fold_rms_um;           ///< on the left-out fold
+  std::vector<double> fold_no_model_rms_um;  ///< on the same rows
+  double hot_rms_um{0.0};                    ///< on the hot half, fitted to the other; NaN: none
 };
 
-/// What is left of the equation when a chosen place is lost.
+/// Errors after the loss of a chosen place.
 struct LostPlace {
   std::size_t place{0};
-  std::vector<double> without_rms_um;  ///< left out, refitted without it, one an output
-  std::size_t replacement{0};  ///< the place that does best in its stead; own: there is none
+  std::vector<double> without_rms_um;  ///< left out, refitted without the place, by output
+  std::size_t replacement{0};          ///< best substitute; the place itself: none
   std::vector<double> replaced_rms_um;
 };
 
@@ -65,39 +66,37 @@ struct Fit {
   std::vector<OutputFit> outputs;
   double condition{0.0};  ///< of the columns, each scaled to length 1
   std::vector<LostPlace> lost;
-  /// Left-out prediction over all selected rows of all runs, in order; shape (rows, outputs).
+  /// Left-out prediction of all selected rows, in order of the runs; shape (rows, outputs).
   Eigen::MatrixXd left_out_um;
   std::vector<std::vector<Subset>> ranking;  ///< [terms], best first
   std::uint64_t judged{0};
   std::vector<std::string> warnings;  ///< worse than no model on a test, nearly singular, ...
 };
 
-/// The columns of the best equation alone, and its coefficients; shape (columns, outputs).
+/// Columns and coefficients of the best equation; shape (columns, outputs).
 struct Equation {
   std::vector<FitColumn> columns;
   Eigen::MatrixXd coefficients;
 };
-/// As fit_equation(), without judging it.
+/// The choice of fit_equation() without its evaluation.
 [[nodiscard]] Equation chosen_equation(const MeasuredTests& tests, const FitOptions& options);
 
-/// Every allowed combination; the best by left-out tests (and the hot half of an only run), with
-/// what wrong readings would add; of two that are as good (2 %) the one
-/// with fewer terms.
-/// @throws std::runtime_error when no combination is allowed or there are too many
+/// Searches all allowed combinations for the smallest left-out error (including the hot half of a
+/// single run) plus the effect of reading errors; within 2 % the one with fewer terms is chosen.
+/// @throws std::runtime_error if no combination is allowed or there are too many
 [[nodiscard]] Fit fit_equation(const MeasuredTests& tests, const FitOptions& options);
 
 /// The model file that the daemon runs; reference: first sample.
 [[nodiscard]] ThermalModel model_of(const MeasuredTests& tests, const Fit& fit);
 
-/// Whether a model leaves half or more of what no model leaves of an output, RMS of what was left
-/// out.
+/// True if the left-out RMS is not below half of that without a model.
 [[nodiscard]] constexpr bool is_unfit(double left_um, double no_model_um) noexcept {
   return !(left_um < 0.5 * no_model_um);
 }
 
 [[nodiscard]] std::string fit_text(const MeasuredTests& tests, const Fit& fit);
 [[nodiscard]] std::string fit_json(const MeasuredTests& tests, const Fit& fit);
-/// One page with curves of measured and left-out prediction, residuals, and the chosen places.
+/// HTML page: curves of measured and left-out prediction, residuals, and the chosen places.
 [[nodiscard]] std::string fit_html(const MeasuredTests& tests, const Fit& fit);
 
 }  // namespace thermocomp::identification

@@ -19,7 +19,7 @@ struct Options {
   std::vector<std::string> runs;
   std::string columns;
   std::vector<std::string> places;
-  double threshold{-1.0};  ///< negative: chosen
+  double threshold{-1.0};  ///< automatic if negative
   bool as_published{false};
   bool range_of_each_test{false};
   bool json{false};
@@ -57,10 +57,10 @@ std::string json_of(const MeasuredTests& tests, const Eigen::MatrixXd& s,
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
-/// Names in full, at least two blanks between the columns.
+/// Table with full names, at least two blanks between the columns.
 std::string table_of(const MeasuredTests& tests, const Eigen::MatrixXd& s,
                      const Grouping& grouping) {
-  std::size_t longest = 7;  // of a value
+  std::size_t longest = 7;  // width of a value
   for (const std::string& place : tests.places) longest = std::max(longest, place.size());
   const std::size_t width = longest + 2;
   const auto right = [width](const std::string& cell) {

@@ -1,4 +1,4 @@
-/// `thermocomp group`: which places warm alike.
+/// The command `thermocomp group`: places that warm alike.
 #pragma once
 
 #include <functional>

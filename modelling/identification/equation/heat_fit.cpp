@@ -21,7 +21,7 @@ constexpr std::array<double, 6> taus_s{60.0, 300.0, 900.0, 2700.0, 8100.0, 24300
 constexpr std::size_t starts_min = 3;
 constexpr double starts_apart_K = 1.0;
 
-/// With a factor, about the mean of the runs' starts.
+/// Multiplies the column by a place's temperature relative to the mean of the runs' starts.
 HeatColumn by_start(const MeasuredTests& tests, HeatColumn column, std::size_t place,
                     bool at_start) {
   double sum_degC = 0.0;
@@ -66,7 +66,7 @@ std::vector<HeatColumn> candidates(const MeasuredTests& tests, const Equation& e
   return all;
 }
 
-/// X'X of each fold: chosen columns, candidates, outputs.
+/// X'X of each fold; order: chosen columns, candidates, outputs.
 std::vector<Eigen::MatrixXd> equations(const MeasuredTests& tests, const Equation& equation,
                                        const std::vector<HeatColumn>& heats) {
   const auto own = static_cast<Eigen::Index>(equation.columns.size());
@@ -89,7 +89,7 @@ std::vector<Eigen::MatrixXd> equations(const MeasuredTests& tests, const Equatio
   return folds;
 }
 
-/// Least squares; the smallest share of a column's own length keeps singular ones finite.
+/// Least squares with a relative ridge of 1e-9, which keeps singular equations finite.
 Eigen::MatrixXd solved(const Eigen::MatrixXd& total, const std::vector<Eigen::Index>& x,
                        Eigen::Index outputs) {
   Eigen::MatrixXd a = total(x, x);
@@ -101,7 +101,7 @@ Eigen::MatrixXd solved(const Eigen::MatrixXd& total, const std::vector<Eigen::In
          (scale.asDiagonal() * a * scale.asDiagonal()).ldlt().solve(scale.asDiagonal() * y);
 }
 
-/// Left-out sum of squares of each fold, each output as a share of its own.
+/// Left-out sum of squares per fold, each output relative to its total.
 std::vector<double> scores(const std::vector<Eigen::MatrixXd>& folds, const Eigen::MatrixXd& total,
                            const std::vector<Eigen::Index>& x, Eigen::Index outputs) {
   std::vector<double> result;

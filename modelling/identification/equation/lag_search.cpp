@@ -23,29 +23,28 @@ std::vector<double> time_constants(const MeasuredTests& tests, std::size_t count
     duration_s = std::max(duration_s, length_s);
     step_s = std::min(step_s, length_s / static_cast<double>(rows - 1));
   }
-  // Shorter than two rows or 1 min cannot be told from none, longer than a quarter of the test
-  // not from a drift.
+  // A lag below two rows or 1 min cannot be distinguished from none, one above a quarter of the
+  // test not from a drift.
   const double shortest_s = std::max(2.0 * step_s, 60.0);
   const double longest_s = std::min(duration_s / 4.0, 4.0 * 3600.0);
   std::vector<double> taus_s;
   if (!(longest_s > shortest_s)) return taus_s;
   for (std::size_t i = 0; i < count; ++i) {
     const double share = count == 1 ? 0.5 : static_cast<double>(i) / static_cast<double>(count - 1);
-    // Whole seconds: a figure for a person too.
+    // Whole seconds, for readability.
     taus_s.push_back(std::round(shortest_s * std::pow(longest_s / shortest_s, share)));
   }
   return taus_s;
 }
 
-/// Where the outputs stand in the pool's equations.
 std::vector<Eigen::Index> outputs_of(const ColumnPool& pool) {
   std::vector<Eigen::Index> places(pool.outputs());
   std::iota(places.begin(), places.end(), static_cast<Eigen::Index>(pool.columns().size()));
   return places;
 }
 
-/// The equations of one subset and its lags in all folds, while columns are taken up one by one;
-/// the arithmetic is that of search_subsets().
+/// Equations of one subset and its lags in all folds, extended by one column at a time with the
+/// arithmetic of search_subsets().
 class Forward {
  public:
   Forward(const ColumnPool& pool, const std::vector<std::size_t>& columns) : pool_(pool) {
@@ -83,8 +82,8 @@ class Forward {
     return true;
   }
 
-  /// Left-out sums over outputs, one a fold, relative to no model, with column k besides (-1:
-  /// none); empty where singular.
+  /// Left-out sum of squares of the outputs per fold, relative to no model, with column k added
+  /// (-1: none); empty if singular.
   [[nodiscard]] std::vector<double> scores_with(Eigen::Index k) const {
     std::vector<double> scores(train_.size(), 0.0);
     for (std::size_t f = 0; f < train_.size(); ++f) {
@@ -116,7 +115,7 @@ double sum_of(const std::vector<double>& values) {
   return sum;
 }
 
-/// Whether the newest of the lags is a share of its place's coefficient, fitted to all rows.
+/// True if each lag's gain, fitted to all rows, is a share of its place's coefficient.
 bool is_share(const ColumnPool& pool, const std::vector<std::size_t>& columns) {
   const std::vector<Eigen::Index> x(columns.begin(), columns.end());
   const std::vector<Eigen::Index> y = outputs_of(pool);

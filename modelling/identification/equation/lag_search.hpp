@@ -1,4 +1,4 @@
-/// A lag on a term, d = K T + g (LP(T) - T), where a left-out test pays for it.
+/// Selection of lags of the terms, d = K T + g (LP(T) - T), by left-out error.
 #pragma once
 
 #include <vector>
@@ -10,19 +10,19 @@
 
 namespace thermocomp::identification {
 
-/// A column of the equation: a place's rise, or (tau_s > 0) what its low pass lags behind.
+/// Column of the equation: rise T of a place, or with tau_s > 0 LP(T) - T.
 struct FitColumn {
   std::size_t place{0};
   double tau_s{0.0};
 };
 
-/// The column over all rows of a run, in the estimator's own arithmetic.
+/// Column over all rows of a run, computed by the estimator's low pass.
 [[nodiscard]] Eigen::VectorXd column_of(const TestRun& run, const FitColumn& column);
 
-/// Equations of each fold for every place and every place's lags at fixed time constants.
+/// Equations of each fold for all places and their lags at fixed time constants.
 class ColumnPool {
  public:
-  /// @param lags  how many time constants, spaced by equal ratios; 0: none
+  /// @param lags  number of time constants, with equal ratios; 0: none
   ColumnPool(const MeasuredTests& tests, std::size_t lags, double sensor_error_K);
 
   [[nodiscard]] const std::vector<FitColumn>& columns() const noexcept { return columns_; }
@@ -34,8 +34,8 @@ class ColumnPool {
   [[nodiscard]] std::size_t places() const noexcept { return places_; }
   [[nodiscard]] std::size_t outputs() const noexcept { return outputs_; }
 
-  /// Left-out sum of squares, shape (folds, outputs), of least squares with these columns on all
-  /// other folds, without the hot half and reading errors; NaN where the equations are singular.
+  /// Left-out sum of squares, shape (folds, outputs), of least squares with these columns on the
+  /// other folds, without hot half and reading errors; NaN if singular.
   [[nodiscard]] Eigen::MatrixXd left_out(const std::vector<std::size_t>& columns) const;
 
  private:
@@ -43,7 +43,7 @@ class ColumnPool {
   std::size_t outputs_;
   std::vector<double> taus_s_;
   std::vector<FitColumn> columns_;
-  std::size_t tests_;  ///< folds without the hot half
+  std::size_t tests_;  ///< number of folds without the hot half
   NormalEquations equations_;
 };
 
@@ -52,13 +52,13 @@ struct LaggedSubset {
   double score{0.0};                 ///< as Subset::score
 };
 
-/// Forward choice: the lag with the best left-out score joins while it lowers the score by
-/// `gain_min` of itself and helps on more than half of the folds; one lag a place, and only as a
-/// share of the structure that follows late, 0 < g / K <= 1 (for several outputs: taken together).
+/// Forward selection: the lag with the best left-out score joins if it reduces the score by a share
+/// of `gain_min` and helps on more than half of the folds; one lag per place, only with 0 < g / K
+/// <= 1 (for several outputs: taken together).
 [[nodiscard]] LaggedSubset add_lags(const ColumnPool& pool, const std::vector<std::size_t>& places,
                                     double gain_min);
 
-/// Whether more than half of the folds leave less after it.
+/// True if the score is lower after it on more than half of the folds.
 [[nodiscard]] bool helps_on_most(const std::vector<double>& before,
                                  const std::vector<double>& after);
 

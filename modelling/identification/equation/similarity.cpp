@@ -11,7 +11,7 @@
 namespace thermocomp::identification {
 namespace {
 
-/// Places that differ by more than this are not alike in any sense: a third of the movement.
+/// Upper limit of the automatic threshold.
 constexpr double threshold_max = 0.3;
 
 struct Pair {
@@ -48,21 +48,20 @@ std::vector<std::vector<std::size_t>> groups_of(std::vector<std::size_t>& parent
   return by_root;
 }
 
-/// The selected ones.
 auto rows_of(const TestRun& run) {
   return run.places_K.bottomRows(run.places_K.rows() - run.begin);
 }
 
-/// Mean square of a place over the selected rows of all tests.
 Eigen::VectorXd mean_squares(const MeasuredTests& tests) {
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(tests.places.size()));
   for (const TestRun& run : tests.runs) sum += rows_of(run).colwise().squaredNorm();
   return sum / static_cast<double>(tests.rows());
 }
 
-/// Of each place's second differences the part that the other places do not have: rows ten minutes
-/// apart hold motion, which neighbours share, and noise, which they do not. A place that moves as
-/// no other keeps motion in its part; sensors are alike, so it gets at most twice the usual one.
+/// Part of each place's second differences that the other places do not explain. Rows ten minutes
+/// apart contain motion, which neighbours share, and noise, which they do not. A place with a
+/// motion of its own keeps it in this part, so the part is limited to twice the median of all
+/// places (RMS).
 /// @param products  of the places' second differences, summed over `count` rows
 Eigen::VectorXd own_parts(const Eigen::MatrixXd& products, double count) {
   const Eigen::VectorXd whole = products.diagonal();
@@ -93,12 +92,12 @@ Eigen::MatrixXd similarity(const MeasuredTests& tests, bool relative, LargestOve
     for (const Eigen::VectorXd& each : largest) of_all = of_all.cwiseMax(each);
     std::fill(largest.begin(), largest.end(), of_all);
   }
-  Eigen::MatrixXd crosses = Eigen::MatrixXd::Zero(places, places);  // A over its largest, times B
+  Eigen::MatrixXd crosses = Eigen::MatrixXd::Zero(places, places);  // of A / max|dT_A| and B
   Eigen::VectorXd squares = Eigen::VectorXd::Zero(places);
   Eigen::VectorXd scaled_squares = Eigen::VectorXd::Zero(places);
   for (std::size_t i = 0; i < tests.runs.size(); ++i) {
     const auto rows = rows_of(tests.runs[i]);
-    // A place that does not move in a test has no shape there.
+    // A place that does not move in a test contributes nothing there.
     const Eigen::VectorXd scale =
         (largest[i].array() > 0).select(largest[i].cwiseInverse(), Eigen::VectorXd::Zero(places));
     const Eigen::MatrixXd scaled = rows * scale.asDiagonal();
@@ -132,8 +131,8 @@ Eigen::MatrixXd noise_floor(const MeasuredTests& tests) {
     second.noalias() += each.transpose() * each;
     count += static_cast<double>(rows - 2);
   }
-  // A second difference of white noise has six times its variance. The rise has the noise of its
-  // own row and that of the reference row.
+  // A second difference of white noise has six times its variance. A rise contains the noise of its
+  // own row and of the reference row.
   const Eigen::VectorXd noise = own_parts(second, count) / (6.0 * std::max(count, 1.0));
   const Eigen::VectorXd share = (2.0 * noise).cwiseQuotient(mean_squares(tests));
   Eigen::MatrixXd floor(places, places);
@@ -163,7 +162,7 @@ Grouping group_places(const Eigen::MatrixXd& s, double threshold) {
 }
 
 Grouping group_places(const Eigen::MatrixXd& s, const Eigen::MatrixXd& floor) {
-  // A pair that differs by less than its noise is alike as far as anybody can tell.
+  // A pair that differs by less than its noise counts as alike.
   const Eigen::MatrixXd raised = s.cwiseMax(floor);
   const std::vector<Merge> merges = group_places(raised, 0.0).merges;
   double threshold = 0.0;

@@ -11,7 +11,6 @@ namespace {
 
 constexpr double singular_share = 1e-10;
 
-/// Keeps the best few of one number of terms.
 class Best {
  public:
   explicit Best(std::size_t kept) : kept_(kept) {}
@@ -38,14 +37,14 @@ class Best {
   std::vector<Subset> subsets_;
 };
 
-/// Equations of all folds side by side, so that one pass of the processor's vector unit serves
-/// several folds: entry (i, j), i <= j, of fold f stands at [(i * size + j) * lanes + f].
+/// Interleaved equations of all folds, so that a vector instruction serves several folds: entry (i,
+/// j) of fold f, i <= j, is at [(i * size + j) * lanes + f].
 struct Level {
   std::vector<double> train;
   std::vector<double> left_out;
 };
 
-/// `fixed`: the number of lanes, known when compiled; 0: as in `lanes`.
+/// `fixed`: number of lanes at compile time; 0: `lanes`.
 template <std::size_t fixed>
 class Search {
  public:
@@ -86,7 +85,7 @@ class Search {
     return (i * size_ + j) * lanes();
   }
 
-  /// The required group first: a branch without any of it is left early.
+  /// Counts the places of the required group, which fill() puts first to prune the others early.
   void order_places() {
     if (options_.group_of.empty()) return;
     const auto required = [&](std::size_t place) {
@@ -103,7 +102,7 @@ class Search {
         return options_.group_of[place] == options_.group_required;
       });
     const Eigen::MatrixXd& total = equations.total;
-    // Columns of one length: what is singular can then be told from one number.
+    // Unit columns, so that one threshold detects singular equations.
     Eigen::VectorXd scale = total.diagonal().cwiseSqrt().cwiseInverse();
     for (Eigen::Index i = 0; i < scale.size(); ++i)
       if (!std::isfinite(scale[i])) scale[i] = 0.0;
@@ -122,14 +121,14 @@ class Search {
           const double error =
               reading ? equations.reading_errors(a, static_cast<Eigen::Index>(f)) : 0.0;
           levels_[0].left_out[at(i, j) + f] = own + error * scale[a] * scale[b];
-          // A lane without a fold: equations that cannot fail, and weigh nothing.
+          // A lane without a fold gets the identity: never singular, and without weight.
           levels_[0].train[at(i, j) + f] = real ? all - own : (i == j ? 1.0 : 0.0);
         }
       }
     }
   }
 
-  /// Judges each place from `first` on as an addition to those chosen, and goes on with it.
+  /// Scores each place from `first` on in addition to the chosen ones, and recurses.
   void descend(std::size_t depth, std::size_t first) {
     const Level& level = levels_[depth];
     const std::size_t terms = depth + 1;
@@ -201,7 +200,7 @@ class Search {
     }
   }
 
-  /// `last`: what follows is only judged, so of the places only diagonal and outputs are needed.
+  /// `last`: the next level is only scored, which needs diagonal and outputs of the places.
   void eliminate(const Level& from, Level& to, std::size_t k, bool last) noexcept {
     const double* a_kk = &from.train[at(k, k)];
     for (std::size_t i = k + 1; i < size_; ++i) {
@@ -225,7 +224,7 @@ class Search {
   std::vector<Best> best_;
   std::vector<std::size_t> of_group_;
   std::vector<double> factor_;
-  std::vector<std::size_t> place_;  ///< own order -> candidate
+  std::vector<std::size_t> place_;  ///< search order -> candidate
   std::vector<std::size_t> chosen_;
   std::size_t required_{0};
   std::uint64_t judged_{0};

@@ -1,4 +1,4 @@
-/// Every combination of places, judged on tests left out, from normal equations alone.
+/// Search of all combinations of places by left-out error, from normal equations alone.
 #pragma once
 
 #include <cstdint>
@@ -15,14 +15,14 @@ struct NormalEquations {
   Eigen::Index candidates{0};
   Eigen::Index outputs{0};
   Eigen::MatrixXd total;               ///< over all rows
-  std::vector<Eigen::MatrixXd> folds;  ///< what is left out; the hot half last, where there is one
-  /// Added to a fold's own diagonal, shape (candidates, folds): rows times the square of what a
-  /// place's reading may be wrong by. It adds rows * sum (coefficient * error)^2 to what is left.
+  std::vector<Eigen::MatrixXd> folds;  ///< left-out rows; the hot half last, if any
+  /// Added to a fold's own diagonal, shape (candidates, folds): rows times the squared reading
+  /// error, which adds rows * sum (coefficient * error)^2 to the left-out sum of squares.
   Eigen::MatrixXd reading_errors;
 };
-/// @param sensor_error_K  what each place's reading may be wrong by, independently of the others
+/// @param sensor_error_K  error of each place's reading, independent of the others
 [[nodiscard]] NormalEquations normal_equations(const MeasuredTests& tests, double sensor_error_K);
-/// The same from columns computed for every run; the first `places` of them have reading errors.
+/// As above, from columns computed for every run; the first `places` have reading errors.
 [[nodiscard]] NormalEquations normal_equations(const MeasuredTests& tests,
                                                const std::vector<Eigen::MatrixXd>& columns,
                                                double sensor_error_K);
@@ -32,14 +32,14 @@ struct SubsetOptions {
   std::size_t terms_max{5};
   std::vector<std::size_t> group_of;  ///< candidate -> group; empty: free choice
   std::size_t of_a_group_max{2};
-  std::size_t group_required{0};  ///< one of its places must be in; only with group_of
+  std::size_t group_required{0};  ///< one of its places is required; only with group_of
   std::size_t kept{20};           ///< best subsets kept for each number of terms
 };
 
 struct Subset {
   std::vector<std::size_t> places;  ///< ascending
-  /// Sum over outputs of (left-out sum of squares / sum of squares without a model), divided by
-  /// their number: 0 is perfect, 1 as good as nothing.
+  /// Mean over outputs of left-out sum of squares / sum of squares without a model: 0 is perfect, 1
+  /// equals no model.
   double score{0.0};
 };
 
@@ -48,18 +48,17 @@ struct SubsetSearch {
   std::uint64_t judged{0};
 };
 
-/// The number of combinations that a free choice would judge.
 [[nodiscard]] double combinations(std::size_t candidates, std::size_t terms_min,
                                   std::size_t terms_max);
 
-/// Exact least squares of every allowed combination on all folds but one, for every fold, and the
-/// sum of squares on the fold left out.
+/// For every fold, exact least squares of each allowed combination on the other folds, and the sum
+/// of squares on the fold left out.
 ///
-/// Depth first over ascending places. Taking up place k eliminates it from the training equations
-/// of all folds at once (Gauss), and the fold left out goes through the same congruence: with
-/// c_i = A_ki / A_kk, A_ij -= c_i A_kj and T_ij += c_i c_j T_kk - c_i T_kj - c_j T_ki. Then a
-/// further place j costs, for each fold, b = A_jy / A_jj and T_yy - 2 b T_jy + b^2 T_jj.
-/// A place that the others explain to one part in 10^10 is not taken up beside them.
+/// Depth first over ascending places. Adding place k eliminates it from the training equations of
+/// all folds (Gauss); the left-out fold undergoes the same congruence, c_i = A_ki / A_kk:
+///   A_ij -= c_i A_kj, T_ij += c_i c_j T_kk - c_i T_kj - c_j T_ki.
+/// A further place j then costs, per fold, b = A_jy / A_jj and T_yy - 2 b T_jy + b^2 T_jj. A place
+/// that the others explain to one part in 10^10 is not added to them.
 [[nodiscard]] SubsetSearch search_subsets(const NormalEquations& equations,
                                           const SubsetOptions& options);
 

@@ -19,23 +19,22 @@ constexpr double ratio = 3.0;
 constexpr std::size_t lags_max = 6;
 constexpr int hinges_a_signal = 8;
 constexpr std::size_t values_of_a_switch_max = 6;
-/// A hinge counts as half of what it moves: nothing but the recording says that it is there.
+/// Scale of a hinge: half of the other columns', since only the recording supports it.
 constexpr double weight_of_hinge = 0.5;
-/// A lag too counts as this share of what it moves: of two columns that explain the same, the one
-/// that acts at once stays.
+/// Scale of a lag: of two columns that explain the same, the undelayed one is preferred.
 constexpr double weight_of_lag = 0.7;
-/// Share of the places' usual deviation that is added, in quadrature, to each place's own before it
-/// is scaled to 1, so that a place that hardly moved is not magnified.
+/// Share of the places' RMS deviation added in quadrature to each place's own before scaling it to
+/// 1, so that a place that hardly moved is not amplified.
 constexpr double usual_share = 0.05;
 /// Penalties for columns of standard deviation 1: ridge_penalty is added to their mean square,
-/// l1_price subtracted from their correlation with the output. Both, weight_of_lag and usual_share
-/// were set on spindle, printer, one telescope, one cell and one probe; the
-/// other measured machines were kept for judging (docs/measurements.md).
+/// l1_price is subtracted from their correlation with the output. Both, weight_of_lag and
+/// usual_share were set on spindle, printer, one telescope, one cell and one probe; the other
+/// measured machines were reserved for validation (docs/measurements.md).
 constexpr double ridge_penalty = 3e-4;
 constexpr double l1_price = 1.5e-3;
-/// Share of l1_price below which an improvement by one more column is rounding.
+/// Improvement by a further column, as a share of l1_price, that counts as rounding.
 constexpr double l1_tolerance = 1e-6;
-/// Limit of the iteration, which rounding could make endless; usual is less than one join a column.
+/// Iteration limit in case of rounding; usually less than one join per column.
 constexpr Eigen::Index joins_a_column_max = 10;
 
 bool is_switch(const MeasuredTests& tests, Eigen::Index signal) {
@@ -45,9 +44,9 @@ bool is_switch(const MeasuredTests& tests, Eigen::Index signal) {
   });
 }
 
-/// min 1/2 w'Aw - c'w + price |w|_1, exactly, so that the order of the columns in a file does not
-/// count: the column that would help most joins, and leaves where its sign would turn (Lee et al.,
-/// Efficient sparse coding algorithms, 2007, algorithm 1).
+/// Exact minimum of 1/2 w'Aw - c'w + price |w|_1, independent of the order of the columns in a
+/// file: the column with the largest gradient joins, and leaves if its sign would change (Lee et
+/// al., Efficient sparse coding algorithms, 2007, algorithm 1).
 /// @pre A is positive definite
 Eigen::VectorXd sparse_minimum(const Eigen::MatrixXd& a, const Eigen::VectorXd& c, double price) {
   Eigen::VectorXd w = Eigen::VectorXd::Zero(c.size());
@@ -84,8 +83,8 @@ Eigen::VectorXd sparse_minimum(const Eigen::MatrixXd& a, const Eigen::VectorXd& 
   return w;
 }
 
-/// What the columns are multiplied by before they are fitted; 0: no gain, for what never moves, and
-/// for all that is made of a signal that stood still.
+/// Factors of the columns for the fit; 0 (no gain): columns that never move, and all columns of a
+/// signal that did not move.
 /// @param deviation  standard deviation of each column
 /// @param size       its RMS
 Eigen::VectorXd scales(const Eigen::VectorXd& deviation, const Eigen::VectorXd& size,
@@ -116,7 +115,6 @@ struct Rows {
   Eigen::MatrixXd y;
 };
 
-/// Those in which no output is missing.
 Rows complete_rows(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y) {
   std::vector<Eigen::Index> complete;
   for (Eigen::Index row = 0; row < y.rows(); ++row)
@@ -162,7 +160,7 @@ BankColumns bank_columns(const MeasuredTests& tests) {
 void add_hinges(const MeasuredTests& tests, BankColumns& columns) {
   std::vector<Hinge> hinges;
   for (std::size_t i = 0; i < tests.signals.size(); ++i) {
-    std::set<double> values;  // as many as tell a switch from what varies
+    std::set<double> values;  // enough to distinguish a switch
     double low = std::numeric_limits<double>::infinity();
     double high = -low;
     for (const TestRun& run : tests.runs)

@@ -1,5 +1,5 @@
-/// Every temperature and signal at several low passes, with penalties: what to fit where nobody
-/// knows which few sensors matter.
+/// Penalised regression on every temperature and signal at several low passes, for machines whose
+/// decisive sensors are unknown.
 #pragma once
 
 #include <string>
@@ -12,14 +12,14 @@
 
 namespace thermocomp::identification {
 
-/// max(u - above, 0) of a signal.
+/// max(u - above, 0) of a signal u.
 struct Hinge {
   std::string signal;
   double above{0.0};
 };
 
-/// Columns of a bank: each subject to its power, at each time constant; subjects within a time
-/// constant side by side. Then the hinges.
+/// Columns of a bank: each subject to its power, at each time constant; ordered by time constant,
+/// then subject. Then the hinges.
 struct BankColumns {
   std::vector<std::string> subjects;  ///< temperatures (rises), then signals, then their squares
   std::vector<double> powers;
@@ -29,45 +29,44 @@ struct BankColumns {
   [[nodiscard]] std::size_t size() const noexcept { return late() + hinges.size(); }
 };
 
-/// Time constants by a ratio of three from 5 min up to half of the longest run, at least
-/// twice the step; as many as leave no more than 600 columns. A signal that is only ever 0 or 1 has
-/// no square. No hinges.
+/// Time constants from 5 min, at least twice the step, in ratios of three up to half of the longest
+/// run, with at most 600 columns. A signal with only the values 0 and 1 has no square. No hinges.
 [[nodiscard]] BankColumns bank_columns(const MeasuredTests& tests);
 
-/// Eight hinges a signal, evenly over its range; none where they would be more than 600 columns,
-/// nor on a signal that did not move, or has at most six values, which its size and square say well
-/// enough.
+/// Adds eight hinges per signal, evenly over its range; none if there would be more than 600
+/// columns, nor for a signal that did not move or has at most six values, which the signal and its
+/// square describe.
 void add_hinges(const MeasuredTests& tests, BankColumns& columns);
 
-/// The columns over all rows of a run, less their values at its first row; shape (rows, columns).
+/// Columns over all rows of a run, relative to its first row; shape (rows, columns).
 [[nodiscard]] Eigen::MatrixXd bank_of(const TestRun& run, const MeasuredTests& tests,
                                       const BankColumns& columns);
 
-/// The term that the daemon evaluates, without the hinges and without subjects of no gain: the
-/// daemon asks the controller for every signal that a term names.
+/// Term for the daemon without hinges and without subjects of no gain, since the daemon requests
+/// every signal of a term from the controller.
 /// @param gains  [um per unit], shape (columns, outputs)
 [[nodiscard]] TermSpec bank_term(const BankColumns& columns,
                                  const std::vector<std::string>& outputs,
                                  const Eigen::MatrixXd& gains);
-/// Those of the hinges that have a gain, one each.
+/// One term per hinge with a gain.
 [[nodiscard]] std::vector<TermSpec> hinge_terms(const BankColumns& columns,
                                                 const std::vector<std::string>& outputs,
                                                 const Eigen::MatrixXd& gains);
 
-/// All of it: what acts at once is the matrix's, the rest one term. @pre places stand first
+/// Undelayed temperatures as matrix, the rest as terms. @pre places are the first subjects
 [[nodiscard]] ThermalModel bank_model(const std::vector<std::string>& places,
                                       const std::vector<std::string>& outputs,
                                       const BankColumns& columns, Eigen::MatrixXd gains);
 
-/// X'X and X'Y of every fold, columns scaled to a standard deviation of 1. Rows in which an output
-/// is missing (NaN) do not count.
+/// X'X and X'Y of every fold, columns scaled to a standard deviation of 1. Rows with a missing
+/// output (NaN) are left out.
 class BankEquations {
  public:
   BankEquations(const MeasuredTests& tests, const BankColumns& columns);
 
   /// Gains [um per unit], shape (columns, outputs), from all folds but `left_out` (none: past the
   /// last): one regression with an L1 and a small L2 penalty. Both are fixed, since stretches of a
-  /// record do not predict which is best on another day (docs/measurements.md).
+  /// record do not predict the best ones for another day (docs/measurements.md).
   [[nodiscard]] Eigen::MatrixXd fit(std::size_t left_out) const;
 
   [[nodiscard]] const std::vector<Eigen::MatrixXd>& rows() const noexcept { return rows_; }
@@ -81,7 +80,7 @@ class BankEquations {
   };
   std::vector<Sums> folds_;
   Eigen::VectorXd scale_;
-  std::vector<Eigen::MatrixXd> rows_;  ///< one a run
+  std::vector<Eigen::MatrixXd> rows_;  ///< one per run
 };
 
 }  // namespace thermocomp::identification

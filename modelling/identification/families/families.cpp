@@ -17,27 +17,27 @@ namespace {
 
 constexpr std::size_t kept_for_lags = 200;
 constexpr Eigen::Index stretches_of_only_run = 6;
-/// Fewer runs say too little of a family by each predicting another: what is left of them then is
-/// mostly what a single run has not shown.
+/// With fewer runs, the error on a run left out is mostly due to states that the others lack, and
+/// says little about a family.
 constexpr std::size_t runs_that_choose = 4;
 constexpr std::size_t stretches_that_choose = 8;
 constexpr double correlation_of_one = 0.98;
-/// Shares of the RMS left out that a family must leave less. By the first no model was made of
-/// noise alone in 60 sets of four to seven simulated runs, three in 30 sets whose noise wanders for
-/// hours.
+/// Least reduction of the left-out RMS relative to no model. With it, pure noise got a model in
+/// none of 60 sets of four to seven simulated runs, and in three of 30 sets with noise that wanders
+/// for hours.
 constexpr double less_than_none = 0.1;
 /// The bank is kept while its error exceeds that of few sensors by at most this share: on later
 /// rows it had the smaller error on 68 of 86 splits of measured machines, and on 8 of the 12 in
 /// which few sensors had the smaller error on the stretches.
 constexpr double more_than_few = 0.1;
-/// What is left of a fold counts as at least so much of what no model leaves of all: below, a
-/// family is as good as another.
+/// Lower limit of a fold's RMS as a share of that without a model on all folds; below it, families
+/// are equal.
 constexpr double least_share = 0.01;
-/// A run decides where it leaves so many times the RMS of all others; what it does differently must
-/// be beyond the others by this share of a column's range. Both set by hand.
+/// A run is decisive if its RMS is so many times that of all others; its difference must exceed the
+/// others by this share of a column's range. Both set by hand.
 constexpr double decides_from = 2.0;
 constexpr double differs_from = 0.25;
-constexpr double penalty_of_few = 0.003;  ///< in the middle of the bank's
+constexpr double penalty_of_few = 0.003;  ///< ridge penalty, see FitOptions
 
 std::size_t index_of_family(Family family) {
   return static_cast<std::size_t>(family);
@@ -49,14 +49,14 @@ Eigen::Index rows_of(const MeasuredTests& tests) {
   return rows;
 }
 
-/// All but one fold, as what a family may see when that one judges it.
+/// All folds but one, for a family that is judged on that one.
 MeasuredTests without(const MeasuredTests& tests, std::size_t fold) {
   MeasuredTests rest = tests;
   const Fold out = tests.folds[fold];
   rest.folds.erase(rest.folds.begin() + static_cast<std::ptrdiff_t>(fold));
   std::erase_if(rest.hot.rows, [&](Eigen::Index row) { return row >= out.begin && row < out.end; });
   if (rest.folds.size() > 1) return rest;
-  // A choice judged on one fold would be judged on what it was fitted to: stretches of it instead.
+  // Choosing on a single fold would use the rows of the fit: its stretches instead.
   const Fold only = rest.folds.front();
   rest.folds.clear();
   const Eigen::Index rows = only.end - only.begin;
@@ -66,7 +66,7 @@ MeasuredTests without(const MeasuredTests& tests, std::size_t fold) {
   return rest;
 }
 
-/// Few runs, cut in stretches that are left out in turn.
+/// Splits few runs into stretches that are left out in turn.
 MeasuredTests in_stretches(const MeasuredTests& tests) {
   MeasuredTests cut = tests;
   cut.folds.clear();
@@ -87,7 +87,7 @@ FitOptions options_of(Family family, const MeasuredTests& tests, FitOptions opti
   options.relaxes = true;
   options.kept_for_lags = kept_for_lags;
   options.penalty = penalty_of_few;
-  // Every combination of five of so many is more than a minute's work.
+  // All combinations of five of so many places take more than a minute.
   if (tests.places.size() > 24) options.terms_max = std::min<std::size_t>(options.terms_max, 4);
   if (tests.places.size() > 40) options.terms_max = std::min<std::size_t>(options.terms_max, 3);
   return options;
@@ -109,7 +109,6 @@ Eigen::MatrixXd predicted(const TestRun& run, const HeatEquation& equation) {
   return sum;
 }
 
-/// Fills in what follows from left_out_um.
 void judge(const MeasuredTests& tests, FamilyResult& result) {
   const std::size_t outputs = tests.outputs.size();
   Eigen::VectorXd whole = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(outputs));
@@ -192,13 +191,13 @@ FamilyResult judge_bank(const MeasuredTests& tests, const BankEquations& bank,
   return result;
 }
 
-/// Lags and heats of few sensors only where they were asked for: their gains balance each other,
-/// and on no measured machine were they clearly better than the bank (docs/measurements.md).
+/// Lags and heats of few sensors only on request: their gains cancel each other, and on no measured
+/// machine were they clearly better than the bank (docs/measurements.md).
 bool offered(Family family, std::optional<Family> forced) {
   return (family != Family::lagged_few && family != Family::physical) || family == forced;
 }
 
-/// Every family on the folds left out, order of all_families.
+/// Judges every family on the left-out folds; order of all_families.
 std::vector<FamilyResult> judged(const MeasuredTests& tests, const FitOptions& options,
                                  std::optional<Family> forced, const BankEquations& bank,
                                  const std::function<void()>& done) {
@@ -219,8 +218,7 @@ std::vector<FamilyResult> judged(const MeasuredTests& tests, const FitOptions& o
   return results;
 }
 
-/// The first and the second half of the only run, each left out as a whole: what a model meets when
-/// it is used after the record.
+/// The halves of the only run as folds, since a model is used after its record.
 MeasuredTests in_halves(const MeasuredTests& tests) {
   MeasuredTests halves = tests;
   const Fold& first = tests.folds[tests.folds.size() / 2];
@@ -231,8 +229,8 @@ MeasuredTests in_halves(const MeasuredTests& tests) {
 
 using Judgement = std::pair<MeasuredTests, std::vector<FamilyResult>>;
 
-/// What a family leaves, geometric mean of judgements, outputs and folds: a factor counts alike in
-/// an output that moves little, and one stretch does not decide.
+/// Geometric mean RMS of a family over judgements, outputs and folds: outputs that move little have
+/// the same weight, and one stretch does not decide.
 double left_by(const std::vector<Judgement>& judgements, std::size_t family) {
   double sum = 0.0;
   for (const auto& [tests, results] : judgements) {
@@ -247,7 +245,7 @@ double left_by(const std::vector<Judgement>& judgements, std::size_t family) {
   return std::exp(sum / static_cast<double>(judgements.size()));
 }
 
-/// Names where the family does worse than no model, over all that a judgement left out.
+/// Where the family's total error is not below that of no model; empty: nowhere.
 std::string worse_than_none(const std::vector<Judgement>& judgements, std::size_t family) {
   const auto sum = [](const std::vector<double>& scores) {
     return std::accumulate(scores.begin(), scores.end(), 0.0);
@@ -260,8 +258,8 @@ std::string worse_than_none(const std::vector<Judgement>& judgements, std::size_
   return "";
 }
 
-/// No model unless a family leaves a tenth less; the bank unless few sensors leave a tenth less
-/// than it. Out is what does worse than no model anywhere it was judged.
+/// Chooses no model unless a family leaves a tenth less; the bank unless its error exceeds that of
+/// few sensors by a tenth. Families worse than no model in any judgement are excluded.
 void choose(const std::vector<Judgement>& judgements, FamiliesFit& fit) {
   std::size_t chosen = 0;
   std::vector<double> left_um{left_by(judgements, 0)};
@@ -289,7 +287,7 @@ void choose(const std::vector<Judgement>& judgements, FamiliesFit& fit) {
                        worse;
 }
 
-/// Groups of places whose rises correlate so far that nothing recorded tells them apart.
+/// Groups of places whose rises are too correlated to be separated.
 std::vector<std::vector<std::string>> moved_together(const MeasuredTests& tests) {
   const auto places = static_cast<Eigen::Index>(tests.places.size());
   Eigen::MatrixXd squares = Eigen::MatrixXd::Zero(places, places);
@@ -353,7 +351,7 @@ ThermalModel few_model(const MeasuredTests& tests, const HeatEquation& equation)
   return model;
 }
 
-/// A column of a run as it was recorded: temperatures, then signals.
+/// Column of a run as recorded: temperatures, then signals.
 Eigen::VectorXd recorded(const TestRun& run, std::size_t column) {
   const Eigen::Index rows = run.time_s.size() - run.begin;
   const auto at = static_cast<Eigen::Index>(column);
@@ -362,8 +360,8 @@ Eigen::VectorXd recorded(const TestRun& run, std::size_t column) {
   return run.places_K.col(at).tail(rows).array() + run.reference_degC[at];
 }
 
-/// "; it starts at spindle_rpm = 10000, the others at 0": what sets a run apart most; empty:
-/// nothing that was recorded.
+/// Greatest difference of a run from the others, as "; it starts at spindle_rpm = 10000, the others
+/// at 0"; empty: none recorded.
 std::string difference_of(const MeasuredTests& tests, std::size_t run) {
   struct View {
     const char* words;
@@ -408,7 +406,7 @@ std::string difference_of(const MeasuredTests& tests, std::size_t run) {
   return text;
 }
 
-/// Names a run, left out, whose remainder makes most of the figure.
+/// Warns of a left-out run that causes most of the error.
 void add_deciding_run(const MeasuredTests& tests, const FamilyResult& result, std::size_t output,
                       std::vector<std::string>& warnings) {
   const std::vector<double>& fold_um = result.fold_um[output];

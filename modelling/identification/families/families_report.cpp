@@ -24,8 +24,8 @@ std::string line_of(const FamilyResult& result, bool chosen) {
   return text + printed("   %5.1f %%\n", 100.0 * std::sqrt(score_of(result)));
 }
 
-/// Coefficients with their intervals. What this choice leaves on rows that took part in choosing
-/// it is not told: it is too good.
+/// Coefficients with their intervals, without the error on rows that took part in the choice: it is
+/// too optimistic.
 std::string equation_text(const MeasuredTests& tests, const Fit& fit) {
   std::string text;
   for (std::size_t o = 0; o < tests.outputs.size(); ++o) {
@@ -45,13 +45,13 @@ std::string equation_text(const MeasuredTests& tests, const Fit& fit) {
   return text + printed("condition of the chosen columns: %.1f\n", fit.condition);
 }
 
-/// Two digits, or all before the point.
+/// Two significant digits, or the integer part.
 std::string about(double value) {
   return printed(std::abs(value) < 99.5 ? "%.2g" : "%.0f", value);
 }
 
-/// What another day will show, as far as so many runs can tell. One run has seen no other day; two
-/// judge one another, each by a model of the other alone, which may be far worse than that of both.
+/// Expected error on another day. A single run contains no other day; two runs are each judged by a
+/// model of the other alone, which may be far worse than a model of both.
 std::string claim_text(std::size_t runs, const std::string& name, const MadeFrom::Output& output) {
   const char* how = runs == 1   ? "on another day (each half of this run by a model of the other)"
                     : runs == 2 ? "on a third run (each run by a model of the other alone)"
@@ -60,7 +60,6 @@ std::string claim_text(std::size_t runs, const std::string& name, const MadeFrom
                  about(output.left_out_rms_um).c_str(), how);
 }
 
-/// The largest RMS of a fold.
 double worst_um(const FamilyResult& result, std::size_t output) {
   return *std::max_element(result.fold_um[output].begin(), result.fold_um[output].end());
 }

@@ -40,7 +40,7 @@ std::string losses_text(const MeasuredTests& tests, const Fit& fit) {
   return text;
 }
 
-/// Measured, predicted and residual of an output over the folds, one behind the other.
+/// Curves of measured, predicted and residual of an output, fold after fold.
 std::string curves(const MeasuredTests& tests, const Fit& fit, Eigen::Index output) {
   std::vector<double> hours;
   std::vector<double> measured;
@@ -52,7 +52,7 @@ std::string curves(const MeasuredTests& tests, const Fit& fit, Eigen::Index outp
     return (time_s[fold.end - 1] - time_s[fold.begin]) / 3600.0;
   };
   for (const Fold& fold : tests.folds) all_h += length_h(fold);
-  const double between_h = 0.03 * all_h;  // so wide a gap is seen between two tests
+  const double between_h = 0.03 * all_h;  // visible gap between two tests
   double start_h = 0.0;
   for (const Fold& fold : tests.folds) {
     const TestRun& run = tests.runs[fold.run];
@@ -85,16 +85,16 @@ std::string groups_map(const MeasuredTests& tests, const Fit& fit) {
   return html_figure(groups_drawing(title, names, similarity(tests, true), fit.grouping).svg(), "");
 }
 
-/// What an output is left with where the model had no part in it.
+/// RMS of an output on rows that were left out of the fit.
 struct LeftOut {
-  double with_um{0.0};       ///< the model
-  double without_um{0.0};    ///< any
-  double other_day_um{0.0};  ///< to be expected, where only one day was seen; 0: not estimated
+  double with_um{0.0};       ///< with the model
+  double without_um{0.0};    ///< without a model
+  double other_day_um{0.0};  ///< expected, if only one day was recorded; 0: not estimated
 };
 
-/// The verdict, curves of measured and left-out prediction, what to do, and how it was chosen.
-/// @param left_out  one an output
-/// @param said      as the command prints it
+/// Verdict, curves of measured and left-out prediction, warnings, and how the model was chosen.
+/// @param left_out  one per output
+/// @param said      text output of the command
 std::string page(const MeasuredTests& tests, const Fit& fit, const std::vector<LeftOut>& left_out,
                  const std::vector<std::string>& warnings, const std::string& said) {
   std::string text = html_begin("Model of the thermal displacement");

@@ -14,11 +14,11 @@
 namespace thermocomp::identification {
 namespace {
 
-// What a direction that was never excited may still move without being another state of the
-// machine: about the scatter of good sensors beside each other, and a share of a signal's range.
+// Deviation added in quadrature to each feature's, so that a direction without excitation does not
+// leave the domain at once: the scatter of good sensors, and a share of a signal's range.
 constexpr double level_floor_K = 0.5;
 constexpr double signal_floor = 0.05;
-/// Rows a little beyond the furthest of the record are no other state yet.
+/// Limit of the domain relative to the largest distance of the record.
 constexpr double beyond_the_record = 1.3;
 constexpr std::array<double, 3> domain_taus_s{0.0, 900.0, 8100.0};
 
@@ -28,10 +28,10 @@ nanoseconds time_of(double time_s) {
 
 struct Feature {
   Eigen::MatrixXd rows;   ///< shape (selected rows, features)
-  Eigen::VectorXd floor;  ///< of their standard deviations
+  Eigen::VectorXd floor;  ///< smallest standard deviations
 };
 
-/// Column of the model over a run: rise or signal, and the level of a temperature's reference.
+/// Column of the model over a run: rise or signal, and the reference of a temperature.
 struct Course {
   Eigen::VectorXd values;
   double reference{0.0};
@@ -114,8 +114,8 @@ void fill_domain(const MeasuredTests& tests, MadeFrom& made_from) {
   }
 }
 
-/// Part of the variance that differs from row to row, by second differences; and the time in which
-/// the correlation of the rest has fallen to 1/e.
+/// White part of the variance, from second differences; and the time in which the correlation of
+/// the rest falls to 1/e.
 void fill_noise(const MeasuredTests& tests, const Eigen::VectorXd& left, MadeFrom::Output& output) {
   double second = 0.0;
   double count = 0.0;
@@ -144,12 +144,12 @@ void fill_noise(const MeasuredTests& tests, const Eigen::VectorXd& left, MadeFro
     if (!(product > (variance - white) / 2.718281828459045)) break;
   }
   output.noise_time_s = std::min(longest_s, static_cast<double>(lag) * step_s);
-  // Rows closer than the noise's own time repeat each other.
+  // Rows closer than the noise's correlation time are not independent.
   const double hours_s = step_s * size;
   output.freedom = std::clamp(hours_s / std::max(2.0 * output.noise_time_s, 1e-9), 1.0, size);
 }
 
-/// RMS of what the model leaves on the rows that it was fitted to, one an output.
+/// RMS remainder of the model on the rows that it was fitted to, one per output.
 std::vector<double> remainders_um(const MeasuredTests& tests, const ThermalModel& model) {
   std::vector<double> squares(model.outputs.size(), 0.0);
   DisplacementModel displacement(model);

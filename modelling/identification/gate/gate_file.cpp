@@ -11,7 +11,7 @@ namespace thermocomp::identification {
 namespace {
 
 constexpr std::size_t ties_max = 64;
-// Where a file does not say how far a tie may be moved.
+// Default ranges of a tie.
 constexpr double lowest_tie = 0.2;  // of the working height
 constexpr double highest_tie = 1.5;
 constexpr double area_factor = 4.0;
@@ -20,9 +20,9 @@ Range length() {
   return Range::above(0, 1e5);
 }
 
-/// What is known of a column's section beside its stiffness.
+/// Properties of a column's section other than its stiffness.
 struct Section {
-  std::optional<double> depth_mm;  ///< none: only its inertia is known
+  std::optional<double> depth_mm;  ///< empty: only the inertia is given
   double shear_area_mm2{0.0};
   bool solid{false};
 };
@@ -67,7 +67,7 @@ double read_held_foot_mm(const TomlTable& column, const Section& section,
                              columns.column_poisson_ratio);
 }
 
-/// What the publication leaves out: shear, and a foot that holds its section.
+/// Elasticity that the publication neglects: shear, and a foot that holds its section.
 void read_elasticity(const TomlTable& column, const Section& section, TiedColumns& columns) {
   enum class Foot : std::uint8_t { free, held };
   const auto foot =
@@ -95,7 +95,6 @@ Section read_column(const TomlTable& column, TiedColumns& columns) {
   return section;
 }
 
-/// Two numbers, the first not above the second.
 Bounds bounds_of(const TomlTable& table, const char* key, Range range, Bounds otherwise) {
   const std::vector<double> pair = table.numbers(key, range, {otherwise.low, otherwise.high});
   if (pair.size() != 2 || !(pair[0] <= pair[1])) {
@@ -105,7 +104,7 @@ Bounds bounds_of(const TomlTable& table, const char* key, Range range, Bounds ot
   return {pair[0], pair[1]};
 }
 
-/// Names of columns; an empty list says nothing of a temperature.
+/// Names of columns; an empty list is a problem.
 std::vector<std::string> columns_in(const TomlTable& table, const char* key,
                                     const std::string& otherwise) {
   std::vector<std::string> names = table.texts(key, {otherwise});
@@ -113,12 +112,12 @@ std::vector<std::string> columns_in(const TomlTable& table, const char* key,
   return names;
 }
 
-/// How a tie is fastened: pinned, or bonded over a thickness.
+/// Thickness of a bonded tie; 0: pinned.
 double read_thickness_mm(const TomlTable& table, double area_mm2, const Section& section,
                          const TiedColumns& columns) {
   if (!table.has("thickness_mm")) return 0.0;
   const double thickness_mm = table.number("thickness_mm", length());
-  if (!(columns.column_shear_compliance_per_N > 0.0))  // as where poisson_ratio is given
+  if (!(columns.column_shear_compliance_per_N > 0.0))  // set with poisson_ratio only
     table.problem("thickness_mm", "needs poisson_ratio in [column]");
   if (section.depth_mm && area_mm2 / thickness_mm > *section.depth_mm * (1.0 + 1e-9))
     table.problem("thickness_mm", "makes the tie, area_mm2 / thickness_mm, deeper than the column");

@@ -1,5 +1,5 @@
-/// The file of `thermocomp tiebar`: a gate-shaped machine with one tie or several, where their
-/// temperatures stand in a run, and how far they may be moved.
+/// Geometry file of `thermocomp tiebar`: a gate-shaped machine with one or more ties, the run
+/// columns of its temperatures, and the ranges of the ties.
 #pragma once
 
 #include <filesystem>
@@ -11,15 +11,15 @@
 
 namespace thermocomp::identification {
 
-/// What a tie may be; low = high: it stays as drawn.
+/// Range of a tie's height or area; low = high: fixed.
 struct Bounds {
   double low{0.0};
   double high{0.0};
 };
 
 struct TieChoice {
-  std::vector<std::string> temperatures;  ///< columns of a run; their mean counts
-  double rise_factor{1.0};                ///< the tie's rise beside that of these columns
+  std::vector<std::string> temperatures;  ///< columns of a run, averaged
+  double rise_factor{1.0};                ///< the tie's rise relative to the mean of these columns
   Bounds height_mm;
   Bounds area_mm2;
 };
@@ -27,14 +27,14 @@ struct TieChoice {
 struct GateFile {
   std::string name;
   TiedColumns columns;
-  std::vector<std::string> side_a;  ///< columns of a run; their mean counts
+  std::vector<std::string> side_a;  ///< columns of a run, averaged
   std::vector<std::string> side_b;
-  std::vector<TieChoice> choices;  ///< one a tie
+  std::vector<TieChoice> choices;  ///< one per tie
 };
 
 /// @throws ConfigurationError with every problem of the file
 [[nodiscard]] GateFile load_gate_file(const std::filesystem::path& path);
-/// @param name stands for the file in problems
+/// @param name  file name in problems
 [[nodiscard]] GateFile parse_gate_file(const std::string& text, const std::string& name);
 
 }  // namespace thermocomp::identification

@@ -14,7 +14,7 @@ constexpr double highest_tie = 3.0;
 constexpr int steps = 2800;
 constexpr double um_per_mm = 1000.0;
 
-/// One curve a beta; `value` of a machine with the tie at l / a.
+/// One curve per beta; `value` is evaluated with the tie at l / a.
 template <class Value>
 Drawing curves_over_a(const TiedColumns& columns, const std::string& title, const std::string& unit,
                       Value value) {

@@ -14,10 +14,10 @@ namespace thermocomp::identification {
 namespace {
 
 constexpr double s_per_min = 60.0;
-constexpr int heights = 200;  // of a curve of the picture
+constexpr int heights = 200;  // steps of a curve in the plot
 constexpr double panel_px = 240.0;
 
-/// Every column that the file names, each once; and that each run has it.
+/// Every column that the file names, once each. @throws ConfigurationError if a run lacks one
 std::vector<std::string> named_places(const GateFile& file, const std::vector<RunFile>& runs) {
   std::vector<std::string> names;
   std::vector<Problem> problems;
@@ -41,7 +41,7 @@ std::vector<std::string> named_places(const GateFile& file, const std::vector<Ru
   return names;
 }
 
-/// Mean rise of some places; those that never move were left out and count as 0.
+/// Mean rise of some places; places that never move are not in `tests` and count as 0.
 Eigen::VectorXd mean_K(const MeasuredTests& tests, const TestRun& run,
                        const std::vector<std::string>& names) {
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(run.time_s.size());
@@ -75,7 +75,6 @@ Drawing course_drawing(const TieCourse& course, const std::vector<NamedColumns>&
   return curves_drawing(minutes, "min", {panel});
 }
 
-/// The swing over the height of one tie, the others at their best.
 Drawing swing_drawing(const GateFile& file, const std::vector<TieCourse>& courses,
                       const TiedColumns& best, std::size_t tie) {
   const Bounds bounds = file.choices[tie].height_mm;
@@ -95,19 +94,19 @@ Drawing swing_drawing(const GateFile& file, const std::vector<TieCourse>& course
                           panel_px}});
 }
 
-// Differential evolution (Storn and Price 1997), each mutation with a factor of its own.
+// Differential evolution (Storn and Price 1997) with a random factor for each mutation.
 constexpr std::uint64_t seed = 1995;
 constexpr std::size_t members_each_variable = 12;
 constexpr int generations_max = 600;
 constexpr double crossing = 0.9;
 constexpr double factor_min = 0.4;
 constexpr double factor_max = 1.0;
-constexpr double swing_same_um = 1e-7;  // the members have met
+constexpr double swing_same_um = 1e-7;  // spread of the members at convergence
 constexpr Eigen::Index rows_max = 2000;
 
-using Point = std::vector<double>;  ///< of each variable its place between its bounds, 0..1
+using Point = std::vector<double>;  ///< position of each variable between its bounds, 0..1
 
-/// One thing that may be chosen: the height or the area of a tie.
+/// Variable of the search: height or area of a tie.
 struct Variable {
   std::size_t tie;
   bool is_area;
@@ -141,7 +140,7 @@ std::vector<Variable> variables_of(const GateFile& file) {
   return variables;
 }
 
-/// Every n-th row of the courses, so that there are not too many.
+/// Every n-th row of the courses, about rows_max in all.
 std::vector<TieCourse> thinned(const std::vector<TieCourse>& courses) {
   Eigen::Index rows = 0;
   for (const TieCourse& course : courses) rows += course.time_s.size();
@@ -180,7 +179,7 @@ class Search {
   }
 
  private:
-  /// A height or area that has one value gets it, even where the drawing has another.
+  /// Moves each tie into its bounds; a fixed height or area overrides the drawn one.
   static TiedColumns bounded(const GateFile& file) {
     TiedColumns columns = file.columns;
     for (std::size_t i = 0; i < columns.ties.size(); ++i) {
@@ -200,7 +199,7 @@ class Search {
   [[nodiscard]] double swing_of(const Point& point) const {
     return swing_um(courses_, tied_coefficients(columns_at(point)));
   }
-  /// The same on every machine, which standard distributions need not be.
+  /// Identical on every platform, unlike standard distributions.
   double uniform() { return static_cast<double>(engine_() >> 11U) * 0x1p-53; }
   std::size_t another() { return static_cast<std::size_t>(engine_() % members_.size()); }
 

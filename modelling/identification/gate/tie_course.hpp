@@ -1,4 +1,4 @@
-/// How far a measured course of temperatures moves tool and work, and the ties that make it least.
+/// Displacement between tool and work from measured temperatures, and the ties that minimise it.
 #pragma once
 
 #include <string>
@@ -14,30 +14,30 @@ namespace thermocomp::identification {
 struct TieCourse {
   std::string name;
   Eigen::VectorXd time_s;
-  Eigen::MatrixXd rises_K;  ///< shape (rows, 1 + ties): A - B, then each tie; of the first row 0
+  Eigen::MatrixXd rises_K;  ///< shape (rows, 1 + ties): A - B, then each tie; 0 in the first row
 };
 
-/// @param notes  for a person: what was left out of the runs
+/// @param notes  receives what was left out of the runs
 /// @throws ConfigurationError naming run and column
 [[nodiscard]] std::vector<TieCourse> tie_courses(const GateFile& file,
                                                  const std::vector<RunFile>& runs,
                                                  std::vector<std::string>& notes);
 
-/// Ki (A - B) - sum_j Kc_j C_j, shape (rows); positive when tool and work come closer.
-/// @pre as many ties as the course has, or none
+/// Ki (A - B) - sum_j Kc_j C_j, shape (rows); positive if tool and work approach each other.
+/// @pre `k` has as many ties as the course, or none
 [[nodiscard]] Eigen::VectorXd displacement_um(const TieCourse& course, const TiedCoefficients& k);
 
-/// Greatest minus least displacement, of the course in which that is most.
+/// Largest swing (greatest minus least displacement) of any course.
 [[nodiscard]] double swing_um(const std::vector<TieCourse>& courses, const TiedCoefficients& k);
 
-/// The ties within the file's bounds with the least swing: a differential evolution over heights
-/// and logarithms of areas, with a fixed seed. A tie is taken to have the same temperatures
-/// wherever it is; more than 2000 rows are thinned out for the search.
-/// @throws ConfigurationError when every tie is fixed
+/// Ties within the file's bounds with the smallest swing, by differential evolution over heights
+/// and logarithms of areas, with a fixed seed. A tie's temperatures are assumed independent of its
+/// position; the search uses at most about 2000 rows.
+/// @throws ConfigurationError if every tie is fixed
 [[nodiscard]] TiedColumns best_ties(const GateFile& file, const std::vector<TieCourse>& courses);
 
-/// Displacement over time of each course without ties, as drawn and, if there is one, with the
-/// best; then the swing over the height of each tie with the others at their best.
+/// Plot of each course's displacement without ties, as drawn and, if given, with the best ties;
+/// then the swing over the height of each tie, the others at their best.
 [[nodiscard]] std::string tie_picture(const GateFile& file, const std::vector<TieCourse>& courses,
                                       const TiedColumns* best);
 

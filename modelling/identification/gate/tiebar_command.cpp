@@ -34,7 +34,6 @@ struct Options {
   bool json{false};
 };
 
-/// What is said, to a person and to a program.
 struct Answer {
   Json json;
   std::string text;
@@ -58,7 +57,7 @@ void say_one_tie(const Options& options, const TiedColumns& columns, Answer& ans
       *options.ratio, best.displacement_um_per_K, best.tie_height_mm);
 }
 
-/// Ki, then a tie a line.
+/// Ki, then one line per tie.
 Answer ties_said(const TiedColumns& columns) {
   const TiedCoefficients k = tied_coefficients(columns);
   Answer answer{{{"Ki_um_per_K", k.ki_um_per_K}, {"ties", Json::array()}},

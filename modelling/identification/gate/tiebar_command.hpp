@@ -1,5 +1,5 @@
-/// `thermocomp tiebar`: the coefficients of a gate-shaped machine with one tie or several, and the
-/// ties that a measured course moves least.
+/// The command `thermocomp tiebar`: coefficients of a gate-shaped machine with one or more ties,
+/// and the ties with the smallest swing on measured temperatures.
 #pragma once
 
 #include <functional>

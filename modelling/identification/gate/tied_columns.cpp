@@ -18,14 +18,14 @@ ColumnBeam beam_of(const TiedColumns& columns) {
           columns.heated_height_mm};
 }
 
-/// A tie on a column, and what differs there from the column's axis.
+/// A tie on a column, with the difference between the column's face and axis.
 class TiedPlace {
  public:
   TiedPlace(const TiedColumns& columns, const Tie& tie)
       : tie_(tie), beam_(beam_of(columns)), width_mm_(columns.column_width_mm) {}
 
   [[nodiscard]] bool bonded() const { return tie_.thickness_mm > 0.0; }
-  /// h^2/8, by which a curvature moves the face of the column; 0 where the tie is on its axis.
+  /// h^2/8, displacement of the column's face per curvature; 0 for a tie on the axis.
   [[nodiscard]] double face_mm2() const { return bonded() ? width_mm_ * width_mm_ / 8.0 : 0.0; }
 
   [[nodiscard]] double thermal_deflection_mm_per_K() const {
@@ -36,17 +36,17 @@ class TiedPlace {
     return beam_.thermal_deflection_mm_per_K(tie_.height_mm) -
            beam_.curvature_per_mm_K * face_mm2() * heated;
   }
-  /// Here, by a force on the axis of the column.
+  /// Deflection here per force on the axis of the column.
   [[nodiscard]] double deflection_mm_per_N(double force_at_mm) const {
     return beam_.deflection_mm_per_N(tie_.height_mm, force_at_mm) +
            widening_per_Nmm() * std::max(0.0, force_at_mm - tie_.height_mm);
   }
-  /// Here, by a force of another tie.
+  /// Deflection here per force of another tie.
   [[nodiscard]] double deflection_mm_per_N(const TiedPlace& other) const {
     return deflection_mm_per_N(other.tie_.height_mm) +
            other.widening_per_Nmm() * std::max(0.0, tie_.height_mm - other.tie_.height_mm);
   }
-  /// Here, by a moment of another tie.
+  /// Deflection here per moment of another tie.
   [[nodiscard]] double deflection_per_N(const TiedPlace& other) const {
     const bool below = tie_.height_mm < other.tie_.height_mm;
     return beam_.deflection_per_N(tie_.height_mm, other.tie_.height_mm) +
@@ -59,7 +59,7 @@ class TiedPlace {
     return beam_.thermal_tilt_per_K(tie_.height_mm);
   }
 
-  /// Of the tie itself with what its ends sink in.
+  /// Compliance of the tie and its bonded ends.
   [[nodiscard]] double own_mm_per_N(const TiedColumns& columns) const {
     const double bar = tie_.length_mm / (tie_.area_mm2 * tie_.modulus_MPa);
     if (!bonded()) return bar;
@@ -67,7 +67,6 @@ class TiedPlace {
                            tie_.thickness_mm, tie_.area_mm2 / tie_.thickness_mm, width_mm_,
                            columns.column_modulus_MPa, columns.column_poisson_ratio);
   }
-  /// Both ends turned against each other.
   [[nodiscard]] double own_tilt_per_Nmm() const {
     const double inertia_mm4 = tie_.area_mm2 * tie_.thickness_mm * tie_.thickness_mm / 12.0;
     return tie_.length_mm / (tie_.modulus_MPa * inertia_mm4);
@@ -83,11 +82,11 @@ class TiedPlace {
   double width_mm_;
 };
 
-/// Forces of all ties, then moments of those that are bonded.
+/// Unknowns: forces of all ties, then moments of the bonded ones.
 struct TieEquations {
-  Eigen::MatrixXd yielding;  ///< both columns, and the ties in themselves
-  Eigen::VectorXd bent;      ///< of 1 K of A - B
-  Eigen::VectorXd at_work;   ///< how far each brings tool and work together
+  Eigen::MatrixXd yielding;  ///< compliance of both columns and of the ties
+  Eigen::VectorXd bent;      ///< per kelvin of A - B
+  Eigen::VectorXd at_work;   ///< approach of tool and work per unit of each
 };
 
 TieEquations equations_of(const TiedColumns& columns) {
@@ -133,8 +132,8 @@ TiedCoefficients tied_coefficients(const TiedColumns& columns) {
       um_per_mm * beam_of(columns).thermal_deflection_mm_per_K(columns.working_height_mm);
   if (columns.ties.empty()) return {free_um_per_K, {}};
   const TieEquations equations = equations_of(columns);
-  // How far tool and work part for each mm that a tie would be too long: symmetric, so one solution
-  // serves every right side.
+  // Separation of tool and work per mm of excess length of a tie: the matrix is symmetric, so one
+  // solution serves every right side.
   const Eigen::VectorXd parted = equations.yielding.llt().solve(equations.at_work);
   TiedCoefficients k{free_um_per_K - um_per_mm * parted.dot(equations.bent), {}};
   for (std::size_t j = 0; j < columns.ties.size(); ++j) {
