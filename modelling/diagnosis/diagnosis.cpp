@@ -19,15 +19,15 @@ constexpr std::size_t candidates_tried = 3;
 std::optional<Extended> with_finding(const Extended& before, const Finding& finding,
                                      const MeasuredData& train) {
   Extended longer = before;
-  const std::optional<TermSpec> term = term_of(finding, train);
-  if (term) longer.model.terms.push_back(*term);
+  const std::vector<TermSpec> terms = terms_of(finding, train);
+  longer.model.terms.insert(longer.model.terms.end(), terms.begin(), terms.end());
   const Cause& cause = cause_named(finding.explanation.hypothesis->cause);
   for (std::size_t output = 0; output < train.model.outputs.size(); ++output) {
     if (cause.correction == nullptr || finding.explanation.gains[output].size() == 0) continue;
     longer.corrections.push_back(cause.correction(parameters_of(finding, train)));
     longer.corrections.back().output = output;
   }
-  if (!term && longer.corrections.size() == before.corrections.size()) return std::nullopt;
+  if (terms.empty() && longer.corrections.size() == before.corrections.size()) return std::nullopt;
   return longer;
 }
 

@@ -88,26 +88,39 @@ std::vector<Parameter> parameters_of(const Finding& finding, const MeasuredData&
     for (Parameter& parameter : cause.gains(found)) all.push_back(std::move(parameter));
     return all;
   }
-  Parameter gains = gain_table(found, 0);
-  if (hypothesis.output || hypothesis.form == Form::shared_gain) {
-    const std::string& output = data.model.outputs[first_output(found)];
-    gains = {gains.name, {{"", gains.values.at(output)}}, {{"", gains.ci95.at(output)}}};
+  for (std::size_t i = 0; i < hypothesis.gains.size(); ++i) {
+    Parameter gains = gain_table(found, static_cast<Eigen::Index>(i));
+    if (hypothesis.output || hypothesis.form == Form::shared_gain) {
+      const std::string& output = data.model.outputs[first_output(found)];
+      gains = {gains.name, {{"", gains.values.at(output)}}, {{"", gains.ci95.at(output)}}};
+    }
+    all.push_back(std::move(gains));
   }
-  all.push_back(std::move(gains));
   return all;
 }
 
-std::optional<TermSpec> term_of(const Finding& finding, const MeasuredData& data) {
+std::vector<TermSpec> terms_of(const Finding& finding, const MeasuredData& data) {
   const Hypothesis& hypothesis = *finding.explanation.hypothesis;
-  if (find_term_kind(hypothesis.cause, hypothesis.subject) == nullptr) return std::nullopt;
-  TermSpec term{hypothesis.cause, hypothesis.subject, {}, {}};
-  for (const Parameter& parameter : parameters_of(finding, data)) {
-    if (parameter.values.contains(""))
-      term.shared[parameter.name] = parameter.values.at("");
-    else
-      term.per_output[parameter.name] = parameter.values;
-  }
-  return term;
+  const std::vector<Parameter> parameters = parameters_of(finding, data);
+  std::vector<TermSpec> terms;
+  const auto add = [&](const std::string& cause, const std::string& subject) {
+    const TermKind* const kind = find_term_kind(cause, subject);
+    if (kind == nullptr) return;
+    TermSpec term{cause, subject, {}, {}};
+    for (const Parameter& parameter : parameters) {
+      if (std::none_of(kind->parameters.begin(), kind->parameters.end(),
+                       [&](const TermParameter& each) { return each.name == parameter.name; }))
+        continue;
+      if (parameter.values.contains(""))
+        term.shared[parameter.name] = parameter.values.at("");
+      else
+        term.per_output[parameter.name] = parameter.values;
+    }
+    if (terms.empty() || !term.per_output.empty()) terms.push_back(std::move(term));
+  };
+  add(hypothesis.cause, hypothesis.subject);
+  if (!terms.empty()) add(hypothesis.simpler_cause, hypothesis.simpler_subject);
+  return terms;
 }
 
 namespace {

@@ -1,6 +1,5 @@
-/// What becomes of what the search found: names, parameters with intervals, a term of the model
-/// file; what that gains on runs that were not used to find anything; and what is left and follows
-/// from what was recorded, though no cause of the catalogue says how.
+/// Turns findings of the search into names, parameters with intervals and terms of the model file,
+/// measures their gain on the test runs, and fits a bank of lags to the predictable remainder.
 #pragma once
 
 #include <map>
@@ -15,7 +14,7 @@
 
 namespace thermocomp::diagnosis {
 
-/// Of the RMS of left-out rows, of the output that gains most.
+/// Share by which the RMS of left-out rows falls, of the output that gains most.
 [[nodiscard]] double share_of_remainder(const Explanation& explanation);
 
 /// Everything but the gain on test runs.
@@ -28,11 +27,12 @@ namespace thermocomp::diagnosis {
 
 [[nodiscard]] std::vector<Parameter> parameters_of(const Finding& finding,
                                                    const MeasuredData& data);
-/// @return the term that the daemon evaluates; nullopt for what it cannot: faults of one run, a
-///         shift in time, a disturbance without an input
-[[nodiscard]] std::optional<TermSpec> term_of(const Finding& finding, const MeasuredData& data);
+/// @return the terms that the daemon evaluates: the cause's own and, for a gain that it lacks, that
+///         of the simpler cause. None for faults of one run, a shift in time and a disturbance
+///         without an input
+[[nodiscard]] std::vector<TermSpec> terms_of(const Finding& finding, const MeasuredData& data);
 
-/// A model with what no term of it carries.
+/// A model with the findings that no term can carry.
 struct Extended {
   ThermalModel model;
   std::vector<Correction> corrections;
@@ -47,13 +47,14 @@ struct Residuals {
 [[nodiscard]] std::vector<Residuals> residuals(const MeasuredData& data);
 [[nodiscard]] std::vector<Residuals> residuals(const Extended& extended, const MeasuredData& data);
 [[nodiscard]] double root_mean_square(const Residuals& residuals);
-/// Of what the model leaves of training and test runs, and the extended model of test runs.
+/// Figures of the model's remainder in training and test runs, and of the extended model's in test
+/// runs.
 [[nodiscard]] OutputFigures output_figures(const Residuals& train, const Residuals& test,
                                            const Residuals& extended_test,
                                            double unexplained_fraction);
-/// The interval is from blocks of rows drawn anew.
+/// The interval comes from resampled blocks of rows.
 [[nodiscard]] TestGain test_gain(const Residuals& before, const Residuals& after);
-/// Whether no output gains by it on the test runs. The extended model goes without it then.
+/// Whether the finding improves no output of the test runs; the extended model then omits it.
 [[nodiscard]] bool fails_on_test_runs(const NamedFinding& finding);
 
 /// A bank for each output whose left-out rows it predicts better: each of eight blocks of the

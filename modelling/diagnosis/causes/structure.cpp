@@ -258,14 +258,11 @@ std::vector<Hypothesis> start_dependence_hypotheses(const Material& material,
       subject.kind == SubjectKind::input ? material.name_of(subject) : data.model.inputs.front();
   std::vector<Hypothesis> all;
   if (starts_differ(data, first)) all.push_back(by_start(material, subject, first, {}));
-  const std::string among_others = room_among(data.others);
-  const std::string room = among_others.empty() ? room_among(data.model.inputs) : among_others;
-  if (room.empty() || room == first || !starts_differ(data, room)) return all;
-  const auto& names = among_others.empty() ? data.model.inputs : data.others;
-  const Subject of_room{
-      among_others.empty() ? SubjectKind::input : SubjectKind::other_temperature,
-      static_cast<std::size_t>(std::find(names.begin(), names.end(), room) - names.begin())};
-  all.push_back(by_start(material, subject, room, material.values_of(of_room)));
+  const std::optional<Subject> of_room = material.room();
+  if (!of_room) return all;
+  const std::string& room = material.name_of(*of_room);
+  if (room != first && starts_differ(data, room))
+    all.push_back(by_start(material, subject, room, material.values_of(*of_room)));
   return all;
 }
 

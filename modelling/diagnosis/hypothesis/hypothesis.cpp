@@ -129,6 +129,15 @@ ColumnOf Material::values_of(const Subject& subject) const {
   return [index](const MeasuredRun& run) -> const Column& { return run.signals[index]; };
 }
 
+std::optional<Subject> Material::room() const {
+  for (const auto& [kind, names] : {std::pair{SubjectKind::other_temperature, &data_.others},
+                                    std::pair{SubjectKind::input, &data_.model.inputs}})
+    if (const std::string room = room_among(*names); !room.empty())
+      return Subject{kind, static_cast<std::size_t>(std::find(names->begin(), names->end(), room) -
+                                                    names->begin())};
+  return {};
+}
+
 bool Material::moves_anywhere(const ColumnOf& of) const {
   return std::any_of(data_.runs.begin(), data_.runs.end(), [&](const MeasuredRun& run) {
     return moves(of(run).tail(run.rows() - run.begin));

@@ -85,6 +85,9 @@ struct Hypothesis {
   std::string simpler_cause{};
   std::string simpler_subject{};
 
+  /// ln of its prior probability over that of the simpler form of the same cause.
+  double log_prior{0.0};
+
   // Of a fault of one reading:
   std::optional<std::size_t> sensor{};  ///< the input
   /// Its error for a gain of 1 [K] over the stacked rows, one column a shape.
@@ -150,6 +153,9 @@ class Material {
   /// The subject's values: rises calmed of the noise of single values, a signal as it is.
   /// @pre a temperature or a signal
   [[nodiscard]] ColumnOf values_of(const Subject& subject) const;
+  /// The room's temperature: one that the model does not use, else one of its inputs; none: not
+  /// recorded.
+  [[nodiscard]] std::optional<Subject> room() const;
   [[nodiscard]] bool moves_anywhere(const ColumnOf& of) const;
   /// The largest distance of two values within a run.
   [[nodiscard]] double range(const ColumnOf& of) const;

@@ -26,8 +26,6 @@ constexpr double fitted_factor = 1.1;
 /// By which the cosine of two lists in proportion may miss 1, for each of their numbers: few
 /// numbers are so by accident.
 constexpr double ridge_angle = 0.0015;
-/// Utilities that differ by less are alike.
-constexpr double as_much = 1.0;
 constexpr int zooms = 2;
 constexpr int points_of_zoom = 9;
 

@@ -8,8 +8,7 @@
 namespace thermocomp::diagnosis {
 namespace {
 
-/// What tells one hypothesis from another; research/calibrate_posterior.py prints
-/// these.
+/// Weights of the utility, as research/calibrate_posterior.py prints them.
 struct Weights {
   double score;
   double witness;
@@ -19,7 +18,7 @@ struct Weights {
   double one_run;
 };
 constexpr Weights weights{2.11, 2.66, 3.27, 12.04, -0.54, -0.27};
-/// What tells that there is something at all: of the likeliest hypothesis.
+/// Weights of the odds that there is any effect, for the figures of the likeliest hypothesis.
 struct Presence {
   double constant;
   double score;
@@ -27,16 +26,15 @@ struct Presence {
   double share;
 };
 constexpr Presence of_first{-2.69, 0.54, 0.49, 9.10};
-/// Beside what is named already, and more so beside coefficients fitted to the rows, what a model
-/// leaves anyway is taken for an effect more easily. Set so that of untouched machines as few are
-/// named as in the first round. What a fit leaves is made of what it was fitted with, never a line,
-/// a jump or a shift of the datum.
+/// In later rounds, and with coefficients fitted to the rows, the model's own misfit resembles an
+/// effect more often. Set so that no more untouched machines are named than in the first round.
+/// Datum causes are exempt: a fit cannot leave a line, a jump or a shift.
 constexpr Presence of_later{-5.70, 0.54, 0.49, 9.10};
 constexpr Presence of_fitted{-7.70, 0.54, 0.49, 9.10};
 constexpr double left_out_min = -0.5;
 constexpr double left_out_max = 3.0;
-/// Neighbouring rows say the same: a likelihood that is larger by this again says as much as
-/// before.
+/// Neighbouring rows are correlated, so that ln L counts in proportion up to this value and by its
+/// logarithm above.
 constexpr double score_scale = 20.0;
 constexpr double score_min = -50.0;
 
@@ -44,11 +42,11 @@ double compressed(double score) {
   return std::copysign(std::log1p(std::abs(score) / score_scale), score);
 }
 
-/// Of the likeliest subject's probability: below, another one is not worth saying.
+/// Least probability of another subject that is listed, as a share of the likeliest one's.
 constexpr double as_likely_min = 0.1;
 constexpr double likelier_than_not = 0.5;
 
-/// The figures that both go by.
+/// Figures from which the utility and the odds are computed.
 struct Figures {
   double score;
   double witness;
@@ -57,7 +55,7 @@ struct Figures {
 };
 
 Figures figures_of(const Explanation& explanation) {
-  // Outputs of one machine say much the same.
+  // The outputs of one machine are correlated.
   const double root = std::sqrt(static_cast<double>(explanation.gains.size()));
   const double own = std::max(score_min, explanation.score) - explanation.witness;
   return {compressed(own / root), compressed(explanation.witness),
@@ -76,18 +74,19 @@ double utility(const Explanation& explanation) {
   return weights.score * of.score + weights.witness * of.witness + weights.left_out * of.left_out +
          weights.share * of.share +
          weights.parameters * static_cast<double>(free_parameters(*explanation.hypothesis)) +
-         (explanation.hypothesis->run ? weights.one_run : 0.0);
+         (explanation.hypothesis->run ? weights.one_run : 0.0) + explanation.hypothesis->log_prior;
 }
 
 namespace {
 
-/// Whether a simpler one explains as much: then this one is no rival of it.
+/// Whether a simpler hypothesis is as likely, or explains as much: then this one is no rival of it.
 bool adds_nothing(const Explanation& explanation, const std::vector<Explanation>& all) {
   const Hypothesis& of = *explanation.hypothesis;
   if (of.simpler_cause.empty()) return false;
   return std::any_of(all.begin(), all.end(), [&](const Explanation& each) {
     return each.hypothesis->cause == of.simpler_cause &&
-           each.hypothesis->subject == of.simpler_subject && each.score >= explanation.score;
+           each.hypothesis->subject == of.simpler_subject &&
+           (each.score >= explanation.score || utility(each) + as_much >= utility(explanation));
   });
 }
 

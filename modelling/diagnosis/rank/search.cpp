@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::size_t refined = 24;
 constexpr std::size_t alternatives_max = 40;
-/// What exceeds the noise so many times, and so much of the motion, is structure.
+/// A remainder is structure if it exceeds the noise by this factor and this share of the motion.
 constexpr double structure_over_noise = 1.5;
 constexpr double structure_of_motion = 0.03;
 
@@ -33,12 +33,11 @@ double motion_of(const MeasuredData& data, std::size_t output) {
 }
 
 constexpr double normal_95 = 1.96;
-/// A machine also does what no column describes, so a shape parameter errs by this factor more than
-/// its deviation. Jumps need no factor.
+/// A machine's effect is only nearly of the column's form, so the error of a shape parameter is
+/// this many times its deviation. Jumps need no factor.
 constexpr double wider_on_machines = 4.5;
-/// A gain errs by more than its deviation, and by a share of itself, because the effect is only
-/// nearly of its form. Set so that 93 % of 112 planted gains are held (seeds of
-/// research/README.md).
+/// For the same reason the error of a gain is a multiple of its deviation and a share of the gain.
+/// Set so that the interval holds 93 % of 112 planted gains (seeds of research/README.md).
 constexpr double gain_wider = 2.0;
 constexpr double gain_share = 0.2;
 constexpr std::size_t fine_points = 33;
@@ -63,8 +62,8 @@ double gain_deviation(const Hypothesis& hypothesis, std::size_t number, double g
              : std::hypot(gain_wider * sd, gain_share * gain);
 }
 
-/// The grid and three points between any two of it, and many between the neighbours of the value
-/// found; ascending.
+/// The grid, three points in each of its intervals, and many points about the value found;
+/// ascending.
 std::vector<double> values_of(const ShapeParameter& of, double found) {
   std::vector<double> values = {found, of.grid.front()};
   for (std::size_t i = 1; i < of.grid.size(); ++i)
@@ -81,9 +80,9 @@ std::vector<double> values_of(const ShapeParameter& of, double found) {
   return values;
 }
 
-/// Sets the intervals of 95 %: every value of a shape parameter whose likelihood, the gains fitted
-/// anew, is within reach of the best one's; the gains at these values with their own deviation.
-/// @return whether a gain is known not to be 0, beside the best shape; true where it has none
+/// Sets the 95 % intervals. That of a shape parameter holds every value whose likelihood, with
+/// gains fitted anew, is close enough to the best; that of a gain holds the gains at these values.
+/// @return whether the interval of any gain at the best shape excludes 0; true without gains
 bool set_spread(const Fits& fits, Finding& finding) {
   Explanation& found = finding.explanation;
   const Hypothesis& hypothesis = *found.hypothesis;
@@ -189,7 +188,7 @@ class Search {
     return Fits(data_, rows_, readings_, accepted);
   }
 
-  /// Variance that is more than noise, of each output.
+  /// Variance of each output above that of the noise.
   std::vector<double> structure_left(const Fits& fits) const {
     std::vector<double> left;
     for (std::size_t output = 0; output < data_.model.outputs.size(); ++output) {
@@ -234,12 +233,17 @@ class Search {
     return false;
   }
 
-  /// @return whether there is one
+  /// @return whether one was added
   bool add_finding(const Fits& fits, std::size_t round, SearchResult& result) const {
     std::vector<Explanation> all;
     for (const Hypothesis& each : hypotheses_) {
       if (progress_) progress_();
-      if (!is_known(each, result.findings)) all.push_back(fits.weigh(each));
+      if (is_known(each, result.findings)) continue;
+      Explanation next = fits.weigh(each);
+      if (all.empty() || !same_name(*all.back().hypothesis, each))
+        all.push_back(std::move(next));
+      else if (utility(next) > utility(all.back()) + as_much)
+        all.back() = std::move(next);  // a form with one gain more, where that is likelier
     }
     if (all.empty()) return false;
     const auto likelier = [](const Explanation& a, const Explanation& b) {
@@ -272,14 +276,18 @@ class Search {
     return true;
   }
 
+  static bool same_name(const Hypothesis& a, const Hypothesis& b) {
+    return a.cause == b.cause && a.subject == b.subject && a.run == b.run;
+  }
+
   static bool is_known(const Hypothesis& hypothesis, const std::vector<Finding>& findings) {
     return std::any_of(findings.begin(), findings.end(), [&](const Finding& each) {
-      return each.explanation.hypothesis == &hypothesis;
+      return same_name(*each.explanation.hypothesis, hypothesis);
     });
   }
 
-  /// Each beside all others, with the intervals that this leaves. What others have taken over goes,
-  /// and what may have no size at all.
+  /// Fits each finding beside the others and sets its intervals. Erases those that the others now
+  /// explain, and those whose gain may be 0.
   void settle_together(std::vector<Finding>& findings) {
     for (std::size_t i = 0; i < findings.size();) {
       std::vector<Explanation> others;

@@ -180,6 +180,28 @@ Diagnosis diagnosis_along_axis(const MeasuredMachine& machine, double um_per_K_m
                   {"a", "b"}, {along_axis(machine, 3, um_per_K_mm)}, {"c"});
 }
 
+/// With a room that swings by 2 K; the body that the speed heats follows it in the same 100 min.
+RunFile in_a_room(const MeasuredMachine& machine, unsigned seed, double um_per_K) {
+  RunFile run = machine.run(seed);
+  run.columns.emplace_back("room_degC");
+  run.values.emplace_back();
+  double body_K = 0.0;
+  for (std::size_t row = 0; row < run.rows(); ++row) {
+    const double room_K = 2.0 * std::sin(0.015 * static_cast<double>(row + 300 * seed));
+    run.values.back().push_back(20.0 + room_K);
+    if (row == 0) body_K = room_K;
+    run.values[2][row] += um_per_K * body_K;
+    body_K += (room_K - body_K) / 100.0;
+  }
+  return run;
+}
+
+Diagnosis diagnosis_in_a_room(const MeasuredMachine& machine, double um_per_K) {
+  return diagnose(machine.model(),
+                  {in_a_room(machine, 1, um_per_K), in_a_room(machine, 2, um_per_K)}, {"a", "b"},
+                  {in_a_room(machine, 3, um_per_K)}, {"c"});
+}
+
 /// A machine of six readings, which are more alike than the causes that they are to be told from.
 MeasuredMachine six_readings(std::vector<double> factor) {
   return {{0.1, 0.05, 0.035, 0.025, 0.015, 0.01},
@@ -301,11 +323,30 @@ TEST_CASE("a jump of the datum in one run is a fault of that run and no term", "
 TEST_CASE("a cause is named with its size beside small errors of all coefficients", "[diagnosis]") {
   MeasuredMachine machine{
       {0.2, 0.05, 0.02, 0.01}, {9.0, -12.0, 10.0, 7.0}, {1.03, 0.96, 1.02, 0.97}};
-  machine.heat_um = 20.0;
+  machine.heat_um = 30.0;
   const Diagnosis effect = diagnosis_of_machine(machine);
   REQUIRE(effect.findings.size() == 1);
   CHECK(effect.findings[0].cause == "missing_heat_source");
   CHECK(effect.findings[0].parameters.at(0).values.at("") == Approx(6000.0).epsilon(0.2));
+}
+
+TEST_CASE("a body that a signal heats follows the room too", "[diagnosis]") {
+  MeasuredMachine machine{{0.05, 0.02}, {9.0, -12.0}, {1.0, 1.0}};
+  machine.heat_um = 30.0;
+  const Diagnosis effect = diagnosis_in_a_room(machine, 5.0);
+  REQUIRE(effect.findings.size() == 1);
+  CHECK(effect.findings[0].cause == "missing_heat_source");
+  CHECK(parameter(effect.findings[0], "gain_um_per_K").values.at("z_um") ==
+        Approx(5.0).epsilon(0.2));
+  REQUIRE(effect.extended.terms.size() >= 2);
+  CHECK(effect.extended.terms[1].kind == "missing_temperature");
+  const OutputFigures& z = effect.outputs.at("z_um");
+  CHECK(z.extended_test_rms_um < 0.1 * z.test_rms_um);
+
+  const Diagnosis alone = diagnosis_in_a_room(machine, 0.0);
+  REQUIRE(alone.findings.size() == 1);
+  CHECK(alone.findings[0].cause == "missing_heat_source");
+  CHECK(alone.findings[0].parameters.size() == 3);  // nothing of the room
 }
 
 TEST_CASE("a cause that errors of all coefficients could take most of is the first candidate",

@@ -90,6 +90,25 @@ TEST_CASE("a cause with one gain more needs more to be as likely", "[diagnosis]"
   CHECK(utility(explanation(along, 100.0, 0.8)) < utility(explanation(wrong, 100.0, 0.8)));
 }
 
+TEST_CASE("a cause that adds hardly anything to one that it contains is no rival of it",
+          "[diagnosis]") {
+  Hypothesis room = hypothesis("missing_temperature", "room_degC");
+  room.gains = {"gain_um_per_K"};
+  Hypothesis heat = hypothesis("missing_heat_source", "spindle_rpm");
+  heat.gains = {"gain_um_per_unit", "gain_um_per_K"};
+  heat.simpler_cause = room.cause;
+  heat.simpler_subject = room.subject;
+  const auto share_of_heat = [&](double score, double left_out) {
+    std::vector<Explanation> both = {explanation(room, 100.0, 0.8),
+                                     explanation(heat, score, left_out)};
+    CHECK(weigh_against_each_other(both, Round::first).none < 0.5);
+    return both[1].probability;
+  };
+  CHECK(share_of_heat(99.0, 2.0) == 0.0);
+  CHECK(share_of_heat(101.0, 0.85) == 0.0);
+  CHECK(share_of_heat(200.0, 1.2) > 0.5);
+}
+
 TEST_CASE("places that move alike are one group, whose probabilities add", "[diagnosis]") {
   const PlaceGroups groups = {{"t1_degC", {"t1_degC", "t2_degC"}},
                               {"t2_degC", {"t2_degC", "t1_degC"}},
