@@ -23,13 +23,13 @@ ColumnBeam column() {
   return beam;
 }
 
-TEST_CASE("a column yields at one place to a force at another as the other way round", "[tiebar]") {
+TEST_CASE("deflections of a column are reciprocal", "[tiebar]") {
   const ColumnBeam beam = column();
   CHECK(beam.deflection_mm_per_N(250, 600) == Approx(beam.deflection_mm_per_N(600, 250)));
   CHECK(beam.tilt_per_Nmm(250, 600) == Approx(beam.tilt_per_Nmm(600, 250)));
 }
 
-TEST_CASE("a column's tilt is the slope of what bends it", "[tiebar]") {
+TEST_CASE("a column's tilt is the slope of its deflection", "[tiebar]") {
   const ColumnBeam beam = column();
   constexpr double step_mm = 1e-3;
   for (const double height_mm : {100.0, 299.0, 450.0}) {
@@ -43,7 +43,7 @@ TEST_CASE("a column's tilt is the slope of what bends it", "[tiebar]") {
   }
 }
 
-TEST_CASE("shear bends a slender column little and a stout one much", "[tiebar]") {
+TEST_CASE("shear deflects a slender column little and a stout one much", "[tiebar]") {
   ColumnBeam rigid = column();
   rigid.shear_compliance_per_N = 0;
   rigid.foot_length_mm = 0;
@@ -57,7 +57,7 @@ TEST_CASE("shear bends a slender column little and a stout one much", "[tiebar]"
                           (height_mm * height_mm))));
 }
 
-TEST_CASE("a foot held crosswise tilts a warm column more and a loaded one less", "[tiebar]") {
+TEST_CASE("a foot held crosswise tilts a heated column more and a loaded one less", "[tiebar]") {
   const ColumnBeam held = column();
   ColumnBeam free = held;
   free.foot_length_mm = 0;
@@ -74,7 +74,7 @@ TEST_CASE("shear area: five sixths of a solid section, less of a box", "[tiebar]
   CHECK(rectangle_shear_area_mm2(100, 1, 0.01) == Approx(5.0 / 6.0 * 2.0).epsilon(0.02));
 }
 
-TEST_CASE("a tie's end sinks in by the mean of what lies under an even pressure", "[tiebar]") {
+TEST_CASE("a tie's end sinks in by the mean displacement under uniform pressure", "[tiebar]") {
   // Deep columns: the table of Timoshenko and Goodier, m (1 - nu^2) / (E sqrt(A)).
   const auto factor = [](double a_mm, double b_mm) {
     return bonded_end_compliance_mm_per_N(a_mm, b_mm, 1e9, modulus_MPa, nu) * modulus_MPa *

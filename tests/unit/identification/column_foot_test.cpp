@@ -24,7 +24,7 @@ constexpr double growth = 1.6;
 constexpr double modulus_MPa = 206000.0;
 constexpr double expansion_per_K = 11.5e-6;
 
-/// A column that a foot holds in all directions, with small elements at the foot and its edges.
+/// A column whose foot is clamped in all directions, with small elements at the foot and its edges.
 StructureSpec clamped_column(double depth_mm, double poisson_ratio) {
   using identification::printed;
   const auto box = [](double x_mm, double y_mm, double z_mm) {
@@ -53,7 +53,7 @@ StructureSpec clamped_column(double depth_mm, double poisson_ratio) {
   return parse_structure(text, "clamped_column.toml");
 }
 
-TEST_CASE("a foot that is held crosswise is what finite elements of a clamped column say",
+TEST_CASE("a foot held crosswise agrees with finite elements of a clamped column",
           "[tiebar][fe][foot]") {
   const double poisson_ratio = GENERATE(0.0, 0.3);
   const double depth_mm = GENERATE(20.0, 60.0, 160.0);
@@ -88,7 +88,7 @@ TEST_CASE("a foot that is held crosswise is what finite elements of a clamped co
   for (const Functional::Entry& entry : structure.rows[1].entries)
     force_N[3 * std::size_t{entry.node}] += entry.weight[0];
   const double yielding_mm = 1e3 * structure.rows[0].of(statics.displacement_under_m(force_N));
-  // A column that is twice as deep as wide bends somewhat as a plate does.
+  // A column twice as deep as wide bends partly like a plate.
   const double near = depth_mm > width_mm ? 0.015 : 0.005;
   CHECK(beam.deflection_mm_per_N(lower_mm, upper_mm) == Approx(yielding_mm).epsilon(near));
 }

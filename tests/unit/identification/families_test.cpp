@@ -20,7 +20,7 @@ namespace {
 
 constexpr std::size_t hours = 6;
 
-/// Two temperatures and a speed; the displacement is what `moved` makes of them, with noise.
+/// Two temperatures and a speed; the displacement is `moved` of them, with noise.
 template <class Moved>
 RunFile machine_run(const std::string& name, std::uint64_t seed, Moved moved) {
   std::mt19937_64 engine(seed);
@@ -68,7 +68,7 @@ const FamilyResult& result_of(const FamiliesFit& fit, Family family) {
 
 }  // namespace
 
-TEST_CASE("a machine of two static places gets their gains, and lags of little", "[families]") {
+TEST_CASE("a machine of two static places gets their gains, and small lags", "[families]") {
   const MeasuredTests tests = machine_tests(
       4, [](double quick, double slow, double, double) { return 5.0 * quick - 3.0 * slow; });
   const FamiliesFit fit = fitted(tests);
@@ -78,7 +78,7 @@ TEST_CASE("a machine of two static places gets their gains, and lags of little",
   CHECK(fit.model.matrix_um_per_K[0][1] == Approx(-3.0).epsilon(0.1));
 }
 
-TEST_CASE("few sensors are taken where they leave a tenth less than the bank", "[families]") {
+TEST_CASE("few sensors are chosen if they leave a tenth less than the bank", "[families]") {
   const MeasuredTests tests =
       machine_tests(4, [](double, double slow, double, double) { return -3.0 * slow; });
   const FamiliesFit fit = fitted(tests);
@@ -88,7 +88,7 @@ TEST_CASE("few sensors are taken where they leave a tenth less than the bank", "
         0.9 * result_of(fit, Family::lag_bank).left_out_rms_um[0]);
 }
 
-TEST_CASE("displacement that follows late is not left to a static model", "[families]") {
+TEST_CASE("delayed displacement gets no static model", "[families]") {
   const MeasuredTests tests = machine_tests(
       4, [](double, double, double late, double rpm) { return 6.0 * late + 4e-3 * rpm; });
   const FamiliesFit fit = fitted(tests);
@@ -97,9 +97,9 @@ TEST_CASE("displacement that follows late is not left to a static model", "[fami
         0.6 * result_of(fit, Family::static_few).left_out_rms_um[0]);
 }
 
-TEST_CASE("displacement that nothing recorded says gets no model", "[families]") {
+TEST_CASE("displacement independent of all recorded columns gets no model", "[families]") {
   std::mt19937_64 engine(5);
-  for (const double stays : {0.0, 0.9}) {  // the share of a row's noise that the next one keeps
+  for (const double stays : {0.0, 0.9}) {  // correlation of successive rows' noise
     CAPTURE(stays);
     double noise_um = 0.0;
     const MeasuredTests tests = machine_tests(4, [&](double, double, double, double) {
@@ -112,7 +112,7 @@ TEST_CASE("displacement that nothing recorded says gets no model", "[families]")
   }
 }
 
-TEST_CASE("a model that leaves half and more is said not to be fit for use", "[families]") {
+TEST_CASE("a model that leaves half or more is reported as unfit for use", "[families]") {
   std::mt19937_64 engine(5);
   for (const double noise_um : {0.5, 4.0}) {
     const MeasuredTests tests = machine_tests(4, [&](double quick, double, double, double) {
@@ -134,9 +134,8 @@ TEST_CASE("a model that leaves half and more is said not to be fit for use", "[f
   }
 }
 
-TEST_CASE("of two runs that are not alike the family is chosen by stretches of both",
-          "[families]") {
-  // The second run's speed is ten times the first one's: neither alone says what the other does.
+TEST_CASE("for two different runs the family is chosen by stretches of both", "[families]") {
+  // The second run's speed is ten times the first one's: neither predicts the other.
   const auto moved = [](double quick, double slow, double, double rpm) {
     return 5.0 * quick - 3.0 * slow + 1e-6 * rpm * rpm;
   };
@@ -149,12 +148,12 @@ TEST_CASE("of two runs that are not alike the family is chosen by stretches of b
   const MeasuredTests tests = measured_tests({slow, fast}, options);
   const FamiliesFit fit = fitted(tests);
   CHECK(fit.chosen != Family::none);
-  CHECK(fit.results.front().fold_um[0].size() == 2);  // what is told is of whole runs
+  CHECK(fit.results.front().fold_um[0].size() == 2);  // figures are of whole runs
   CHECK(families_text(tests, fit).find("um of what was left out (geometric mean") !=
         std::string::npos);
 }
 
-TEST_CASE("one temperature is enough for an answer", "[families]") {
+TEST_CASE("one temperature is enough for a model", "[families]") {
   RunFile run = machine_run("one", 3, [](double quick, double, double, double) { return quick; });
   run.columns = {"time_s", "t1_degC", "spindle_rpm", "z_um"};
   run.values.erase(run.values.begin() + 2);
@@ -167,7 +166,7 @@ TEST_CASE("one temperature is enough for an answer", "[families]") {
   CHECK(fit.model.made_from->within_one_run);
 }
 
-TEST_CASE("a model judged within one run says so", "[families]") {
+TEST_CASE("a model judged within one run has a warning", "[families]") {
   const MeasuredTests tests = machine_tests(
       1, [](double quick, double slow, double, double) { return 5.0 * quick - 3.0 * slow; });
   const FamiliesFit fit = fitted(tests);
@@ -178,7 +177,7 @@ TEST_CASE("a model judged within one run says so", "[families]") {
         std::string::npos);
 }
 
-TEST_CASE("fit says one error to expect, and on what", "[families]") {
+TEST_CASE("fit prints one expected error per output, and its basis", "[families]") {
   const auto follows = [](double quick, double slow, double, double) { return 5.0 * quick - slow; };
   const MeasuredTests two = machine_tests(2, follows);
   const std::string said = families_text(two, fitted(two));
@@ -189,7 +188,7 @@ TEST_CASE("fit says one error to expect, and on what", "[families]") {
         std::string::npos);
 }
 
-TEST_CASE("what few runs have not shown widens what a prediction may be off by", "[families]") {
+TEST_CASE("few runs increase the uncertainty of a prediction", "[families]") {
   MadeFrom made_from;
   made_from.runs = {"a.csv"};
   MadeFrom::Output output;
@@ -203,7 +202,7 @@ TEST_CASE("what few runs have not shown widens what a prediction may be off by",
   CHECK(spread_um(made_from, output, false) == 4.0);
 }
 
-TEST_CASE("a bank of lags is written, read and predicts what was judged", "[families]") {
+TEST_CASE("a bank of lags is written, read back and predicts as judged", "[families]") {
   const MeasuredTests tests = machine_tests(
       3, [](double, double, double late, double rpm) { return 6.0 * late + 4e-3 * rpm; });
   const FamiliesFit fit = fitted(tests, Family::lag_bank);
@@ -212,15 +211,14 @@ TEST_CASE("a bank of lags is written, read and predicts what was judged", "[fami
   const ThermalModel back = parse_model(write_model(fit.model), "written");
   CHECK(back.made_from == fit.model.made_from);
   CHECK(back.terms[0].bank == fit.model.terms[0].bank);
-  // The remainder in [made_from] is the daemon's own model's, so it is small where the fit's is.
+  // The remainder in [made_from] comes from the daemon's own model.
   const MadeFrom::Output& output = back.made_from->outputs.at("z_um");
   CHECK(output.remainder_rms_um < 0.5);
   CHECK(output.left_out_rms_um < 0.8);
   CHECK(output.no_model_rms_um > 5.0);
 }
 
-TEST_CASE("the rows that a model was made from are inside its domain, a hotter day is not",
-          "[families]") {
+TEST_CASE("a model's own rows are inside its domain, a hotter day is not", "[families]") {
   const MeasuredTests tests = machine_tests(
       3, [](double quick, double slow, double, double) { return 5.0 * quick - 3.0 * slow; });
   const ThermalModel model = fitted(tests).model;
@@ -250,7 +248,7 @@ TEST_CASE("the rows that a model was made from are inside its domain, a hotter d
   CHECK(look(15.0));
 }
 
-TEST_CASE("three readings of 3276.7 degC are left out with a word", "[families]") {
+TEST_CASE("three readings of 3276.7 degC are left out with a note", "[families]") {
   RunFile run =
       machine_run("spikes", 3, [](double quick, double, double, double) { return quick; });
   for (const std::size_t row : {50u, 140u, 200u}) run.values[1][row] = 3276.7;
@@ -262,7 +260,7 @@ TEST_CASE("three readings of 3276.7 degC are left out with a word", "[families]"
   CHECK(tests.runs[0].places_K.maxCoeff() < 50.0);
 }
 
-TEST_CASE("a heater that is switched on after the first row is no spike there", "[families]") {
+TEST_CASE("a heater switched on after the first row is not a spike", "[families]") {
   RunFile run =
       machine_run("heater", 3, [](double quick, double, double, double) { return quick; });
   for (std::size_t row = 0; row < run.rows(); ++row) run.values[2][row] = row == 0 ? 32.0 : 100.0;
@@ -272,7 +270,7 @@ TEST_CASE("a heater that is switched on after the first row is no spike there", 
   CHECK(tests.notes.empty());
   CHECK(tests.runs[0].reference_degC[1] == 32.0);
   run.values[2][0] = 3276.7;
-  CHECK(measured_tests({run}, options).notes.size() == 2);  // ... and what is left never moves
+  CHECK(measured_tests({run}, options).notes.size() == 2);  // ... and the remaining rows never move
 }
 
 TEST_CASE("the same rows twice are refused", "[families]") {
@@ -283,7 +281,7 @@ TEST_CASE("the same rows twice are refused", "[families]") {
   CHECK_THROWS_AS(measured_tests({run, run}, options), ConfigurationError);
 }
 
-TEST_CASE("the bank's columns are the low passes of what was recorded, from 0", "[families]") {
+TEST_CASE("the bank's columns are the low passes of the recorded columns, from 0", "[families]") {
   const MeasuredTests tests =
       machine_tests(1, [](double quick, double, double, double) { return quick; });
   const BankColumns columns = bank_columns(tests);
@@ -318,7 +316,7 @@ TEST_CASE("the order of the columns in a file does not change a bank's gains", "
   CHECK((gains[0] - gains[1].colwise().reverse()).norm() < 1e-6 * gains[0].norm());
 }
 
-TEST_CASE("a bank follows a signal whose displacement is a curve", "[families]") {
+TEST_CASE("a bank fits a curved response to a signal", "[families]") {
   TestOptions options;
   options.outputs = {"z_um"};
   options.signals = true;
@@ -368,12 +366,12 @@ TEST_CASE("a speed of a few steps has no hinges", "[families]") {
   CHECK(columns.hinges.empty());
 }
 
-TEST_CASE("a signal that lacks a few values costs those rows, not the signal", "[families]") {
+TEST_CASE("a signal with a few missing values loses those rows only", "[families]") {
   const auto moved = [](double quick, double, double, double rpm) {
     return 5.0 * quick + 2e-3 * rpm;
   };
   std::vector<RunFile> files{machine_run("a", 1, moved), machine_run("b", 2, moved)};
-  files[0].values[3][0] = not_a_number;  // as a daemon's export begins
+  files[0].values[3][0] = not_a_number;  // as at the start of a daemon's export
   files[1].values[3][100] = not_a_number;
   TestOptions options;
   options.outputs = {"z_um"};
@@ -386,7 +384,7 @@ TEST_CASE("a signal that lacks a few values costs those rows, not the signal", "
   for (const TestRun& run : tests.runs) CHECK(run.signals.allFinite());
 }
 
-TEST_CASE("blunders of a probe are left out with a word, the first row's too", "[families]") {
+TEST_CASE("blunders of a probe are left out with a note, including the first row", "[families]") {
   const auto moved = [](double quick, double, double, double) { return 5.0 * quick; };
   RunFile run = machine_run("probe", 3, moved);
   for (const std::size_t row : {0u, 40u, 41u, 200u, 359u}) run.values[4][row] += 4300.0;
@@ -403,12 +401,12 @@ TEST_CASE("blunders of a probe are left out with a word, the first row's too", "
   REQUIRE(unstuck.notes.size() == 1);
   CHECK(unstuck.notes[0].find("z_um: 39 values are left out, the same from 360 to 2640 s") !=
         std::string::npos);
-  RunFile steps = machine_run("steps", 3, moved);  // a step of the machine is no blunder
+  RunFile steps = machine_run("steps", 3, moved);  // a step of the machine is not a blunder
   for (std::size_t row = 100; row < steps.rows(); ++row) steps.values[4][row] += 60.0;
   CHECK(measured_tests({steps}, options).notes.empty());
 }
 
-TEST_CASE("a signal that stays at a level within each run is not asked of the controller",
+TEST_CASE("a signal at a constant level within each run is not requested from the controller",
           "[families]") {
   std::vector<RunFile> files;
   std::mt19937_64 engine(3);
@@ -426,7 +424,7 @@ TEST_CASE("a signal that stays at a level within each run is not asked of the co
   const MeasuredTests tests = measured_tests(files, options);
   const FamiliesFit fit = fitted(tests, Family::lag_bank);
   CHECK(tests.unmoved == std::vector<std::string>{"load_A"});
-  CHECK(fit.model.signal_columns().empty());  // nor has it hinges
+  CHECK(fit.model.signal_columns().empty());  // and no hinges
   CHECK_NOTHROW(parse_model(write_model(fit.model), "written"));
 }
 
@@ -446,7 +444,7 @@ TEST_CASE("a position and a place that vary by rounding alone are constant", "[f
   CHECK(tests.places == std::vector<std::string>{"t1_degC"});
 }
 
-TEST_CASE("a signal that goes one way once in all runs gets no gain", "[families]") {
+TEST_CASE("a signal that changes in one direction once in all runs gets no gain", "[families]") {
   const auto unmoved = [](std::initializer_list<double> levels) {
     RunFile run = machine_run("run", 1, [](double quick, double, double, double) { return quick; });
     run.columns[3] = "heater";
@@ -466,7 +464,7 @@ TEST_CASE("a signal that goes one way once in all runs gets no gain", "[families
 }
 
 TEST_CASE("a family that is worse than no model on a run left out is not chosen", "[families]") {
-  // The third run moves against the others: whatever two of them show is wrong on the other.
+  // The third run moves in the opposite direction: any two runs predict the other wrongly.
   std::vector<RunFile> files;
   for (std::size_t i = 0; i < 3; ++i) {
     const double gain = i == 2 ? -5.0 : 5.0;
@@ -483,7 +481,7 @@ TEST_CASE("a family that is worse than no model on a run left out is not chosen"
   CHECK(fit.chosen_because.find("lag_bank is worse than no model on ") != std::string::npos);
 }
 
-TEST_CASE("the run that makes most of the error is named with how it differs", "[families]") {
+TEST_CASE("the run with most of the error is named with its difference", "[families]") {
   for (const bool one_differs : {false, true}) {
     std::vector<RunFile> files;
     for (std::size_t i = 0; i < 4; ++i)
@@ -507,9 +505,8 @@ TEST_CASE("the run that makes most of the error is named with how it differs", "
   }
 }
 
-TEST_CASE("two heaters that ran together share the gain, so that one alone is foretold",
-          "[families]") {
-  // Only the first bends the machine; both are heated alike but for the noise of their sensors.
+TEST_CASE("two heaters that ran together share the gain", "[families]") {
+  // Only the first bends the machine; both heat alike but for the noise of their sensors.
   const auto heaters = [](std::uint64_t seed) {
     std::mt19937_64 engine(seed);
     RunFile run;
@@ -583,7 +580,7 @@ MeasuredTests days_from(const std::vector<double>& starts_degC, Moved moved) {
   return measured_tests(files, options);
 }
 
-/// The only one of its kind; its gain of z at the second temperature.
+/// Gain of z at the second temperature from the only term of its kind.
 double gain_at(const ThermalModel& model, double temp_degC) {
   const TermSpec* found = nullptr;
   for (const TermSpec& term : model.terms) {
@@ -598,7 +595,7 @@ double gain_at(const ThermalModel& model, double temp_degC) {
 
 }  // namespace
 
-TEST_CASE("a coefficient that depends on how the day began is fitted (C1)", "[families]") {
+TEST_CASE("a coefficient that depends on the start temperature is fitted (C1)", "[families]") {
   // [5 + 0.25 (T0 - 19)] dT: 5 + 0.25 (16 - 19) = 4.25 and 5 + 0.25 (25 - 19) = 6.5 um/K.
   const MeasuredTests tests =
       days_from({16.0, 20.0, 25.0, 22.0}, [](double start_degC, double rise_K, double) {
@@ -612,7 +609,7 @@ TEST_CASE("a coefficient that depends on how the day began is fitted (C1)", "[fa
         0.4 * result_of(fit, Family::static_few).left_out_rms_um[0]);
 }
 
-TEST_CASE("a running-in that depends on how the day began is fitted (C2)", "[families]") {
+TEST_CASE("a running-in that depends on the start temperature is fitted (C2)", "[families]") {
   // N [b1 + b2 (T0 - 20)] LP(1), b1 = 0.004, b2 = 0.0008: 0.0008 and 0.008 um/rpm from 16 and 25.
   const MeasuredTests tests =
       days_from({16.0, 20.0, 25.0, 22.0}, [](double start_degC, double rise_K, double late_rpm) {

@@ -51,7 +51,7 @@ double score_by_rows(const MeasuredTests& tests, const std::vector<std::size_t>&
   return left / whole;
 }
 
-TEST_CASE("the search judges every combination as least squares on the rows does", "[fit]") {
+TEST_CASE("the search scores every combination like least squares on the rows", "[fit]") {
   const MeasuredTests tests = few_tests(0.5);
   SubsetOptions options;
   options.terms_min = 1;
@@ -80,7 +80,8 @@ TEST_CASE("odd and large numbers of tests give the same scores", "[fit]") {
     CHECK(subset.score == Approx(score_by_rows(tests, subset.places)).epsilon(1e-6));
 }
 
-TEST_CASE("by the publication's rules at most two of a group, and one of the largest", "[fit]") {
+TEST_CASE("the publication's rules allow two places per group and require one of the largest",
+          "[fit]") {
   const MeasuredTests tests = few_tests(0.5);
   SubsetOptions options;
   options.terms_min = 1;
@@ -103,7 +104,7 @@ TEST_CASE("by the publication's rules at most two of a group, and one of the lar
     }
 }
 
-TEST_CASE("a place that is the sum of two others is not taken up beside both", "[fit]") {
+TEST_CASE("a place that is the sum of two others is not combined with both", "[fit]") {
   MeasuredTests tests = few_tests(0.5);
   for (TestRun& run : tests.runs) run.places_K.col(7) = run.places_K.col(5) + run.places_K.col(6);
   SubsetOptions options;
@@ -133,7 +134,7 @@ TEST_CASE("the places and coefficients that made the data are found", "[fit]") {
   CHECK(fit.warnings.empty());
   REQUIRE(fit.lost.size() == 3);
   CHECK(fit.lost[0].without_rms_um[0] > 3.0);
-  // Another place of its group serves nearly as well.
+  // Another place of its group is nearly as good.
   CHECK(fit.lost[0].replacement <= 2);
   CHECK(fit.lost[0].replaced_rms_um[0] < 0.5);
 }
@@ -150,7 +151,7 @@ TEST_CASE("two outputs share one choice of places", "[fit]") {
   CHECK(fit.outputs[1].left_out_rms_um == Approx(0.3).epsilon(0.1));
 }
 
-TEST_CASE("a lag is taken where there is one, and not where there is none", "[fit]") {
+TEST_CASE("a lag is added if there is one, and not otherwise", "[fit]") {
   MeasuredTests tests = few_tests(0.3);
   FitOptions options;
   options.choice = Choice::free;
@@ -168,9 +169,9 @@ TEST_CASE("a lag is taken where there is one, and not where there is none", "[fi
   CHECK(write_model(parse_model(text, "fitted")) == text);
 }
 
-TEST_CASE("a model that does worse than none on some test says so", "[fit]") {
+TEST_CASE("a model worse than none on a test has a warning", "[fit]") {
   MeasuredTests tests = few_tests(0.3);
-  tests.runs[2].outputs_um *= -0.2;  // on this test everything is the other way round
+  tests.runs[2].outputs_um *= -0.2;  // on this test every gain has the opposite sign
   FitOptions options;
   options.choice = Choice::free;
   const Fit fit = fit_equation(tests, options);
@@ -178,7 +179,7 @@ TEST_CASE("a model that does worse than none on some test says so", "[fit]") {
   CHECK_THAT(fit.warnings.front(), Catch::Contains("test2") && Catch::Contains("worse"));
 }
 
-TEST_CASE("rows with a missing value, still places and absent ones are left out", "[fit]") {
+TEST_CASE("rows with a missing value, constant places and absent ones are left out", "[fit]") {
   const std::string text =
       "time_s,a_degC,b_degC,c_degC,z_um\n0,nan,20,21,0\n60,20,20,21,1\n120,21,20,22,2\n"
       "180,22,20,,3\n240,23,20,24,4\n300,24,20,25,5\n360,25,20,26,7\n";

@@ -21,7 +21,7 @@ void refused(const std::string& text, std::initializer_list<const char*> parts) 
   }
 }
 
-TEST_CASE("a geometry with faults names every one of them", "[tiebar]") {
+TEST_CASE("every fault of a geometry file is named", "[tiebar]") {
   refused(
       "working_height_mm = 100\nheated_height_mm = 200\ntie_height_mm = -1\n[column]\nwidth_mm "
       "= 10\ndepth_mm = 5\ninertia_mm4 = 3\nmodulus_MPa = 1\n[tie]\nlength_mm = 1\ncolour = 2\n",
@@ -41,13 +41,13 @@ TEST_CASE("several ties with faults are reported with file, line, key, value and
            "gate.toml:17", "at least one column", "gate.toml:23", "fixed = true"});
 }
 
-TEST_CASE("a height for one tie does not stand beside several", "[tiebar]") {
+TEST_CASE("a single tie height is refused with several ties", "[tiebar]") {
   refused("tie_height_mm = 5\n" + columns +
               "[[tie]]\nheight_mm = 700\nlength_mm = 400\narea_mm2 = 150\n",
           {"tie_height_mm", "[[tie]]"});
 }
 
-TEST_CASE("one tie may be written either way", "[tiebar]") {
+TEST_CASE("one tie may be written as a table or as a list", "[tiebar]") {
   const std::string tie = "length_mm = 400\narea_mm2 = 150\n";
   const GateFile one = parse_gate_file("tie_height_mm = 700\n" + columns + "[tie]\n" + tie, "a");
   const GateFile list = parse_gate_file(columns + "[[tie]]\nheight_mm = 700\n" + tie, "b");
@@ -57,8 +57,7 @@ TEST_CASE("one tie may be written either way", "[tiebar]") {
   CHECK(one.choices[0].temperatures == list.choices[0].temperatures);
 }
 
-TEST_CASE("what a file does not say of the search has a default, and a fixed tie stays",
-          "[tiebar]") {
+TEST_CASE("ranges of the search have defaults, and a fixed tie stays", "[tiebar]") {
   const GateFile file = parse_gate_file(
       columns +
           "[[tie]]\nheight_mm = 250\nlength_mm = 400\narea_mm2 = 150\nfixed = true\n"
@@ -78,7 +77,7 @@ const std::string heights = "working_height_mm = 600\nheated_height_mm = 300\n";
 const std::string steel = "modulus_MPa = 206000\nexpansion_per_K = 11.5e-6\n";
 const std::string tie = "[[tie]]\nheight_mm = 250\nlength_mm = 400\narea_mm2 = 150\n";
 
-TEST_CASE("a file without elasticity means the publication's columns and ties", "[tiebar]") {
+TEST_CASE("a file without elasticity gives the publication's columns and ties", "[tiebar]") {
   const TiedColumns plain = parse_gate_file(columns + tie, "gate.toml").columns;
   CHECK(plain.column_poisson_ratio == 0.0);
   CHECK(plain.column_shear_compliance_per_N == 0.0);
@@ -108,7 +107,7 @@ TEST_CASE("shear, held feet and bonded ties are read", "[tiebar]") {
   }
 }
 
-TEST_CASE("elasticity that lacks something is reported with key and rule", "[tiebar]") {
+TEST_CASE("incomplete elasticity is reported with key and rule", "[tiebar]") {
   refused(columns + "foot = \"held\"\n" + tie, {"column.foot", "needs poisson_ratio"});
   refused(columns + "foot = \"bolted\"\n" + tie, {"column.foot", "bolted"});
   refused(columns + "poisson_ratio = 0.6\n" + tie, {"poisson_ratio = 0.6"});

@@ -10,7 +10,8 @@ namespace {
 
 constexpr double step_s = 20.0;
 
-TEST_CASE("warm oil first brings tool and work closer, then the tie parts them", "[tiebar][fe]") {
+TEST_CASE("warm oil first moves tool and work together, then the tie moves them apart",
+          "[tiebar][fe]") {
   bench::GateStructure gate(250.0, step_s);
   double early_um = 0.0;
   for (int step = 0; step < 180; ++step) {

@@ -18,7 +18,7 @@ ThermalModel matrix(std::vector<std::string> inputs, std::vector<std::string> ou
 
 }  // namespace
 
-TEST_CASE("a fitted model takes the frame of the daemon's, and its other rows", "[frame]") {
+TEST_CASE("a fitted model takes inputs, outputs and other rows of the daemon's model", "[frame]") {
   const ThermalModel frame =
       matrix({"a_degC", "b_degC", "c_degC"}, {"x_um", "z_um"}, {{1.0, 2.0, 3.0}, {4.0, 5.0, 6.0}});
   ThermalModel fitted = matrix({"c_degC", "a_degC"}, {"z_um"}, {{7.0, 8.0}});
@@ -34,7 +34,7 @@ TEST_CASE("a fitted model takes the frame of the daemon's, and its other rows", 
   CHECK(notes == std::vector<std::string>{"x_um: not fitted, the row of --like stays"});
 }
 
-TEST_CASE("what the frame lacks comes behind it", "[frame]") {
+TEST_CASE("columns that the frame lacks are appended", "[frame]") {
   const ThermalModel frame = matrix({"a_degC"}, {"x_um"}, {{1.0}});
   std::vector<std::string> notes;
   const ThermalModel model = in_frame(matrix({"b_degC"}, {"z_um"}, {{2.0}}), frame, notes);
@@ -44,7 +44,7 @@ TEST_CASE("what the frame lacks comes behind it", "[frame]") {
   CHECK_THAT(notes[1], Catch::Contains("z_um: no output of the model of --like"));
 }
 
-TEST_CASE("a frame that was fitted itself gives its names alone", "[frame]") {
+TEST_CASE("a frame that was itself fitted gives its names only", "[frame]") {
   ThermalModel frame = matrix({"a_degC", "b_degC"}, {"x_um"}, {{1.0, 2.0}});
   frame.terms = {{"wrong_coefficient", "a_degC", {}, {{"delta_um_per_K", {{"x_um", 1.0}}}}}};
   frame.covariance_K2 = {{1.0, 0.0}, {0.0, 1.0}};

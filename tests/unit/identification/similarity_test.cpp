@@ -31,7 +31,7 @@ MeasuredTests by_hand() {
   return tests;
 }
 
-TEST_CASE("similarity is what it is by hand, with one factor over both tests", "[group]") {
+TEST_CASE("similarity equals a calculation by hand, with one factor over both tests", "[group]") {
   const MeasuredTests tests = by_hand();
   // a.a = 1+4+16 = 21, b.b = 4+16+49 = 69, a.b = 2+8+28 = 38, max a = 4
   const Eigen::MatrixXd sums = similarity(tests, false);
@@ -43,27 +43,27 @@ TEST_CASE("similarity is what it is by hand, with one factor over both tests", "
   CHECK(relative(1, 0) == Approx(relative(0, 1)));
 }
 
-TEST_CASE("with the range of each test a test of small rises counts as much", "[group]") {
+TEST_CASE("with the maximum of each test, a test with small rises has the same weight", "[group]") {
   // a over its largest: 0, 1/2, 1 and 0, 0, 1; its square 2.25, times b 1 + 4 + 7 = 12, b.b = 69
   const MeasuredTests tests = by_hand();
   const Eigen::MatrixXd sums = similarity(tests, false, LargestOver::each_test);
   CHECK(sums(0, 1) == Approx(2.25 - 12.0 * 12.0 / 69));
   const Eigen::MatrixXd relative = similarity(tests, true, LargestOver::each_test);
   CHECK(relative(0, 1) == Approx(1.0 - 12.0 * 12.0 / (2.25 * 69.0)));
-  MeasuredTests first = tests;  // of one test both are the same
+  MeasuredTests first = tests;  // with one test both are the same
   first.runs.resize(1);
   first.folds.resize(1);
   CHECK(similarity(first, false, LargestOver::each_test)(1, 0) ==
         Approx(similarity(first, false)(1, 0)).margin(1e-12));
 }
 
-TEST_CASE("places that move against each other have nothing in common", "[group]") {
-  // a.c = 2 - 4 < 0: alpha is 0, and the whole of a is left over
+TEST_CASE("places that move in opposite directions have nothing in common", "[group]") {
+  // a.c = 2 - 4 < 0: alpha is 0, and all of a remains
   CHECK(similarity(by_hand(), true)(0, 2) == 1.0);
   CHECK(similarity(by_hand(), false)(0, 2) == Approx(21.0 / 16));
 }
 
-TEST_CASE("a threshold merges pairs in ascending order, and says what others would do", "[group]") {
+TEST_CASE("a threshold merges pairs in ascending order, and all merges are listed", "[group]") {
   Eigen::MatrixXd s(4, 4);
   s << 0, .01, .5, .9, .01, 0, .02, .8, .5, .02, 0, .7, .9, .8, .7, 0;
   CHECK(group_places(s, 0.015).groups == std::vector<std::vector<std::size_t>>{{0, 1}, {2}, {3}});
@@ -75,7 +75,7 @@ TEST_CASE("a threshold merges pairs in ascending order, and says what others wou
   CHECK(group_places(s, 1.0).groups.size() == 1);
 }
 
-TEST_CASE("22 places in 9 groups are found again at three levels of noise and three samplings",
+TEST_CASE("22 places in 9 groups are found at three noise levels and three sampling intervals",
           "[group]") {
   const std::vector<std::size_t> sizes{10, 5, 1, 1, 1, 1, 1, 1, 1};
   std::vector<std::vector<std::size_t>> truth;
@@ -86,7 +86,7 @@ TEST_CASE("22 places in 9 groups are found again at three levels of noise and th
   }
   const double noise_K = GENERATE(0.01, 0.05, 0.1);
   const auto seed = GENERATE(1u, 2u, 3u);
-  const int minutes = GENERATE(1, 10, 25);  // 25: a row a machining cycle
+  const int minutes = GENERATE(1, 10, 25);  // 25: one row per machining cycle
   MeasuredTests tests = grouped_places(sizes, noise_K, seed);
   for (TestRun& run : tests.runs) {
     const auto rows = Eigen::seq(0, Eigen::last, minutes);

@@ -1,5 +1,4 @@
-// On measured data of a spindle, which are not part of the project: THERMOCOMP_DATA names their
-// folder.
+// Tests on measured spindle data outside the project, in the folder of THERMOCOMP_DATA.
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -12,7 +11,7 @@
 namespace thermocomp::identification {
 namespace {
 
-/// RMS of what the equation leaves of the selected rows, its reference the file's first row.
+/// RMS remainder of the equation on the selected rows; reference: the file's first row.
 double rms_on(const MeasuredTests& rows, const Fit& fit) {
   const TestRun& run = rows.runs[0];
   Eigen::VectorXd left = run.outputs_um.col(0);
@@ -29,7 +28,7 @@ std::filesystem::path recording() {
          "hours_00_32.csv";
 }
 
-/// Rows of these hours as a file of their own; one row a minute.
+/// Rows of these hours as a file; one row per minute.
 RunFile hours_of(const RunFile& run, double from_h, double to_h) {
   RunFile part = run;
   part.name = std::to_string(from_h);
@@ -43,14 +42,14 @@ RunFile hours_of(const RunFile& run, double from_h, double to_h) {
   return part;
 }
 
-TEST_CASE("four sensors and lags do better on hours not fitted than sixteen without",
+TEST_CASE("four sensors with lags predict hours not fitted better than sixteen without",
           "[fit][data]") {
   const std::filesystem::path run = recording();
   if (!std::filesystem::exists(run)) {
     WARN("skipped: " << run << " is not here");
     return;
   }
-  // The static model of all sixteen, as its makers state it.
+  // Static model of all sixteen, as stated by its makers.
   const std::vector<std::pair<std::string, double>> sixteen{{"ch1_um", 5.653},
                                                             {"ch2_um", 5.087},
                                                             {"ch3_um", 9.193},
@@ -70,8 +69,7 @@ TEST_CASE("four sensors and lags do better on hours not fitted than sixteen with
   }
 }
 
-TEST_CASE("five runs that differ in size get the model that predicts them best",
-          "[families][data]") {
+TEST_CASE("five runs of different size get the model that predicts them best", "[families][data]") {
   const std::filesystem::path file = recording();
   if (!std::filesystem::exists(file)) {
     WARN("skipped: " << file << " is not here");

@@ -1,5 +1,5 @@
 /// Places that warm in groups: each group follows its own mixture of heat sources with its own time
-/// constant, each place of it with its own size.
+/// constant, each place with its own gain.
 #pragma once
 
 #include <cmath>
@@ -16,8 +16,8 @@ inline double gaussian(std::mt19937_64& engine) {
   return std::sqrt(-2.0 * std::log(share())) * std::cos(2.0 * M_PI * share());
 }
 
-/// `sizes[g]` places of group g; tests of 8 h, a row a minute, every test with its own spindle
-/// load, coolant and room.
+/// `sizes[g]` places of group g; tests of 8 h, one row per minute, each with its own spindle load,
+/// coolant and room.
 inline MeasuredTests grouped_places(const std::vector<std::size_t>& sizes, double noise_K,
                                     std::uint64_t seed, std::size_t tests_count = 9) {
   std::mt19937_64 engine(seed);

@@ -46,7 +46,8 @@ std::vector<TieCourse> courses_of(const GateFile& file) {
   return tie_courses(file, {oil_run()}, notes);
 }
 
-TEST_CASE("a course counts from its first row, A less B and each tie by its factor", "[tiebar]") {
+TEST_CASE("a course is relative to its first row: A - B, and each tie times its factor",
+          "[tiebar]") {
   const GateFile file = gate(tie(250) + tie(700, "rise_factor = 0.5\n"));
   const TieCourse course = courses_of(file).front();
   REQUIRE(course.rises_K.cols() == 3);
@@ -59,7 +60,7 @@ TEST_CASE("a course counts from its first row, A less B and each tie by its fact
                k.kc_um_per_K[1] * course.rises_K(200, 2)));
 }
 
-TEST_CASE("a run without a column of the geometry is refused with both files", "[tiebar]") {
+TEST_CASE("a run that lacks a column of the geometry is refused, naming both files", "[tiebar]") {
   std::vector<std::string> notes;
   const GateFile file =
       parse_gate_file(columns +
@@ -75,7 +76,7 @@ TEST_CASE("a run without a column of the geometry is refused with both files", "
   }
 }
 
-TEST_CASE("the best tie is that of a table of all heights and areas", "[tiebar]") {
+TEST_CASE("the best tie equals that of an exhaustive search of heights and areas", "[tiebar]") {
   const GateFile file = gate(tie(250));
   const std::vector<TieCourse> courses = courses_of(file);
   TiedColumns other = file.columns;
@@ -110,7 +111,7 @@ TEST_CASE("a second tie leaves less than the best single one, within the bounds"
   }
 }
 
-TEST_CASE("a fixed tie stays, and where every one is fixed there is no best", "[tiebar]") {
+TEST_CASE("a fixed tie stays, and optimising only fixed ties is refused", "[tiebar]") {
   const GateFile some = gate(tie(250, "fixed = true\n") + tie(700));
   CHECK(best_ties(some, courses_of(some)).ties[0].height_mm == 250.0);
   const GateFile none = gate(tie(250, "fixed = true\n"));

@@ -51,7 +51,7 @@ TEST_CASE("one tie gives the published cases, dimensionless", "[tiebar]") {
   }
 }
 
-TEST_CASE("at the best height of the tie no other height displaces less", "[tiebar]") {
+TEST_CASE("no other height of the tie displaces less than the best one", "[tiebar]") {
   const double ratio = GENERATE(0.0, 0.1, 0.3);
   TiedColumns columns = gate_with_tie(1.1, 0.1);
   const BestHeight best = best_tie_height(columns, ratio);
@@ -63,13 +63,13 @@ TEST_CASE("at the best height of the tie no other height displaces less", "[tieb
   }
 }
 
-TEST_CASE("without a tie only the bending of the heated column is left", "[tiebar]") {
+TEST_CASE("without a tie only the heated column's bending remains", "[tiebar]") {
   const TiedCoefficients k = tied_coefficients(gate());
   CHECK(k.ki_um_per_K == Approx(1000 * 3 * 11.5e-6 * 600 * 600 / (8 * 80)));
   CHECK(k.kc_um_per_K.empty());
 }
 
-TEST_CASE("two half ties at one height are a whole one", "[tiebar]") {
+TEST_CASE("two half ties at one height equal a whole one", "[tiebar]") {
   TiedColumns whole = gate();
   whole.ties = {tie(700, 300)};
   TiedColumns halves = gate();
@@ -80,7 +80,7 @@ TEST_CASE("two half ties at one height are a whole one", "[tiebar]") {
   CHECK(two.kc_um_per_K[0] + two.kc_um_per_K[1] == Approx(one.kc_um_per_K[0]).epsilon(1e-10));
 }
 
-TEST_CASE("a tie that bears nothing changes nothing, and the order of ties does not matter",
+TEST_CASE("a tie without stiffness changes nothing, and the order of ties is irrelevant",
           "[tiebar]") {
   TiedColumns one = gate();
   one.ties = {tie(250, 150)};
@@ -110,7 +110,7 @@ TEST_CASE("two rigid ties, one above the work and one below, leave less than eit
   CHECK(both < 0.5 * ki({tie(750, 1e5)}));
 }
 
-/// With all that the publication leaves out.
+/// With everything that the publication neglects.
 TiedColumns elastic_gate() {
   TiedColumns columns = gate();
   columns.column_poisson_ratio = 0.3;
@@ -125,7 +125,7 @@ Tie bonded_tie(double height_mm, double area_mm2, double thickness_mm) {
   return bonded;
 }
 
-TEST_CASE("shear, the foot and bonded ends each move Ki away from the published one", "[tiebar]") {
+TEST_CASE("shear, the foot and bonded ends each change the published Ki", "[tiebar]") {
   TiedColumns columns = gate();
   columns.ties = {tie(250, 150)};
   const double published = tied_coefficients(columns).ki_um_per_K;
@@ -143,9 +143,9 @@ TEST_CASE("shear, the foot and bonded ends each move Ki away from the published 
   CHECK(differs(other) > 0.005);
 }
 
-TEST_CASE("a stiff bonded tie above the heated zone leaves nothing at the work or above the tie",
+TEST_CASE("a stiff bonded tie above the heated zone removes the displacement at the work",
           "[tiebar]") {
-  TiedColumns columns = gate();  // without Poisson's ratio the faces stay where the axes are
+  TiedColumns columns = gate();  // nu = 0: the section keeps its width
   columns.column_poisson_ratio = 0.0;
   const double free_um_per_K = tied_coefficients(columns).ki_um_per_K;
   const double height_mm = GENERATE(400.0, 600.0);
@@ -172,7 +172,7 @@ TEST_CASE("bonded and pinned ties may be mixed in any order", "[tiebar]") {
     CHECK(other.kc_um_per_K[j] == Approx(k.kc_um_per_K[2 - j]).epsilon(1e-10));
 }
 
-TEST_CASE("of a bonded tie at the end of the heated zone no jump is left", "[tiebar]") {
+TEST_CASE("Ki of a bonded tie is continuous at the end of the heated zone", "[tiebar]") {
   TiedColumns columns = elastic_gate();
   const auto ki = [&](double height_mm) {
     columns.ties = {bonded_tie(height_mm, 150, 12.5)};

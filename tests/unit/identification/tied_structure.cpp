@@ -21,9 +21,9 @@ namespace {
 constexpr double depth_mm = 60.0;  // of a column
 constexpr double width_mm = 80.0;
 constexpr double tie_length_mm = 400.0;
-constexpr double tie_high_mm = 12.5;  // as high as that of the file; wider where it is thicker
+constexpr double tie_high_mm = 12.5;  // height of the file's tie; a larger area first widens it
 constexpr double above_tie_mm = 40.0;
-// Where elements are refined: the first two at an edge, those of a tie, and what is too narrow.
+// Sizes of refined elements: the first two at an edge, those of a tie; and the smallest distance.
 constexpr double edge_mm = 5.0;
 constexpr double edge_next_mm = 14.0;
 constexpr double tie_size_mm = 6.25;
@@ -43,7 +43,7 @@ struct TieSection {
   double high_mm;
 };
 
-/// As wide as its area asks for, then higher.
+/// Widens the tie to its area, up to the column's depth, then increases its height.
 TieSection section_of(const FiniteTie& tie) {
   const double wide_mm = std::min(depth_mm, tie.area_mm2 / tie_high_mm);
   return {wide_mm, tie.area_mm2 / wide_mm};
@@ -71,7 +71,7 @@ std::string text_of_tie(const std::string& name, const FiniteTie& tie) {
   return text;
 }
 
-/// More planes of elements: boxes inside the part end at them.
+/// Adds planes of elements as ends of boxes inside the part.
 void add_planes(PartSpec& part, std::size_t axis, std::vector<double> planes_mm) {
   Box whole = part.boxes.front().box;
   whole.high_m[2] = part.boxes.back().box.high_m[2];
@@ -88,8 +88,7 @@ void add_planes(PartSpec& part, std::size_t axis, std::vector<double> planes_mm)
   }
 }
 
-/// Small elements at the edges of the feet, which hold the columns crosswise, and at the ends of
-/// the ties.
+/// Small elements at the feet's edges, which hold the columns crosswise, and at the ties' ends.
 void refine(StructureSpec& spec, std::size_t ties) {
   const auto between = [](double low_mm, double high_mm) {
     return std::vector<double>{low_mm + edge_mm, low_mm + edge_next_mm, high_mm - edge_next_mm,
@@ -178,7 +177,7 @@ struct TiedStructure::Parts {
       sum_um += um * sensitivity_m_per_K[i] * field_K[i];
     return sum_um;
   }
-  /// Linear across the heated zone; ends within the rows of elements above and below its top.
+  /// Linear across the heated zone, to 0 within the element rows above and below its top.
   [[nodiscard]] std::vector<double> linear_field() const {
     const auto belongs = nodes_of_part(structure.mesh, 0);
     const double top_m = beams.heated_height_mm / mm;

@@ -1,5 +1,4 @@
-/// The coefficients of the gate machine of config/examples/gate_structure.toml with any number of
-/// ties, as finite elements.
+/// Finite elements of config/examples/gate_structure.toml with any number of ties.
 #pragma once
 
 #include <memory>
@@ -16,15 +15,16 @@ struct FiniteTie {
 
 class TiedStructure {
  public:
-  /// Refined at the feet and where ties are bonded; Ki and Kc then stay within 0.4 %.
+  /// Refined at the feet and at bonded ties; Ki and Kc change by at most 0.4 % on further
+  /// refinement.
   explicit TiedStructure(const std::vector<FiniteTie>& ties);
   ~TiedStructure();
   TiedStructure(const TiedStructure&) = delete;
   TiedStructure& operator=(const TiedStructure&) = delete;
 
-  /// The same machine to the beams, with all that they can have.
+  /// The same machine as beams, with all elasticity.
   [[nodiscard]] const identification::TiedColumns& columns() const;
-  /// A temperature that is linear across the heated zone, and each tie 1 K warm.
+  /// From a linear temperature across the heated zone, and 1 K of each tie.
   [[nodiscard]] identification::TiedCoefficients coefficients() const;
 
  private:

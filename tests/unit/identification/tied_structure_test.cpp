@@ -9,7 +9,7 @@
 namespace thermocomp::gate_tests {
 namespace {
 
-/// The publication's: rigid in shear, feet free crosswise, ties pinned to the axes.
+/// The publication's columns: rigid in shear, feet free crosswise, ties pinned to the axes.
 identification::TiedColumns published(identification::TiedColumns columns) {
   columns.column_poisson_ratio = 0.0;
   columns.column_shear_compliance_per_N = 0.0;
@@ -23,7 +23,7 @@ void print_ties(const std::vector<FiniteTie>& ties) {
     std::printf("%.0f mm, %.0f mm^2; ", tie.height_mm, tie.area_mm2);
 }
 
-/// Beams of four kinds: the publication's, then with shear, on held feet, and with bonded ties too.
+/// Four beam models: the publication's, then with shear, with held feet, and with bonded ties.
 std::vector<identification::TiedCoefficients> beams_of(const identification::TiedColumns& all) {
   identification::TiedColumns columns = published(all);
   std::vector<identification::TiedCoefficients> beams{identification::tied_coefficients(columns)};
@@ -36,7 +36,7 @@ std::vector<identification::TiedCoefficients> beams_of(const identification::Tie
   return beams;
 }
 
-/// How far they are off, in percent of `whole`.
+/// Prints the deviations in percent of `whole`.
 template <class Value>
 void print_off(const char* name, double fe,
                const std::vector<identification::TiedCoefficients>& beams, Value value,
@@ -51,8 +51,8 @@ double ki_of(const identification::TiedCoefficients& k) {
   return k.ki_um_per_K;
 }
 
-TEST_CASE("one tie and two are what finite elements of the gate machine say", "[tiebar][fe]") {
-  // Below the work in the heated zone and above it, at the work, and above; then two of two sizes.
+TEST_CASE("one tie and two agree with finite elements of the gate machine", "[tiebar][fe]") {
+  // Below the work in the heated zone and above it, at the work, and above; then two unequal ties.
   const auto ties = GENERATE(std::vector<FiniteTie>{{150, 150}}, std::vector<FiniteTie>{{400, 150}},
                              std::vector<FiniteTie>{{600, 600}}, std::vector<FiniteTie>{{900, 150}},
                              std::vector<FiniteTie>{{400, 150}, {900, 300}});
@@ -75,8 +75,7 @@ TEST_CASE("one tie and two are what finite elements of the gate machine say", "[
   std::printf("\n");
 }
 
-TEST_CASE("where a tie leaves nearly nothing of Ki, beams are right to parts of Ki without a tie",
-          "[tiebar][fe]") {
+TEST_CASE("beams agree with finite elements where a tie nearly cancels Ki", "[tiebar][fe]") {
   const double height_mm = GENERATE(500.0, 560.0);
   const std::vector<FiniteTie> ties{{height_mm, 1200}};
   const TiedStructure gate(ties);
