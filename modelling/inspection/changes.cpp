@@ -422,7 +422,7 @@ class ChangeSearch {
   }
 
   Recording recording_;
-  std::vector<double> operating_change_;  ///< one a signal
+  std::vector<double> operating_change_;  ///< by signal
   std::vector<Target> targets_;
   std::vector<Finding> taken_;
   Suspicions offers_;

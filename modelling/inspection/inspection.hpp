@@ -35,7 +35,7 @@ struct Cleaned {
 
 /// Time between two rows: "10 s", "3.71 h".
 [[nodiscard]] std::string step_text(double step_s);
-/// Groups of at least two places, names joined. `thermocomp group` goes by another measure.
+/// Groups of at least two places, names joined. `thermocomp group` uses another measure.
 [[nodiscard]] std::vector<std::string> alike(const Inspection& inspection);
 inline constexpr const char* none_alike = "No two places correlate above 0.98.";
 /// @param departure  JSON value, or empty

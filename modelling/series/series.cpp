@@ -154,8 +154,9 @@ std::size_t output_of(const Statistics& machine, const std::string& output) {
   return static_cast<std::size_t>(at - machine.outputs.begin());
 }
 
-/// Mean square remainder of each machine left out, by its sisters' mean, over the value expected
-/// from their S; at least 1. S from few machines is the most likely one, which is too small.
+/// Mean square remainder of left-out machines by their sisters' mean, less the sisters' own,
+/// divided by the value expected from their S; at least 1. The most likely S of few machines is too
+/// small.
 double widening_of(const std::vector<Evidence>& machines, const Assumed& assumed,
                    double noise_time_s) {
   if (machines.size() < 3) return 1.0;
