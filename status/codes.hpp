@@ -34,7 +34,7 @@ struct CodeText {
 /// Text of the fault `out_of_range` for a NaN value.
 [[nodiscard]] CodeText nan_text() noexcept;
 
-/// "mend the sensor or its bus: thermocomp sensors"
+/// "repair the sensor or its bus: thermocomp sensors"
 [[nodiscard]] std::string with_command(std::string_view remedy, std::string_view command);
 
 /// The code with this name; nullopt: unknown.

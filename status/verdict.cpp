@@ -191,7 +191,7 @@ class Causes {
       for (const InputStatus& input : status_.inputs) blocks.push_back(input.block);
       if (!unexplained_.empty())
         add("bad sensors: " + joined(unexplained_) + input_text(lost_inputs(blocks)),
-            "mend the sensor or its bus", "thermocomp sensors");
+            "repair the sensor or its bus", "thermocomp sensors");
       return;
     }
     for (const SensorStatus& sensor : sensors_->sensors) {
@@ -226,7 +226,7 @@ class Causes {
       if (axis.latched)
         add(name + " is not driven: " + fixed(axis.latched->sent_um, 1) + " um was sent, " +
                 fixed(axis.latched->read_um, 1) + " um is read back (" + axis.latched->likely + ")",
-            "mend it, then release the axis", "thermocomp release " + axis.name, subject);
+            "remove the cause, then release the axis", "thermocomp release " + axis.name, subject);
       else if (axis.disagrees)
         add(name + ": the controller applies " + fixed(axis.applied, 1) + " " + axis.unit + ", " +
                 fixed(axis.offset, 1) + " was sent",

@@ -114,7 +114,7 @@ def test_it_says_what_is_wrong_and_recovers(machine, gateway, browser):
     entry, = browser.find_elements("css selector", "#problem-list li")  # one, not four
     assert "2 sensors, inputs column, spindle" in entry.text
     assert not re.search("thermocomp |systemctl", entry.text), "a command on the page"
-    assert "the correction is frozen and the tool may drift from here; finish no precise cut" in text(browser, "detail")
+    assert "the correction is frozen and the tool may drift from here; do not finish a precise cut" in text(browser, "detail")
     assert re.search(r"held since \d\d:\d\d:\d\d at 0.0 of at most 60", text(browser, "axes"))
     assert is_on_first_screen(browser, "#problem-list li")
     entry.find_element("css selector", "a").click()

@@ -153,7 +153,7 @@ TEST_CASE("troubles are named in plain words", "[cli][status]") {
   const std::string text = status_text(status, false);
   CHECK_THAT(text, Contains("no (data lost: offsets held, for"));
   CHECK_THAT(text,
-             Contains("no good sensor left -> mend the sensor or its bus: thermocomp sensors"));
+             Contains("no good sensor left -> repair the sensor or its bus: thermocomp sensors"));
   CHECK_THAT(text, Contains("bad sensors: table"));
   CHECK_THAT(text, Contains("sensor table jumped by +48.0 K -> compare it with a hand-held "
                             "thermometer; where it is right, accept it: thermocomp accept table"));

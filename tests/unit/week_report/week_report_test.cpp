@@ -182,7 +182,7 @@ TEST_CASE("a suspected sensor has its own line of advice", "[week]") {
                            Contains("1 time, 2 h 0 min in all. Do:") && Contains("thermometer"));
   for (const std::string& line : lines) {
     CHECK_THAT(line, !Contains("drifted by"));  // not reported twice
-    CHECK_THAT(line, !Contains("a sensor shows what its neighbours contradict"));
+    CHECK_THAT(line, !Contains("a sensor disagrees with its neighbours"));
   }
   const std::string html = week_html(week);
   CHECK_THAT(html, Contains(">2 h 0 min</td>"));
