@@ -294,9 +294,9 @@ TEST_CASE("a settling value is not reported as a fault", "[cli][status]") {
   Status status = good_status();
   status.mode = Mode::starting;
   status.reasons = only(Reason::block_lost);
-  CHECK_THAT(status_text(status, false), !Contains("mend the sensor"));
+  CHECK_THAT(status_text(status, false), !Contains("repair the sensor"));
   status.sensors_bad = {"head"};
-  CHECK_THAT(status_text(status, false), Contains("mend the sensor"));
+  CHECK_THAT(status_text(status, false), Contains("repair the sensor"));
 }
 
 TEST_CASE("a model of zeros compensates nothing", "[cli][status]") {

@@ -185,7 +185,7 @@ TEST_CASE("the page uses the texts of thermocomp status", "[gateway][page]") {
   snapshot.status.reasons = static_cast<std::uint32_t>(Reason::block_lost);
   state = page_state(snapshot, "mill");
   CHECK(state["verdict"]["level"] == "bad");
-  CHECK_THAT(state["verdict"]["advice"].get<std::string>(), Catch::Contains("no precise cut"));
+  CHECK_THAT(state["verdict"]["advice"].get<std::string>(), Catch::Contains("do not finish a precise cut"));
   CHECK(state["problems"][0]["what"] == "an input of the model has no good sensor left");
   CHECK_FALSE(state["problems"][0]["remedy"].get<std::string>().empty());
   snapshot.is_here = false;
