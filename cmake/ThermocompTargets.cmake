@@ -30,6 +30,10 @@ target_compile_options(thermocomp_flags INTERFACE
   -Wall -Wextra -Wpedantic -Werror -Wshadow -Wconversion -Wsign-conversion -Wold-style-cast
   -Wnon-virtual-dtor -Woverloaded-virtual -Wcast-align -Wformat=2 -Wimplicit-fallthrough
   -ffp-contract=off)
+# GCC collects its garbage only above 500 MB, which few files reach: an eighth of the time of compiling.
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  target_compile_options(thermocomp_flags INTERFACE "SHELL:--param ggc-min-heapsize=512000")
+endif()
 # The packages are hardened as Debian does it, and what is tested is what is installed: every release
 # build has these flags, and debian/rules adds none.
 if(CMAKE_BUILD_TYPE STREQUAL "Release")
