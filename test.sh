@@ -60,7 +60,7 @@ folder=$PWD/build/$preset
 failed_names=build/$preset/Testing/Temporary/LastTestsFailed.log  # written by ctest
 
 # Skipped tests with their reasons, so that they do not look passed.
-say_what_was_skipped() {
+list_skipped() {
   local log=build/$preset/Testing/Temporary/LastTest.log
   [[ -f $log ]] || return 0
   grep -E '^SKIPPED |: skipped: ' "$log" | sort -u | sed 's/^/left out: /' || true
@@ -138,7 +138,7 @@ build() {
 test_part() {
   local part=$1
   stage "tests $preset $part" run_tests "$@" || failed=1
-  say_what_was_skipped
+  list_skipped
 }
 
 # Tests of processes wait for devices half of their time: what only the others need is built behind them.

@@ -97,7 +97,7 @@ void declare_command_line(CLI::App& app, GlobalOptions& global, Action& action) 
       ->type_name("FILE")
       ->default_str(global.socket);
   app.require_subcommand(1);
-  app.failure_message(command_slip_text);
+  app.failure_message(command_error_text);
   app.footer(
       "Exit status: 0 success, 1 the answer is no, 2 wrong usage, invalid input or unreachable.");
   add_init_command(app, action);

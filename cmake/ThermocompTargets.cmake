@@ -67,7 +67,7 @@ if(THERMOCOMP_COVERAGE)
 endif()
 
 # Headers of the C++ library and of others, read once for all files instead of once a file: a quarter
-# of the time of compiling a test. Never headers of ours, so that the rooms below still hold. A file must name
+# of the time of compiling a test. Never headers of ours, so that the include folders below still hold. A file must name
 # what it uses all the same: the preset debug and clang-tidy read the files without these.
 # GCC only: it alone builds what is tested and installed.
 set(THERMOCOMP_STD_HEADERS
@@ -113,11 +113,11 @@ endif()
 thermocomp_precompiled(thermocomp_precompiled_runs_once
   HEADERS ${THERMOCOMP_STD_HEADERS} OPTIONS ${THERMOCOMP_RUNS_ONCE})
 
-# thermocomp_rooms(TARGET [VISIBILITY] FOLDER...): headers of FOLDER become visible as
+# thermocomp_include_folders(TARGET [VISIBILITY] FOLDER...): headers of FOLDER become visible as
 # "FOLDER/name.hpp" to TARGET and to whoever links it - and to nobody else. Each target gets an
 # include root of its own with links to its folders, so that including a header of a library that
 # is not linked does not compile.
-function(thermocomp_rooms target visibility)
+function(thermocomp_include_folders target visibility)
   set(root ${CMAKE_BINARY_DIR}/include-roots/${target})
   # Begun anew in each configuration, before the first link: a link to a folder that an earlier
   # layout left would lead what is done below it into the sources.
@@ -134,12 +134,12 @@ function(thermocomp_rooms target visibility)
   target_include_directories(${target} ${visibility} ${root})
 endfunction()
 
-# thermocomp_library(NAME ROOMS folder... SOURCES file... LINKS target... [PRECOMPILED name] [RUNS_ONCE])
+# thermocomp_library(NAME INCLUDE_FOLDERS folder... SOURCES file... LINKS target... [PRECOMPILED name] [RUNS_ONCE])
 function(thermocomp_library name)
-  cmake_parse_arguments(arg "RUNS_ONCE" "PRECOMPILED" "ROOMS;SOURCES;LINKS;PRIVATE_LINKS" ${ARGN})
+  cmake_parse_arguments(arg "RUNS_ONCE" "PRECOMPILED" "INCLUDE_FOLDERS;SOURCES;LINKS;PRIVATE_LINKS" ${ARGN})
   add_library(${name} STATIC ${arg_SOURCES})
   target_link_libraries(${name} PUBLIC ${arg_LINKS} PRIVATE thermocomp_flags ${arg_PRIVATE_LINKS})
-  thermocomp_rooms(${name} PUBLIC ${arg_ROOMS})
+  thermocomp_include_folders(${name} PUBLIC ${arg_INCLUDE_FOLDERS})
   if(arg_RUNS_ONCE)
     target_compile_options(${name} PRIVATE ${THERMOCOMP_RUNS_ONCE})
     set(arg_PRECOMPILED thermocomp_precompiled_runs_once)

@@ -173,7 +173,7 @@ Daemon::Parts::Parts(const std::filesystem::path& config_file)
                   [this] { return server.caller(); }, start_state.state.reference_degC}),
       supervisor({config, sources, *link, history.get(), keeper, server, signals, service,
                   operations, journal, locks.controller}) {
-  if (history) journal.tell([this](const Event& event) { history->note(event); });
+  if (history) journal.on_event([this](const Event& event) { history->note(event); });
   // Saved now: a kill before the first periodic save must not look like a first start.
   keeper.save(start_state.state, std::chrono::steady_clock::now());
   static_cast<void>(keeper.wait(StateKeeper::disk_answers_within));

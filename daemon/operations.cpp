@@ -231,7 +231,7 @@ void Operations::end_reload() {
 void Operations::poll() {
   cycle_.poll(Clock::now());
   parts_.keeper.poll(Clock::now());
-  tell_saved(false);
+  report_saved(false);
   finish_loading();
   finish_reload();
 }
@@ -343,7 +343,7 @@ void Operations::save_state(bool at_once) {
     parts_.keeper.save(state, Clock::now());
   else
     parts_.keeper.note(state, Clock::now());
-  tell_saved(!at_once);
+  report_saved(!at_once);
   const std::string& error = parts_.keeper.error();
   if (!error.empty() && error != reported_save_error_) spdlog::error("{}", error);
   reported_save_error_ = error;
@@ -351,7 +351,7 @@ void Operations::save_state(bool at_once) {
 
 /// Reports a newer state on disk to the estimator.
 /// @param again  reports an unchanged one too, if an axis waits and no write is under way
-void Operations::tell_saved(bool again) {
+void Operations::report_saved(bool again) {
   const std::vector<AxisReport>& axes = cycle_.report().axes;
   const bool is_waited_for = again && !parts_.keeper.is_busy() && parts_.keeper.error().empty() &&
                              std::any_of(axes.begin(), axes.end(), [](const AxisReport& axis) {

@@ -100,7 +100,7 @@ class Operations {
   void finish_reload();
   void end_reload();
   void carried_out(const Command& done);
-  void tell_saved(bool again);
+  void report_saved(bool again);
   void note_reference(const PersistentState& state, ReferenceOrigin origin);
   [[nodiscard]] static Event command_event(std::string_view code, const Asking& by);
   void note_asked(const Command& asked, const CycleHandle::Tracked& outcome);

@@ -166,7 +166,7 @@ void Supervisor::look_at_health() {
   events_.note_missed(cycle().timing().missed.load());
   events_.note_failed_sleeps(cycle().timing().failed_sleeps.load());
   events_.note_socket(parts_.server.statistics());
-  events_.note_log(log_statistics().stands);
+  events_.note_log(log_statistics().is_stalled);
   note_history();
   for (NameLock& lock : parts_.locks) lock.drain();
   parts_.service.status(status_line(view()));
@@ -226,7 +226,7 @@ StatusView Supervisor::view() {
     if (axes[i].waits_for_disk)
       all.push_back("axis " + parts_.config.estimator.axes[i].name +
                     " waits for the state file, which a restart needs for its offset");
-  if (const LogStatistics log = log_statistics(); log.stands)
+  if (const LogStatistics log = log_statistics(); log.is_stalled)
     all.push_back(fmt::format("the log is not read: {} lines are lost", log.dropped));
   const HistoryStatistics statistics =
       parts_.history != nullptr ? parts_.history->statistics() : HistoryStatistics{};

@@ -192,7 +192,7 @@ enum class StopPolicy { hold, ramp_to_zero };
 enum class OutsidePolicy {
   warn,  ///< follows the model; reported in status and history
   hold,
-  shrink  ///< follows a share of the displacement, see ModelDomain::believed_share()
+  shrink  ///< follows a share of the displacement, see ModelDomain::used_share()
 };
 
 /// Treatment of a sensor whose good values its neighbours contradict.

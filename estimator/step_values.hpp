@@ -61,7 +61,7 @@ struct Displacement {
   bool not_finite{false};       ///< good inputs gave no finite number
   bool outside{false};
   bool held{false};                 ///< outside, and configured to hold
-  double believed_share{1.0};       ///< share of the model's displacement in use
+  double used_share{1.0};           ///< share of the model's displacement in use
   std::span<const double> zero_um;  ///< per output: the model at the reference state
   std::span<const double> axis_um;  ///< one per axis, with the correction learned from probings
 };

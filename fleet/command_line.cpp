@@ -14,7 +14,7 @@ void declare_fleet_command_line(CLI::App& app, std::string& store, cli::Action& 
   app.description("The store of machines of one type: who is in it, what the nights found");
   app.set_version_flag("--version", THERMOCOMP_VERSION);
   app.require_subcommand(1);
-  app.failure_message(cli::command_slip_text);
+  app.failure_message(cli::command_error_text);
   app.footer("Exit status: 0 success, 1 no, 2 bad use, bad input, or a store that is not reached.");
   store = "dbname=thermocomp_fleet";
   app.add_option(

@@ -104,11 +104,11 @@ class Gateway {
       return alarm;
     };
     std::vector<AlarmChange> changes = alarms_.update(now_s, wrong_now(snapshot), snapshot.is_here);
-    if (changes.empty() && alarms_told_) return;
+    if (changes.empty() && alarms_published_) return;
     std::vector<Alarm> active = alarms_.active();
     for (Alarm& alarm : active) alarm = with_time_of_day(alarm);
     if (mqtt_ && changes.empty()) mqtt_->show_alarms(active, nullptr, snapshot.wall_s);
-    alarms_told_ = true;
+    alarms_published_ = true;
     for (AlarmChange& change : changes) {
       change.alarm = with_time_of_day(change.alarm);
       spdlog::warn("alarm {} {}: {}", change.is_raised ? "raised" : "cleared",
@@ -120,7 +120,7 @@ class Gateway {
 
   DaemonFeed feed_;
   AlarmWatch alarms_;
-  bool alarms_told_{false};  ///< alarms were published once, even if there were none
+  bool alarms_published_{false};  ///< alarms were published once, even if there were none
   std::optional<MqttPublisher> mqtt_;
   std::optional<ShdrAdapter> shdr_;
   std::optional<HookRunner> hooks_;

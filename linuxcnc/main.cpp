@@ -69,13 +69,13 @@ class Exchange {
   void ask(const MachineView& view, Clock::time_point now) {
     if (asked_ && now - asked_at_ > answer_max) {
       link_.close();
-      say("the daemon does not answer");
+      print_once("the daemon does not answer");
     }
     if (!link_.connected()) connect(now);
     if (!link_.connected() || asked_) return;
     reported_ = view;
     if (!link_.send(request_line(session_, ++id_, options_.axes, view))) {
-      say(link_.error());
+      print_once(link_.error());
       return;
     }
     asked_ = true;
@@ -89,13 +89,13 @@ class Exchange {
         if (!awaited) throw BadAnswer("the daemon says what was not asked");
         const Answer answer = read_answer(*line, id_, options_.axes, options_.limits.offset_mm_max);
         state_.take(answer, reported_, Clock::now().time_since_epoch());
-        say("");
+        print_once("");
       } catch (const BadAnswer& error) {
         state_.fault();
-        say(error.what());
+        print_once(error.what());
       }
     }
-    if (!link_.connected() && !link_.error().empty()) say(link_.error());
+    if (!link_.connected() && !link_.error().empty()) print_once(link_.error());
   }
 
   [[nodiscard]] int fd() const { return link_.fd(); }
@@ -107,13 +107,13 @@ class Exchange {
     if (now < connect_next_) return;
     connect_next_ = now + reconnect_after;
     session_ = new_session();
-    if (!link_.connect()) say(link_.error());
+    if (!link_.connect()) print_once(link_.error());
   }
 
   /// Prints each new message once; empty: no problem.
-  void say(const std::string& what) {
-    if (what == last_said_) return;
-    last_said_ = what;
+  void print_once(const std::string& what) {
+    if (what == last_printed_) return;
+    last_printed_ = what;
     std::fprintf(stderr, "thermocomp-linuxcnc: %s\n",
                  what.empty() ? "in exchange with the daemon" : what.c_str());
   }
@@ -127,7 +127,7 @@ class Exchange {
   bool asked_{false};
   Clock::time_point asked_at_{};
   Clock::time_point connect_next_{};
-  std::string last_said_;
+  std::string last_printed_;
 };
 
 /// Runs until SIGTERM or SIGINT. @throws HalError at the start

@@ -57,7 +57,7 @@ void declare_modelling_command_line(CLI::App& app, std::function<int()>& action)
   app.name("thermocomp-modelling");
   app.description("What leads to a model, and what a model gets wrong");
   app.require_subcommand(1);
-  app.failure_message(cli::command_slip_text);
+  app.failure_message(cli::command_error_text);
   // Each command shows this one too, unless it has its own.
   app.footer("Exit status: 0 success, 2 bad use or bad input.");
   diagnosis::add_diagnose_command(app, action);

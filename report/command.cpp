@@ -39,7 +39,7 @@ int run_program(int argc, char** argv, const char* name,
   }
 }
 
-std::string command_slip_text(const CLI::App* app, const CLI::Error& error) {
+std::string command_error_text(const CLI::App* app, const CLI::Error& error) {
   const CLI::App* group = app;
   std::string words = app->get_name();
   while (!group->get_subcommands().empty()) {

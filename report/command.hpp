@@ -49,6 +49,6 @@ class Failure : public std::runtime_error {
 
 /// Message for CLI::App::failure_message(). An unknown command: the word and the closest command. A
 /// missing command: the existing ones. Else the text of CLI11.
-[[nodiscard]] std::string command_slip_text(const CLI::App* app, const CLI::Error& error);
+[[nodiscard]] std::string command_error_text(const CLI::App* app, const CLI::Error& error);
 
 }  // namespace thermocomp::cli

@@ -92,7 +92,7 @@ double text_width(const std::string& text) {
   return 7.0 * static_cast<double>(text.size());
 }
 
-std::string straight(double x, double y, const std::string& along, const char* kind) {
+std::string line_path(double x, double y, const std::string& along, const char* kind) {
   std::string svg = "<path class=\"";
   svg.append(kind).append("\" d=\"M").append(place(x, y)).append(along);
   return svg.append("\"/>");
@@ -125,10 +125,10 @@ std::string vertical_axis(const Box& box, const Range& range, int wanted) {
   std::string svg;
   for (const double tick : round_ticks(range.low, range.high, wanted)) {
     const double at = box.up(range, tick);
-    svg += straight(box.x, at, way('h', box.width), tick == 0.0 ? "zero" : "grid");
+    svg += line_path(box.x, at, way('h', box.width), tick == 0.0 ? "zero" : "grid");
     svg += label(box.x - 4, at + 4, number(tick), "text-anchor=\"end\"");
   }
-  return svg + straight(box.x, box.y, way('v', box.height), "axis");
+  return svg + line_path(box.x, box.y, way('v', box.height), "axis");
 }
 
 std::string horizontal_axis(const Box& box, const Range& range, const std::string& unit,
@@ -136,19 +136,19 @@ std::string horizontal_axis(const Box& box, const Range& range, const std::strin
   std::string svg;
   for (const double tick : round_ticks(range.low, range.high, wanted)) {
     const double at = box.across(range, tick);
-    svg += straight(at, box.y + box.height, "v4", "axis");
+    svg += line_path(at, box.y + box.height, "v4", "axis");
     svg += label(at, box.y + box.height + 16, number(tick), "text-anchor=\"middle\"");
   }
-  svg += straight(box.x, box.y + box.height, way('h', box.width), "axis");
+  svg += line_path(box.x, box.y + box.height, way('h', box.width), "axis");
   return svg + label(box.x + box.width, box.y + box.height + 28, unit, "text-anchor=\"end\"");
 }
 
 std::string named_axis(const Box& box, const Range& x, const std::vector<TimeTick>& ticks) {
-  std::string svg = straight(box.x, box.y + box.height, way('h', box.width), "axis");
+  std::string svg = line_path(box.x, box.y + box.height, way('h', box.width), "axis");
   for (std::size_t i = 0; i < ticks.size(); ++i) {
     const double at = box.across(x, ticks[i].at_s);
     const double next = i + 1 < ticks.size() ? box.across(x, ticks[i + 1].at_s) : box.x + box.width;
-    svg += straight(at, box.y + box.height, "v16", "axis");
+    svg += line_path(at, box.y + box.height, "v16", "axis");
     if (at + text_width(ticks[i].label) + 8 < next)
       svg += label(at + 4, box.y + box.height + 14, ticks[i].label);
   }
@@ -325,7 +325,7 @@ Drawing panels_drawing(Values along, const std::string& along_title,
     std::string& svg = drawing.body;
     for (const PlotSpan& span : spans) svg += span_svg(span, box, x, &panel == &panels.front());
     for (const TimeTick& tick : ticks)
-      svg += straight(box.across(x, tick.at_s), box.y, way('v', box.height), "grid");
+      svg += line_path(box.across(x, tick.at_s), box.y, way('v', box.height), "grid");
     svg += panel_svg(panel, legend, box, along, x);
     if (&panel == &panels.back())
       svg += ticks.empty() ? horizontal_axis(box, x, along_title, 10) : named_axis(box, x, ticks);

@@ -21,7 +21,7 @@ import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "tests" / "diagnosis"))
 # ruff: noqa: E402
-from measured_cases import STATED, examine, right, said  # first: sets the threads
+from measured_cases import STATED, examine, right, summary  # first: sets the threads
 import measured_machines
 import numpy as np
 from measured_plants import CAUSES, FAMILIES, OUTSIDE
@@ -89,8 +89,8 @@ class Count:
             self.total[key] += 1
             self.right[key] += hit
             self.family[key] += family
-        said = found[0]["cause"] if found else answer["verdict"]
-        self.confusion[(truth["cause"], said + (" (subject)" if said == truth["cause"] and not hit
+        summary = found[0]["cause"] if found else answer["verdict"]
+        self.confusion[(truth["cause"], summary + (" (subject)" if summary == truth["cause"] and not hit
                                                 else ""))] += 1
         for finding in found:
             if "probability" in finding:
@@ -190,7 +190,7 @@ def main():
             if options.show and not fine:
                 print("  %s %s %s %s x%g: %s -> %s" % (
                     task[1], *task[2:4], truth and [t["cause"] for t in truth], task[5],
-                    truth and [t["subject"] for t in truth], said(answer)), flush=True)
+                    truth and [t["subject"] for t in truth], summary(answer)), flush=True)
     count.report()
     print("%d cases that their machine cannot carry were left out" % impossible)
     if options.json:

@@ -17,7 +17,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "tests" / "
 # ruff: noqa: E402
 import physical_effects as physical
 from measured_campaign import Count
-from measured_cases import STATED, said
+from measured_cases import STATED, summary
 from physical_cases import examine
 
 
@@ -59,7 +59,7 @@ def main():
             if options.show and not fine:
                 print("  %d %s %s x%g: %s(%s) -> %s" % (
                     task[1], task[2], task[3], task[5], truths[0]["cause"], truths[0]["subject"],
-                    said(answer)), flush=True)
+                    summary(answer)), flush=True)
     count.report()
     print("wrong first names above %g: %d of %d" % (STATED, wrong, len(kept)))
     print("%d cases that no machine carries were left out" % left_out)

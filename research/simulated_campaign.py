@@ -20,7 +20,7 @@ import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "tests" / "diagnosis"))
 # ruff: noqa: E402
-from cases import NULL_SEED, examined, said, same  # first: sets the number of threads
+from cases import NULL_SEED, examined, summary, same  # first: sets the number of threads
 import hidden_effects
 import hidden_heat
 import numpy as np
@@ -95,7 +95,7 @@ class Count:
         if not right and self.show:
             print("  level %d %s seed %d: %s -> %s" % (
                 level, kind, seed, ", ".join("%s(%s)" % (t["cause"], t["subject"]) for t in
-                                             truth["hidden"]) or "nothing", said(answer)))
+                                             truth["hidden"]) or "nothing", summary(answer)))
 
     def _single(self, truth, answer):
         hidden_one, found = truth["hidden"][0], answer["findings"]

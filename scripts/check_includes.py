@@ -1,9 +1,9 @@
 #!/usr/bin/python3
-"""The structure given by #includes: no cycles, and floors that include downwards.
+"""The structure given by #includes: no cycles, and levels that include downwards.
 
     scripts/check_includes.py            cycles, and whether the table is current; exit status 1 if there
                                          is a cycle or it is not
-    scripts/check_includes.py --write    renews the floors in scripts/floors.md
+    scripts/check_includes.py --write    renews the levels in scripts/include_levels.md
     scripts/check_includes.py --sizes    the largest folders and files
 
 A unit is a header and its source (`screening.hpp` and `screening.cpp`). A cycle is a set of units,
@@ -86,9 +86,9 @@ def check(kind, graph):
     return len(found)
 
 
-def floors(graph):
-    """The folders by floor, the lowest first: a folder is above all that it includes. Folders in a
-    cycle share a floor."""
+def levels(graph):
+    """The folders by level, the lowest first: a folder is above all that it includes. Folders in a
+    cycle share a level."""
     together = {node: node for node in graph}
     for circle in circles(graph):
         together.update({node: circle[0] for node in circle})
@@ -105,14 +105,14 @@ def floors(graph):
     found = collections.defaultdict(list)
     for node in sorted(graph):
         found[height_of(together[node])].append(node)
-    return [found[floor] for floor in sorted(found)]
+    return [found[level] for level in sorted(found)]
 
 
 def drawing(includes):
     drawn = {path: [other for other in found if other.split("/")[0] in DRAWN]
              for path, found in includes.items() if path.split("/")[0] in DRAWN}
-    stack = floors(graph_of(drawn, os.path.dirname))
-    lines = ["| floor | folders |", "|---|---|"]
+    stack = levels(graph_of(drawn, os.path.dirname))
+    lines = ["| level | folders |", "|---|---|"]
     for number in range(len(stack), 0, -1):
         lines.append(f"| {number} | {', '.join(f'`{node}`' for node in stack[number - 1])} |")
     return "\n".join(lines)
@@ -131,9 +131,9 @@ def print_sizes(root, includes):
 
 
 def main():
-    parser = argparse.ArgumentParser(description="Circles of #includes, and the floors.")
+    parser = argparse.ArgumentParser(description="Circles of #includes, and the levels.")
     parser.add_argument("--root", default=os.path.join(os.path.dirname(__file__), ".."))
-    parser.add_argument("--write", action="store_true", help="draw the floors anew")
+    parser.add_argument("--write", action="store_true", help="draw the levels anew")
     parser.add_argument("--sizes", action="store_true", help="print the largest folders and files")
     options = parser.parse_args()
     includes = read_includes(options.root)
@@ -141,7 +141,7 @@ def main():
         print_sizes(options.root, includes)
         return 0
 
-    document = os.path.join(options.root, "scripts", "floors.md")
+    document = os.path.join(options.root, "scripts", "include_levels.md")
     now = drawing(includes) + "\n"
     if options.write:
         with open(document, "w", encoding="utf-8") as text:
@@ -155,7 +155,7 @@ def main():
     wrong = check("unit", units) + check("folder", folders)
     if now != drawn:
         wrong += 1
-        print("check_includes: the floors in scripts/floors.md are not those of the tree: "
+        print("check_includes: the levels in scripts/include_levels.md are not those of the tree: "
               "scripts/check_includes.py --write")
     print(f"check_includes: {len(includes)} files, {len(folders)} folders, {wrong} wrong")
     return 1 if wrong else 0

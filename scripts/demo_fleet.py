@@ -104,7 +104,7 @@ class Workshop:
                 (int(day), departs == "t", float(probability), json.loads(answer)))
         return found
 
-    def say_what_diagnose_finds(self):
+    def print_diagnosis(self):
         for name, answer in self.server.ask("SELECT name, diagnosis FROM fleet.night_result JOIN fleet.machine "
                                             "ON id = machine WHERE diagnosis IS NOT NULL ORDER BY id"):
             found = json.loads(answer)
@@ -124,7 +124,7 @@ def reason(answer):
     return f"{what}: {subjects[0]['subject']}, {subjects[0]['effect_um']:.1f} um"
 
 
-def say_who_departs(found):
+def print_departing(found):
     for machine, nights in sorted(found.items()):
         alarms = [(day, answer) for day, departs, _, answer in nights if departs]
         planted = {HIDDEN: "its column expands more from day 10 on",
@@ -192,8 +192,8 @@ def main():
                 log.write(workshop.fleet("night", "--nights", DAYS + 1, good=(0, 1)))
             workshop.fleet("status", show=True, good=(0, 1))
             found = workshop.results()
-            say_who_departs(found)
-            workshop.say_what_diagnose_finds()
+            print_departing(found)
+            workshop.print_diagnosis()
             print("== a new machine", flush=True)
             errors, (own, both) = new_machine(workshop, folder)
             print("a new machine with 8 h of data, RMS on four other days: "

@@ -161,11 +161,11 @@ class Causes {
 
   void add_silent(const UnitStatus& unit, bool is_on_network, const Subject& subject) {
     const bool is_silent = unit.timeouts >= unit.bad_frames;
-    const bool was_heard = unit.silent_s >= 0.0;
+    const bool has_answered = unit.silent_s >= 0.0;
     add(unit.name +
-            (!is_silent  ? " answers wrongly (" + unit.last_error + ")"
-             : was_heard ? " silent for " + duration_text(unit.silent_s)
-                         : " does not answer (" + unit.last_error + ")") +
+            (!is_silent     ? " answers wrongly (" + unit.last_error + ")"
+             : has_answered ? " silent for " + duration_text(unit.silent_s)
+                            : " does not answer (" + unit.last_error + ")") +
             lost_with(unit.sensors, unit.blocks),
         is_on_network && !is_silent
             ? "look at what came, and at what may help"

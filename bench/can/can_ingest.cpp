@@ -90,15 +90,15 @@ CanBusConfig every_signal() {
   source.start();
   while (!source.health().connected) std::this_thread::sleep_for(10ms);
   Received received;
-  bool told = ::write(to, &received, sizeof received) == sizeof received;
+  bool is_written = ::write(to, &received, sizeof received) == sizeof received;
   int signal = 0;
   sigwait(&ending, &signal);
   source.stop();
   const BusHealth health = source.health();
   received.dropped = health.dropped;
   for (const UnitHealth& unit : health.units) received.good += unit.answers;
-  told = told && ::write(to, &received, sizeof received) == sizeof received;
-  std::_Exit(told ? 0 : 1);
+  is_written = is_written && ::write(to, &received, sizeof received) == sizeof received;
+  std::_Exit(is_written ? 0 : 1);
 }
 
 [[noreturn]] void run_candump() {
@@ -154,7 +154,7 @@ class Sender {
 
 /// Runs one receiver under the load.
 template <class Child>
-Cost measure(Sender& sender, double round_s, bool tells, Child child) {
+Cost measure(Sender& sender, double round_s, bool reports, Child child) {
   std::array<int, 2> pipe{};
   expect(::pipe2(pipe.data(), O_CLOEXEC) == 0, "pipe");
   const pid_t pid = ::fork();
@@ -162,7 +162,7 @@ Cost measure(Sender& sender, double round_s, bool tells, Child child) {
   if (pid == 0) child(pipe[1]);
   ::close(pipe[1]);
   Cost cost;
-  if (tells) {
+  if (reports) {
     expect(::read(pipe[0], &cost.received, sizeof(Received)) == sizeof(Received), "our receiver");
   } else {
     std::this_thread::sleep_for(500ms);  // candump does not report when it listens
@@ -170,7 +170,7 @@ Cost measure(Sender& sender, double round_s, bool tells, Child child) {
   cost.sent = sender.fill(round_s);
   std::this_thread::sleep_for(200ms);
   ::kill(pid, SIGTERM);
-  if (tells) {
+  if (reports) {
     expect(::read(pipe[0], &cost.received, sizeof(Received)) == sizeof(Received), "our receiver");
   }
   ::close(pipe[0]);

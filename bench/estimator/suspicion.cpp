@@ -71,7 +71,7 @@ double percent(int part, int whole) {
 }
 
 /// Value of a falsified sensor at a row, from the true ones at this row and at the beginning.
-using Lie = std::function<double(double true_degC, double then_degC, double since_s)>;
+using ReadingError = std::function<double(double true_degC, double then_degC, double since_s)>;
 
 /// One part of a record with the covariance of another.
 class Fold {
@@ -96,17 +96,18 @@ class Fold {
   [[nodiscard]] int false_suspicions() const { return false_suspicions_; }
 
   [[nodiscard]] Tally jumps(std::size_t sensor) {
-    return tell(sensor, jumps_apart_s, jump_watched_s,
-                [](double true_degC, double, double) { return true_degC + jump_K; });
+    return tally_errors(sensor, jumps_apart_s, jump_watched_s,
+                        [](double true_degC, double, double) { return true_degC + jump_K; });
   }
   [[nodiscard]] Tally loose(std::size_t sensor) {
-    return tell(sensor, looses_apart_s, 1e9, [](double true_degC, double then_degC, double) {
-      return then_degC + motion_left * (true_degC - then_degC);
-    });
+    return tally_errors(sensor, looses_apart_s, 1e9,
+                        [](double true_degC, double then_degC, double) {
+                          return then_degC + motion_left * (true_degC - then_degC);
+                        });
   }
   [[nodiscard]] Tally creep(std::size_t sensor) {
     const double rate = creep_K / (times_s_.back() - times_s_.front());
-    return tell(sensor, 1e9, 1e9, [rate](double true_degC, double, double since_s) {
+    return tally_errors(sensor, 1e9, 1e9, [rate](double true_degC, double, double since_s) {
       return true_degC + rate * since_s;
     });
   }
@@ -140,7 +141,8 @@ class Fold {
     }
   }
 
-  [[nodiscard]] Tally tell(std::size_t sensor, double apart_s, double watched_s, const Lie& lie) {
+  [[nodiscard]] Tally tally_errors(std::size_t sensor, double apart_s, double watched_s,
+                                   const ReadingError& error_of) {
     Tally tally;
     double next_s = times_s_.front();
     for (const Start& start : starts_) {
@@ -149,19 +151,19 @@ class Fold {
       const double end_s = times_s_[start.row] + watched_s;
       if (watched_s < 1e8 && end_s > times_s_.back()) break;
       machine_.load(start.state);
-      tally.add(tell_once(sensor, start.row, end_s, lie));
+      tally.add(tally_one_error(sensor, start.row, end_s, error_of));
     }
     return tally;
   }
 
-  [[nodiscard]] Tally tell_once(std::size_t sensor, std::size_t begin, double end_s,
-                                const Lie& lie) {
+  [[nodiscard]] Tally tally_one_error(std::size_t sensor, std::size_t begin, double end_s,
+                                      const ReadingError& error_of) {
     Tally tally;
     tally.planted = 1;
     for (std::size_t row = begin; row < times_s_.size() && times_s_[row] < end_s; ++row) {
       std::vector<double> temps_degC = temps_degC_[row];
       const double since_s = times_s_[row] - times_s_[begin];
-      temps_degC[sensor] = lie(temps_degC[sensor], temps_degC_[begin][sensor], since_s);
+      temps_degC[sensor] = error_of(temps_degC[sensor], temps_degC_[begin][sensor], since_s);
       machine_.step(times_s_[row], temps_degC);
       const Report& report = machine_.report();
       for (std::size_t i = 0; i < temps_degC.size(); ++i)

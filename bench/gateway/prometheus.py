@@ -95,9 +95,9 @@ def run(lab, seconds):
 
     def check_metrics(state):
         nonlocal warnings
-        said = promtool("check", "metrics", text=gateway.text("/metrics"))
-        warnings += said
-        print(f"{time.monotonic() - begun_s:.0f} s: {state}; promtool: {said or 'nothing'}",
+        findings = promtool("check", "metrics", text=gateway.text("/metrics"))
+        warnings += findings
+        print(f"{time.monotonic() - begun_s:.0f} s: {state}; promtool: {findings or 'nothing'}",
               file=sys.stderr, flush=True)
 
     eventually(lambda: prometheus.figure("thermocomp_compensating") == 1.0, "it is scraped")

@@ -77,10 +77,10 @@ def left_by(program, model, runs, split):
 
 def run(what, arguments_of):
     start = time.monotonic()
-    said = subprocess.run(arguments_of, capture_output=True, text=True, check=False)
-    if said.returncode != 0:
-        raise SystemExit(f"{what}: {said.stderr}")
-    print(said.stdout + said.stderr, file=sys.stderr)
+    done = subprocess.run(arguments_of, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise SystemExit(f"{what}: {done.stderr}")
+    print(done.stdout + done.stderr, file=sys.stderr)
     return time.monotonic() - start
 
 
@@ -107,12 +107,12 @@ def diagnosed(program, split, train, test, folder):
 def fitted(program, split, train, model):
     """Fits without further options; the JSON answer and the time [s]."""
     start = time.monotonic()
-    said = subprocess.run([program, "fit", *train, "--outputs", ",".join(split.outputs), "-o",
+    done = subprocess.run([program, "fit", *train, "--outputs", ",".join(split.outputs), "-o",
                            model, "--json"], capture_output=True, text=True, check=False)
-    if said.returncode != 0:
-        raise SystemExit(f"{split.name}: fit: {said.stderr}")
-    print(said.stderr, file=sys.stderr)
-    return json.loads(said.stdout), time.monotonic() - start
+    if done.returncode != 0:
+        raise SystemExit(f"{split.name}: fit: {done.stderr}")
+    print(done.stderr, file=sys.stderr)
+    return json.loads(done.stdout), time.monotonic() - start
 
 
 def share_covered(left, sd, rows):

@@ -91,14 +91,14 @@ def test_um(program, split, folder, family):
     """@return the chosen family and its RMS; None if there is no answer"""
     folder.mkdir()
     model = folder / "model.toml"
-    said = subprocess.run([program, "fit", *arguments(split.train, folder, "train"), "--outputs",
+    done = subprocess.run([program, "fit", *arguments(split.train, folder, "train"), "--outputs",
                            ",".join(split.outputs), "-o", model, "--json",
                            *(["--family", family] if family else [])],
                           capture_output=True, text=True, check=False)
-    if said.returncode != 0:
+    if done.returncode != 0:
         return None
     left, _, _, _ = left_by(program, model, arguments(split.test, folder, "test"), split)
-    return json.loads(said.stdout)["family"], float(np.mean([rms(each) for each in left]))
+    return json.loads(done.stdout)["family"], float(np.mean([rms(each) for each in left]))
 
 
 def main():

@@ -34,7 +34,7 @@ std::optional<HistoryTime> time_or_none(const std::string& text) {
 }
 
 /// @return the exit status
-int tell_damage(const std::string& history, const std::vector<HistoryDamage>& damage) {
+int report_damage(const std::string& history, const std::vector<HistoryDamage>& damage) {
   constexpr std::size_t shown_max = 20;
   for (std::size_t i = 0; i < std::min(damage.size(), shown_max); ++i) {
     std::fprintf(stderr, "%s: %s\n", history.c_str(), to_string(damage[i]).c_str());
@@ -66,7 +66,7 @@ int run_export(const ExportOptions& options) {
         options.sensors ? ExportContent::sensors : ExportContent::inputs);
   }
   if (summary.rows == 0) {
-    tell_damage(options.history, summary.damage);
+    report_damage(options.history, summary.damage);
     throw Failure(options.history + ": nothing was recorded in that time");
   }
   file.commit();
@@ -76,7 +76,7 @@ int run_export(const ExportOptions& options) {
     std::fprintf(stderr, "%llu gap%s, each marked by a comment line in the file\n",
                  static_cast<unsigned long long>(summary.gaps), summary.gaps == 1 ? "" : "s");
   }
-  return tell_damage(options.history, summary.damage);
+  return report_damage(options.history, summary.damage);
 }
 
 struct ReplayOptions {
@@ -95,7 +95,7 @@ int run_history_replay(const ReplayOptions& options) {
     summary = replay_to_csv(options.input, file.stream(),
                             [&progress](double fraction) { progress.update(fraction); });
   }
-  const int status = tell_damage(options.input, summary.damage);
+  const int status = report_damage(options.input, summary.damage);
   if (summary.compared == 0 && status != exit_success) {
     throw Failure(options.input + ": nothing of it can be replayed");
   }

@@ -29,7 +29,7 @@ struct ImportOptions {
   std::string corrections;
 };
 
-void tell(const std::string& name, const std::vector<std::string>& lines) {
+void print_lines(const std::string& name, const std::vector<std::string>& lines) {
   std::fprintf(stderr, "%s: read as follows\n", name.c_str());
   for (const std::string& line : lines) std::fprintf(stderr, "  %s\n", line.c_str());
 }
@@ -58,7 +58,7 @@ RunFile read_log(const std::string& file, const ColumnMap& map) {
     if (run.wall_zero) run.understood.emplace_back("a comment gives the wall time of time_s = 0");
     count_from_first_row(run);
   }
-  tell(run.name, run.understood);
+  print_lines(run.name, run.understood);
   return run;
 }
 
@@ -77,14 +77,14 @@ int run_import(const ImportOptions& options) {
     run.understood.clear();
     run = displacements_of(std::move(run), options.corrections == "steps" ? CorrectionEntry::step
                                                                           : CorrectionEntry::total);
-    tell(options.output, run.understood);
+    print_lines(options.output, run.understood);
   }
   if (!options.join.empty()) {
     ColumnMap of_second = map;
     of_second.names.clear();
     of_second.period_s.reset();
     run = joined_runs(run, read_log(options.join, of_second), options.shift_s);
-    tell(options.output, run.understood);
+    print_lines(options.output, run.understood);
   }
   OutputFile file(options.output);
   if (run.wall_zero) file.stream() << wall_zero_comment(*run.wall_zero);

@@ -261,7 +261,7 @@ class Join {
                  ": the clocks differ; write --shift-s S, where the second file's time_s plus S is "
                  "the first one's");
     run_.selected_end = run_.rows();
-    say();
+    note_shift();
     return std::move(run_);
   }
 
@@ -284,7 +284,7 @@ class Join {
     if (takes_b && at_s >= a.front() && at_s <= a.back()) ++inside_;
   }
 
-  void say() {
+  void note_shift() {
     const std::size_t rows = second_.rows();
     run_.understood.push_back(second_.name + ": its time_s plus " + number_text(shift_s_) +
                               " s is that of " + first_.name + ", " + why_);

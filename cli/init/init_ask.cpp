@@ -64,7 +64,7 @@ void offer_word_order(const InitDraft& draft, const InitModule& form, InitModule
     other.registers.word_order = order;
     const std::vector<std::string> lines = eyes.try_module(draft, other);
     if (other.channels.size() != form.channels.size()) continue;
-    for (const std::string& line : lines) questions.say("    " + line);
+    for (const std::string& line : lines) questions.print("    " + line);
     questions.ask_until(std::string("In word order ") + order + " all give a temperature; take it?",
                         "yes", [&](const std::string& text) {
                           if (text.starts_with("y")) asked = other;
@@ -101,7 +101,7 @@ void ask_for_module(InitDraft& draft, std::size_t bus, int unit, Questions& ques
         InitModule asked = form;
         if (eyes.try_module) {
           for (const std::string& line : eyes.try_module(draft, asked))
-            questions.say("    " + line);
+            questions.print("    " + line);
           offer_word_order(draft, form, asked, questions, eyes);
         } else {
           refuse_unnamed_channels(asked);
@@ -142,7 +142,7 @@ void ask_for_modules(InitDraft& draft, Questions& questions, const InitEyes& eye
       continue;
     }
     if (draft.buses.size() == 1) throw Failure("a machine needs a module with a sensor");
-    questions.say(name + " is left out: it has no module");
+    questions.print(name + " is left out: it has no module");
     draft.buses.erase(draft.buses.begin() + static_cast<std::ptrdiff_t>(bus));
   }
 }
@@ -230,7 +230,7 @@ void Questions::ask_until(const std::string& question, const std::string& otherw
       throw;
     } catch (const Failure& failure) {
       answers_.resize(next_ = before);
-      say(failure.what());
+      print(failure.what());
     }
   }
 }
@@ -245,13 +245,13 @@ void Questions::interview(const std::function<void()>& body) {
       throw;
     } catch (const Failure& failure) {
       if (answers_.empty()) throw;
-      say(failure.what());
+      print(failure.what());
     }
     if (!answers_.empty()) answers_.pop_back();
   }
 }
 
-void Questions::say(const std::string& text) {
+void Questions::print(const std::string& text) {
   if (next_ == answers_.size()) out_ << text << '\n';
 }
 

@@ -29,7 +29,7 @@ class Questions {
   /// @param otherwise  default answer (Enter), shown in brackets
   void ask_until(const std::string& question, const std::string& otherwise,
                  const std::function<void(const std::string&)>& take);
-  void say(const std::string& text);
+  void print(const std::string& text);
   [[nodiscard]] int count() const noexcept { return count_; }
 
  private:

@@ -183,7 +183,7 @@ void keep_old(const fs::path& path) {
   std::cout << path.string() << ": the one before is " << old.filename().string() << " now\n";
 }
 
-void tell_next(const InitDraft& draft, const std::string& file) {
+void print_next_steps(const InitDraft& draft, const std::string& file) {
   const bool is_own = !draft.own_folder.empty();
   const std::string tool =
       is_own ? "thermocomp --socket " + draft.own_folder + "/status.sock" : "thermocomp";
@@ -243,7 +243,7 @@ int run_init(const InitOptions& options) {
                                  !options.controller.empty() && !given.axes.empty();
   if (!is_complete_draft) {
     if (!stdin_is_terminal()) refuse_what_is_missing(given, options);
-    questions.say("< goes back to the question before.");
+    questions.print("< goes back to the question before.");
   }
   const bool are_asked_for = given.modules.empty();
   if (!are_asked_for) settle_modules(given);  // from options: cannot be asked again
@@ -271,7 +271,7 @@ int run_init(const InitOptions& options) {
   if (!is_all_there)
     std::cout << "Not everything answers yet: see above, then thermocomp scan " << options.file
               << '\n';
-  tell_next(draft, options.file);
+  print_next_steps(draft, options.file);
   return is_all_there ? exit_success : exit_no;
 }
 

@@ -20,17 +20,17 @@ constexpr std::array<double, 4> bandwidths{0.125, 0.25, 0.5, 1.0};
 constexpr double bandwidth_of_one_run = 0.5;
 
 /// A point with the groups' contributions, which convert gains to displacement.
-struct Taught {
+struct LearnedPoint {
   Point point;
   std::vector<double> contribution_um;
 };
-using OfRuns = std::vector<std::vector<Taught>>;  ///< one list per run
+using OfRuns = std::vector<std::vector<LearnedPoint>>;  ///< one list per run
 
 /// Steps the correction of one output through a run.
-class Lesson {
+class CorrectionRun {
  public:
-  Lesson(const RunFile& run, const ThermalModel& model, const CorrectionConfig& correction,
-         std::size_t output)
+  CorrectionRun(const RunFile& run, const ThermalModel& model, const CorrectionConfig& correction,
+                std::size_t output)
       : inputs_(model_inputs(model, run)),
         time_s_(run.time_s()),
         model_(model),
@@ -44,9 +44,9 @@ class Lesson {
     measured_um_ = column ? &run.values[*column] : nullptr;
   }
 
-  std::vector<Taught> take(double every_s) {
-    std::vector<Taught> taught;
-    if (measured_um_ == nullptr) return taught;
+  std::vector<LearnedPoint> take(double every_s) {
+    std::vector<LearnedPoint> learned_points;
+    if (measured_um_ == nullptr) return learned_points;
     double first_um = std::numeric_limits<double>::quiet_NaN();
     double model_first_um = 0.0;
     double probed_at_s = -std::numeric_limits<double>::infinity();
@@ -62,9 +62,9 @@ class Lesson {
       }
       const std::uint64_t before = learning_.report().taken;
       learning_.measured({measured_um - first_um, values_um_[output_] - model_first_um});
-      if (learning_.report().taken > before) taught.push_back(point());
+      if (learning_.report().taken > before) learned_points.push_back(point());
     }
-    return taught;
+    return learned_points;
   }
 
  private:
@@ -101,7 +101,7 @@ class Lesson {
     return sums;
   }
 
-  [[nodiscard]] Taught point() const {
+  [[nodiscard]] LearnedPoint point() const {
     const CorrectionReport report = learning_.report();
     Point point{phase_.phase(), phase_.since_s(), rise_K_, {}, {}};
     point.rise_K.resize(model_.inputs.size());
@@ -139,7 +139,7 @@ std::vector<Point> thinned(const OfRuns& runs, std::size_t left_out) {
   std::vector<Point> all;
   for (std::size_t i = 0; i < runs.size(); ++i)
     if (i != left_out)
-      for (const Taught& each : runs[i]) all.push_back(each.point);
+      for (const LearnedPoint& each : runs[i]) all.push_back(each.point);
   const std::size_t stride = (all.size() + course_points_max - 1) / course_points_max;
   std::vector<Point> kept;
   for (std::size_t i = 0; i < all.size(); i += std::max<std::size_t>(1, stride))
@@ -155,11 +155,12 @@ double left_out_square(const OfRuns& runs, const ThermalModel& model, std::size_
   for (std::size_t run = 0; run < runs.size(); ++run) {
     course.outputs[model.outputs[output]] = thinned(runs, run);
     const CourseLookup lookup(course, model, output, gain_sd);
-    for (const Taught& each : runs[run]) {
-      const RecordedGains says = lookup.at(each.point.phase, each.point.since_s, each.point.rise_K);
+    for (const LearnedPoint& each : runs[run]) {
+      const RecordedGains recorded =
+          lookup.at(each.point.phase, each.point.since_s, each.point.rise_K);
       double missed_um = 0.0;
       for (std::size_t g = 0; g < each.contribution_um.size(); ++g)
-        missed_um += (says.gain[g] - each.point.gain[g]) * each.contribution_um[g];
+        missed_um += (recorded.gain[g] - each.point.gain[g]) * each.contribution_um[g];
       sum += missed_um * missed_um;
       ++count;
     }
@@ -171,8 +172,8 @@ double left_out_square(const OfRuns& runs, const ThermalModel& model, std::size_
 double square_without(const OfRuns& runs) {
   double sum = 0.0;
   std::size_t count = 0;
-  for (const std::vector<Taught>& run : runs) {
-    for (const Taught& each : run) {
+  for (const std::vector<LearnedPoint>& run : runs) {
+    for (const LearnedPoint& each : run) {
       double missed_um = 0.0;
       for (std::size_t g = 0; g < each.contribution_um.size(); ++g)
         missed_um += (1.0 - each.point.gain[g]) * each.contribution_um[g];
@@ -188,15 +189,15 @@ std::size_t index_of_output(const ThermalModel& model, const std::string& name) 
                                   model.outputs.begin());
 }
 
-void choose_bandwidth(const std::map<std::string, OfRuns>& taught, const ThermalModel& model,
-                      double gain_sd, CourseFit& fit) {
+void choose_bandwidth(const std::map<std::string, OfRuns>& learned_points,
+                      const ThermalModel& model, double gain_sd, CourseFit& fit) {
   double best = std::numeric_limits<double>::infinity();
   for (const double bandwidth : bandwidths) {
     RecordedCourse course = fit.course;
     course.bandwidth = bandwidth;
     std::map<std::string, double> rms_um;
     double sum = 0.0;
-    for (const auto& [name, of_runs] : taught) {
+    for (const auto& [name, of_runs] : learned_points) {
       const double square =
           left_out_square(of_runs, model, index_of_output(model, name), course, gain_sd);
       rms_um[name] = std::sqrt(square);
@@ -207,7 +208,7 @@ void choose_bandwidth(const std::map<std::string, OfRuns>& taught, const Thermal
     fit.course.bandwidth = bandwidth;
     fit.left_out_rms_um = rms_um;
   }
-  for (const auto& [name, of_runs] : taught)
+  for (const auto& [name, of_runs] : learned_points)
     fit.without_rms_um[name] = std::sqrt(square_without(of_runs));
 }
 
@@ -221,23 +222,23 @@ CourseFit fit_course(std::span<const RunFile> runs, const ThermalModel& given,
   fit.course.groups = correction.groups;
   fit.course.bandwidth = bandwidth_of_one_run;
   for (const RunFile& run : runs) fit.course.runs.push_back(run.name);
-  std::map<std::string, OfRuns> taught;
+  std::map<std::string, OfRuns> learned_points;
   for (std::size_t output = 0; output < model.outputs.size(); ++output) {
     const std::string& name = model.outputs[output];
     for (const RunFile& run : runs) {
-      std::vector<Taught> one = Lesson(run, model, correction, output).take(every_s);
+      std::vector<LearnedPoint> one = CorrectionRun(run, model, correction, output).take(every_s);
       if (one.empty()) continue;
       fit.probings[name] += one.size();
-      taught[name].push_back(std::move(one));
+      learned_points[name].push_back(std::move(one));
     }
   }
-  if (taught.empty())
+  if (learned_points.empty())
     throw ConfigurationError({{runs.empty() ? "correction" : runs.front().name, 0, "rows",
                                "none of them determines a gain",
                                "must have measured values of an output of the model, at states in "
                                "which its groups contribute contribution_um_min or more"}});
-  if (runs.size() > 1) choose_bandwidth(taught, model, correction.gain_sd, fit);
-  for (const auto& [name, of_runs] : taught)
+  if (runs.size() > 1) choose_bandwidth(learned_points, model, correction.gain_sd, fit);
+  for (const auto& [name, of_runs] : learned_points)
     fit.course.outputs[name] = thinned(of_runs, of_runs.size());
   return fit;
 }

@@ -117,7 +117,7 @@ json waited_for(const GlobalOptions& global, const std::string& name) {
 }
 
 /// Warns if the read-back differs from the last offset sent: the release adopts the read-back.
-void warn_of_trust(const json& before) {
+void warn_of_read_back(const json& before) {
   constexpr double same_um = 0.3;
   const double sent_um = number_of(before, "sent_um");
   const double read_um = number_of(before, "applied_um");
@@ -148,7 +148,7 @@ int run_release(const GlobalOptions& global, const std::string& axis) {
   const json after = waited_for(global, axis);
   if (after.empty()) {
     std::cout << "axis " << axis << ": released\n";
-    warn_of_trust(before);
+    warn_of_read_back(before);
     return exit_success;
   }
   if (flag_of(after, "releasing")) {

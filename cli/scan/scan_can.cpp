@@ -18,7 +18,7 @@
 namespace thermocomp::cli {
 namespace {
 
-struct Heard {
+struct ReceivedFrames {
   FrameCounts frames;
   std::vector<std::optional<CanFrame>> of_signal;  ///< newest frame with the signal
 };
@@ -32,32 +32,32 @@ std::vector<const CanSignal*> signals_of(const CanBusConfig& config) {
 }
 
 /// @param stale_after_s  by signal; empty: one value is enough
-Heard listen(CanSocket& socket, const std::vector<const CanSignal*>& signals, double listen_s,
-             const std::vector<double>& stale_after_s) {
-  Heard heard;
-  heard.of_signal.resize(signals.size());
+ReceivedFrames listen(CanSocket& socket, const std::vector<const CanSignal*>& signals,
+                      double listen_s, const std::vector<double>& stale_after_s) {
+  ReceivedFrames received;
+  received.of_signal.resize(signals.size());
   const nanoseconds end = monotonic_now() + from_seconds(listen_s);
-  const auto goes_on = [&](nanoseconds now) {
+  const auto may_continue = [&](nanoseconds now) {
     for (std::size_t i = 0; i < stale_after_s.size(); ++i) {
-      const auto& frame = heard.of_signal[i];
+      const auto& frame = received.of_signal[i];
       if (frame && may_come_again(frame->received_at, stale_after_s[i], end, now)) return true;
     }
     return now < end;
   };
-  while (socket.is_open() && goes_on(monotonic_now())) {
+  while (socket.is_open() && may_continue(monotonic_now())) {
     pollfd wait{socket.descriptor(), POLLIN, 0};
     constexpr int slice_ms = 50;
     static_cast<void>(::poll(&wait, 1, slice_ms));
     for (const CanFrame& frame : socket.receive()) {
-      ++heard.frames[frame.id];
+      ++received.frames[frame.id];
       for (std::size_t i = 0; i < signals.size(); ++i) {
         const CanSignal& signal = *signals[i];
         if (!matches(frame.id, signal)) continue;
-        if (carries(frame.payload(), signal)) heard.of_signal[i] = frame;
+        if (carries(frame.payload(), signal)) received.of_signal[i] = frame;
       }
     }
   }
-  return heard;
+  return received;
 }
 
 void judge(const CanSignal& signal, const CanFrame& frame, const PlausibleRange& range,
@@ -107,9 +107,9 @@ void judge(const CanSignal& signal, const CanFrame& frame, const PlausibleRange&
 }
 
 /// Hints at the same number in the other format, or a J1939 group from another address.
-void add_id_hint(const CanSignal& signal, const Heard& heard, ScanChannel& result) {
+void add_id_hint(const CanSignal& signal, const ReceivedFrames& received, ScanChannel& result) {
   constexpr std::uint32_t group = 0x03FFFF00;
-  for (const auto& [id, count] : heard.frames) {
+  for (const auto& [id, count] : received.frames) {
     if (id.id == signal.id && id.extended != signal.extended_id)
       result.hints.push_back(id_name(id) +
                              " was received: extended_id = " + (id.extended ? "true" : "false"));
@@ -122,7 +122,7 @@ void add_id_hint(const CanSignal& signal, const Heard& heard, ScanChannel& resul
   }
 }
 
-void fill(const CanBusConfig& config, const ScanSensors& sensors, const Heard& heard,
+void fill(const CanBusConfig& config, const ScanSensors& sensors, const ReceivedFrames& received,
           ScanBus& bus) {
   std::size_t index = 0;
   for (const CanDeviceConfig& device : config.devices) {
@@ -133,7 +133,7 @@ void fill(const CanBusConfig& config, const ScanSensors& sensors, const Heard& h
       result.sensor = sensors.names.at(channel.sensor);
       result.place = place_name(channel.signal);
       result.fault = Fault::never_read;
-      const auto& frame = heard.of_signal[index++];
+      const auto& frame = received.of_signal[index++];
       if (frame) {
         shown.answers = true;
         judge(channel.signal, *frame, sensors.ranges.at(channel.sensor), result);
@@ -141,17 +141,18 @@ void fill(const CanBusConfig& config, const ScanSensors& sensors, const Heard& h
       } else if (bus.error.empty()) {
         result.why = "no frame with identifier " +
                      id_name({channel.signal.id, channel.signal.extended_id}) + " carried it";
-        add_id_hint(channel.signal, heard, result);
+        add_id_hint(channel.signal, received, result);
       }
     }
   }
 }
 
-void take(const CanSignal& signal, const Heard& heard, std::size_t index, ScanValue& shown) {
+void take(const CanSignal& signal, const ReceivedFrames& received, std::size_t index,
+          ScanValue& shown) {
   const CanId id{signal.id, signal.extended_id};
-  const auto& frame = heard.of_signal[index];
+  const auto& frame = received.of_signal[index];
   if (!frame) {
-    shown.why = heard.frames.contains(id)
+    shown.why = received.frames.contains(id)
                     ? "frames " + id_name(id) + " were received, but none has this value"
                     : "no frame with identifier " + id_name(id) + " was received";
     return;
@@ -168,7 +169,7 @@ void take(const CanSignal& signal, const Heard& heard, std::size_t index, ScanVa
 
 }  // namespace
 
-std::string heard_text(const FrameCounts& frames) {
+std::string received_text(const FrameCounts& frames) {
   constexpr std::size_t text_max = 200;
   if (frames.empty())
     return "no frame was received: bit rate, termination (two of 120 Ohm), or no node sends";
@@ -205,8 +206,8 @@ ScanBus scan_bus(const CanBusConfig& config, const ScanSensors& sensors, const S
   CanSocket socket(config.interface, {});
   socket.also_want({{0, false}, 0});  // all frames, to list those not configured
   socket.also_want({{0, true}, 0});
-  Heard heard;
-  heard.of_signal.resize(signals.size());
+  ReceivedFrames received;
+  received.of_signal.resize(signals.size());
   if (!socket.open()) {
     bus.error = "cannot be opened: " + socket.error();
   } else {
@@ -216,14 +217,14 @@ ScanBus scan_bus(const CanBusConfig& config, const ScanSensors& sensors, const S
       for (const CanChannel& channel : device.channels)
         stale_after_s.push_back(sensors.stale_after_s.at(channel.sensor));
     }
-    heard = listen(socket, signals, task.listen_s, stale_after_s);
+    received = listen(socket, signals, task.listen_s, stale_after_s);
     if (!socket.error().empty()) bus.error = socket.error();
-    bus.note = heard_text(heard.frames);
-    if (heard.frames.empty() && bus.error.empty()) {
+    bus.note = received_text(received.frames);
+    if (received.frames.empty() && bus.error.empty()) {
       bus.note = "no frame was received: bit rate, termination (two of 120 Ohm), or no node sends";
     }
   }
-  fill(config, sensors, heard, bus);
+  fill(config, sensors, received, bus);
   return bus;
 }
 
@@ -265,16 +266,16 @@ ScanController scan_can_controller(const DaemonConfig& config,
   CanSocket socket(controller.interface, {});
   socket.also_want({{0, false}, 0});  // all frames, including those too short for a signal
   socket.also_want({{0, true}, 0});
-  Heard heard;
-  heard.of_signal.resize(signals.size());
+  ReceivedFrames received;
+  received.of_signal.resize(signals.size());
   if (socket.open()) {
     progress("controller " + controller.name + ": listening for " + short_number(listen_s) + " s");
-    heard = listen(socket, signals, listen_s, {});
+    received = listen(socket, signals, listen_s, {});
     result.error = socket.error();
   } else {
     result.error = "cannot be opened: " + socket.error();
   }
-  for (std::size_t i = 0; i < signals.size(); ++i) take(*signals[i], heard, i, result.values[i]);
+  for (std::size_t i = 0; i < signals.size(); ++i) take(*signals[i], received, i, result.values[i]);
   return result;
 }
 

@@ -386,7 +386,7 @@ void ModbusScan::find(const UnitSearch& search, ScanBus& bus) {
   for (int unit = search.first; unit <= search.last; ++unit) {
     std::array<std::uint16_t, 1> word{};
     if (!connection_.connected() && !connection_.connect()) break;
-    if (!may_hold) connection_.forget_silence();
+    if (!may_hold) connection_.reset_silence();
     const Exchange exchange = connection_.read(unit, ModbusTable::holding, 0, word);
     if (was_silent && exchange.unit_answered()) may_hold = connection_.held() > nanoseconds{0};
     was_silent = exchange.outcome == ExchangeOutcome::timeout;

@@ -23,7 +23,7 @@ Worked work(CanProtocol& protocol, CanSocket& socket, double listen_s, const Sca
   Worked worked;
   const nanoseconds end = monotonic_now() + from_seconds(listen_s);
   const std::vector<std::size_t> order = protocol.sensors();
-  const auto goes_on = [&](nanoseconds now) {
+  const auto may_continue = [&](nanoseconds now) {
     const std::span<const Reading> readings = protocol.readings();
     for (std::size_t i = 0; i < order.size(); ++i) {
       const double stale_after_s = sensors.stale_after_s.at(order[i]);
@@ -34,7 +34,7 @@ Worked work(CanProtocol& protocol, CanSocket& socket, double listen_s, const Sca
     return now < end;
   };
   protocol.opened(monotonic_now());
-  while (socket.is_open() && goes_on(monotonic_now())) {
+  while (socket.is_open() && may_continue(monotonic_now())) {
     pollfd wait{socket.descriptor(), POLLIN, 0};
     constexpr int slice_ms = 10;
     static_cast<void>(::poll(&wait, 1, slice_ms));
@@ -110,7 +110,7 @@ ScanBus scan_protocol(ProtocolBus what, CanProtocol& protocol, const ScanSensors
                   short_number(task.listen_s) + " s");
     worked = work(protocol, socket, task.listen_s, sensors);
     bus.error = socket.error();
-    bus.note = heard_text(worked.frames);
+    bus.note = received_text(worked.frames);
     if (afterwards) afterwards(socket, worked.frames, bus);
   } else {
     bus.error = "cannot be opened: " + socket.error();

@@ -88,7 +88,7 @@ class ForeignReader {
     read_units();
     form_ = number_form(table_, map_, problems_);
     problems_.throw_any();
-    say_layout();
+    note_layout();
     const auto found = find_time(table_, map_, units_, form_, problems_);
     problems_.throw_any();
     TimeColumns time = *found;
@@ -119,13 +119,13 @@ class ForeignReader {
  private:
   /// A separator at the end of every line does not make a column.
   void leave_empty_columns_out() {
-    std::vector<bool> leaves(table_.columns());
+    std::vector<bool> left_out(table_.columns());
     for (std::size_t i = 0; i < table_.columns(); ++i) {
-      leaves[i] = is_unnamed(table_.header[i]);
-      for (std::size_t row = 0; row < table_.rows() && leaves[i]; ++row)
-        leaves[i] = table_.field(row, i).empty();
+      left_out[i] = is_unnamed(table_.header[i]);
+      for (std::size_t row = 0; row < table_.rows() && left_out[i]; ++row)
+        left_out[i] = table_.field(row, i).empty();
     }
-    table_.leave_out(leaves);
+    table_.leave_out(left_out);
   }
 
   /// Reads units from the header, the row of units, or the cells.
@@ -160,7 +160,7 @@ class ForeignReader {
       turn_rows(time_s);
       return;
     }
-    if (goes_on_an_hour_back(time_s)) return;
+    if (is_set_back_an_hour(time_s)) return;
     const auto at = std::adjacent_find(time_s.begin(), time_s.end(), is_not_later);
     const auto row = static_cast<std::size_t>(at - time_s.begin()) + 1;
     const std::size_t column = time.columns.empty() ? 0 : time.columns.back();
@@ -172,7 +172,7 @@ class ForeignReader {
   }
 
   /// In autumn, local time is set back by an hour once, while the rows continue.
-  bool goes_on_an_hour_back(std::vector<double>& time_s) {
+  bool is_set_back_an_hour(std::vector<double>& time_s) {
     constexpr double hour_s = 3600.0;
     constexpr double steps_max = 3.0;
     if (!run_.wall_zero || run_.wall_zero->is_utc) return false;
@@ -205,7 +205,7 @@ class ForeignReader {
     run_.understood.emplace_back("the newest row is first: order reversed");
   }
 
-  void say_layout() {
+  void note_layout() {
     std::string note = "separator '" + separator_name(table_.separator) + "', decimal " +
                        (form_.decimal == ',' ? "comma" : "point");
     if (form_.thousands != '\0') note += std::string(", thousands '") + form_.thousands + "'";
@@ -286,7 +286,7 @@ class ForeignReader {
                       " = \"another name\" under [columns] in the file of --columns");
         continue;
       }
-      say(i, *meaning);
+      note_meaning(i, *meaning);
       run_.columns.push_back(meaning->name);
       meanings_.push_back(*meaning);
     }
@@ -387,7 +387,7 @@ class ForeignReader {
     return meaning;
   }
 
-  void say(std::size_t i, const Meaning& meaning) {
+  void note_meaning(std::size_t i, const Meaning& meaning) {
     std::string note = "'" + table_.header[i] + "' is " + meaning.name;
     const bool has_unit = !unit_of(meaning.name).suffix.empty();
     if (!has_unit) note += ", a signal without unit";

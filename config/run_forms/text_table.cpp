@@ -542,15 +542,15 @@ class TableReader {
 
 }  // namespace
 
-void TextTable::leave_out(const std::vector<bool>& leaves) {
+void TextTable::leave_out(const std::vector<bool>& left_out) {
   TextTable kept;
   for (std::size_t i = 0; i < columns(); ++i) {
-    if (leaves[i]) continue;
+    if (left_out[i]) continue;
     kept.header.push_back(header[i]);
     if (!units.empty()) kept.units.push_back(units[i]);
   }
   for (std::size_t k = 0; k < fields.size(); ++k)
-    if (!leaves[k % columns()]) kept.fields.push_back(fields[k]);
+    if (!left_out[k % columns()]) kept.fields.push_back(fields[k]);
   header = std::move(kept.header);
   units = std::move(kept.units);
   fields = std::move(kept.fields);

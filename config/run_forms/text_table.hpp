@@ -26,8 +26,8 @@ struct TextTable {
   [[nodiscard]] std::string_view field(std::size_t row, std::size_t column) const {
     return fields[row * columns() + column];
   }
-  /// Removes the columns for which `leaves` is true.
-  void leave_out(const std::vector<bool>& leaves);
+  /// Removes the columns for which `left_out` is true.
+  void leave_out(const std::vector<bool>& left_out);
 };
 
 /// The separator is the one of `;`, tab, `,`, `|` and blank that gives rows of equal length with

@@ -276,7 +276,7 @@ class TimeReader {
       run_.time_s[row] = std::round((run_.time_s[row] - first) * 1e6) / 1e6;
     }
     if (!problems_.empty()) return;
-    say_stamps(stamps.front(), order, first);
+    note_stamps(stamps.front(), order, first);
     if (stamps.front().has_date && order)
       run_.wall_zero = WallZero{first, stamps.front().zone_s.has_value()};
   }
@@ -370,7 +370,7 @@ class TimeReader {
     return false;
   }
 
-  void say_stamps(const TimeStamp& first, std::optional<DateOrder> order, double first_s) {
+  void note_stamps(const TimeStamp& first, std::optional<DateOrder> order, double first_s) {
     run_.note = "time_s: '" + table_.header[time_.columns[0]] + "'";
     if (time_.columns.size() == 2) run_.note += " and '" + table_.header[time_.columns[1]] + "'";
     if (first.has_date && !order) {

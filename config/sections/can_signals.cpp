@@ -32,7 +32,7 @@ std::pair<std::int64_t, std::int64_t> codes_of(const CanSignal& signal) {
   return {-half, half - 1};
 }
 
-bool stands(const TomlTable& own, const TomlTable& base, std::string_view key) {
+bool has_key(const TomlTable& own, const TomlTable& base, std::string_view key) {
   const bool in_base = base.has(key);  // marks the key as known
   return own.has(key) || in_base;
 }
@@ -40,7 +40,7 @@ bool stands(const TomlTable& own, const TomlTable& base, std::string_view key) {
 /// An integer in `own` or else `base`. Both are checked.
 int whole(const TomlTable& own, const TomlTable& base, std::string_view key, int low, int high,
           int otherwise, bool is_required) {
-  if (is_required && !stands(own, base, key)) own.problem(key, "must be given");
+  if (is_required && !has_key(own, base, key)) own.problem(key, "must be given");
   return own.integer(key, low, high, base.integer(key, low, high, otherwise));
 }
 
@@ -60,7 +60,7 @@ std::string too_long(const CanSignal& signal) {
 void read_identifier(const TomlTable& own, const TomlTable& base, bool is_required,
                      CanSignal& signal) {
   signal.extended_id = own.flag("extended_id", base.flag("extended_id", signal.extended_id));
-  const bool is_given = stands(own, base, "id");
+  const bool is_given = has_key(own, base, "id");
   if (is_required && !is_given) own.problem("id", "must be given");
   if (!is_given) {
     if (signal.id > standard_id_max && !signal.extended_id)
@@ -82,7 +82,7 @@ void read_place(const TomlTable& own, const TomlTable& base, bool is_required, C
   const ByteOrder before = signal.byte_order;
   signal.byte_order = own.choice("byte_order", byte_orders(),
                                  base.choice("byte_order", byte_orders(), signal.byte_order));
-  if (!is_required && signal.byte_order != before && !stands(own, base, "start_bit")) {
+  if (!is_required && signal.byte_order != before && !has_key(own, base, "start_bit")) {
     if (!other_first) own.problem("start_bit", "must be given: the value is not in whole bytes");
     signal.start_bit = other_first.value_or(signal.start_bit);
   }

@@ -56,7 +56,7 @@ bool any_node(const StatusView& view, std::size_t axis, bool AxisReport::*is_so)
 
 /// A figure of the axis, interpolated at the slide's position if the axis has nodes.
 template <class Figure>
-double where_it_stands(const StatusView& view, std::size_t axis, Figure figure) {
+double figure_at_position(const StatusView& view, std::size_t axis, Figure figure) {
   const AxisSpan span = span_of(view.config.estimator.axes, axis);
   if (span.count == 1) return figure(view.report.axes[axis]);
   std::vector<double> nodes;
@@ -194,22 +194,22 @@ void ask_back(const StatusView& view, const Command& command, double expected_um
   const double own_um =
       command.sd_nm > 0 ? 1e-3 * command.sd_nm : view.config.estimator.correction.noise_um;
   const double sd_um = std::hypot(claimed_um, own_um);
-  const Slip slip = slip_of(command.value_um, expected_um, sd_um);
-  if (slip == Slip::none || is_confirmed) return;
+  const EntryError entry_error = entry_error_of(command.value_um, expected_um, sd_um);
+  if (entry_error == EntryError::none || is_confirmed) return;
   throw RpcError(
       rpc::refused,
       fmt::format("asked back, nothing is taken over: {:+g} um was measured, {:+.1f} +-{:.1f} um "
                   "(1 sd) was expected; {}. If it is correct, repeat it with --confirm",
-                  command.value_um, expected_um, sd_um, text_of(slip)));
+                  command.value_um, expected_um, sd_um, text_of(entry_error)));
 }
 
 RpcPending note_measured(const DaemonActions& actions, const json& params) {
   const auto view = actions.view();
   const Command command = measured_command(view, params);
-  const double displacement_um = where_it_stands(
+  const double displacement_um = figure_at_position(
       view, command.axis, [](const AxisReport& axis) { return axis.displacement_um; });
   const bool remains = view.config.estimator.correction.measured == MeasuredMeaning::remaining;
-  const double applied_um = where_it_stands(view, command.axis, [](const AxisReport& axis) {
+  const double applied_um = figure_at_position(view, command.axis, [](const AxisReport& axis) {
     return std::isfinite(axis.applied_um) ? axis.applied_um : axis.offset_um;
   });
   const double effect_um = view.config.estimator.axes[command.axis].sign * applied_um;

@@ -71,13 +71,13 @@ void ServedClient::receive(Clock::time_point now) {
 
 void ServedClient::send(std::string_view text, Clock::time_point now) {
   if (broken) return;
-  if (!owes()) last_taken = now;
+  if (!has_unsent()) last_taken = now;
   output.append(text);
   flush(now);
 }
 
 void ServedClient::flush(Clock::time_point now) {
-  while (owes()) {
+  while (has_unsent()) {
     const ssize_t count =
         ::send(fd, output.data() + sent, output.size() - sent, MSG_NOSIGNAL | MSG_DONTWAIT);
     if (count < 0 && errno == EINTR) continue;

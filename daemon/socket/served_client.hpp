@@ -91,13 +91,13 @@ struct ServedClient {
   /// Sends what the socket accepts, keeps the rest. May set broken.
   void send(std::string_view text, Clock::time_point now);
   void flush(Clock::time_point now);
-  [[nodiscard]] bool owes() const noexcept { return sent < output.size(); }
+  [[nodiscard]] bool has_unsent() const noexcept { return sent < output.size(); }
   [[nodiscard]] std::size_t held_bytes() const noexcept {
     return input.capacity_bytes() + output.capacity();
   }
   /// No request, answer or subscription is pending.
   [[nodiscard]] bool is_idle() const noexcept {
-    return !subscription && !queued && !owes() && !later;
+    return !subscription && !queued && !has_unsent() && !later;
   }
 
   int fd;

@@ -96,7 +96,8 @@ struct StatusServer::Parts {
   void ask_waiting();
   void wake_rested(Clock::time_point now);
   void notify(Clock::time_point turn_end);
-  void tell(ServedClient& client, std::map<std::string, std::string>& lines, Clock::time_point now);
+  void notify_client(ServedClient& client, std::map<std::string, std::string>& lines,
+                     Clock::time_point now);
   void check_time_outs(Clock::time_point now);
   void cut_off(ClientId id, ServedClient& client, const std::string& why, int code = rpc::cut_off);
   void keep_memory_bounded();
@@ -249,11 +250,11 @@ void StatusServer::Parts::arrange(ClientId id, ServedClient& client) {
   client.counted_bytes = held;
 
   // A pending answer keeps a client open while it can still read.
-  if (client.broken || (client.owes() ? client.hung_up : client.close_when_sent)) {
+  if (client.broken || (client.has_unsent() ? client.hung_up : client.close_when_sent)) {
     return end(id, client);
   }
   std::uint32_t events = 0;
-  if (client.owes()) {
+  if (client.has_unsent()) {
     events = EPOLLOUT;
   } else if (client.later) {
     // Neither read nor closed: further requests follow the answer.
@@ -355,16 +356,17 @@ void StatusServer::Parts::notify(Clock::time_point turn_end) {
     ServedClient* client = find(id);
     // The client has another due time: this entry is of an earlier subscription.
     if (client == nullptr || client->notified_next != due) continue;
-    tell(*client, lines, now);
+    notify_client(*client, lines, now);
     client->notified_next = std::max(due + client->subscription->period, now);
     subscribers.emplace(client->notified_next, id);
     arrange(id, *client);
   }
 }
 
-void StatusServer::Parts::tell(ServedClient& client, std::map<std::string, std::string>& lines,
-                               Clock::time_point now) {
-  if (client.owes()) {
+void StatusServer::Parts::notify_client(ServedClient& client,
+                                        std::map<std::string, std::string>& lines,
+                                        Clock::time_point now) {
+  if (client.has_unsent()) {
     ++client.missed;
     ++statistics.missed;
     return;
@@ -386,10 +388,10 @@ void StatusServer::Parts::check_time_outs(Clock::time_point now) {
   time_outs_checked_next = now + time_outs_checked_every;
   for (auto& [id, client] : clients) {
     if (client.broken) continue;
-    if (client.owes() && now - client.last_taken > limits.unread_max) {
+    if (client.has_unsent() && now - client.last_taken > limits.unread_max) {
       cut_off(id, client, "nothing was read for " + seconds_text(limits.unread_max));
-    } else if (client.input.is_partial() && !client.queued && !client.owes() && !client.later &&
-               now - client.line_begun > limits.partial_line_max) {
+    } else if (client.input.is_partial() && !client.queued && !client.has_unsent() &&
+               !client.later && now - client.line_begun > limits.partial_line_max) {
       cut_off(id, client,
               "a request must be complete within " + seconds_text(limits.partial_line_max));
     } else if (!client.access.any() && now - client.last_request > limits.stranger_max) {
@@ -405,7 +407,7 @@ void StatusServer::Parts::cut_off(ClientId id, ServedClient& client, const std::
                                   int code) {
   ++statistics.cut_off;
   // Another line must not be inserted into an answer.
-  if (!client.owes()) client.send(error_line(code, why), Clock::now());
+  if (!client.has_unsent()) client.send(error_line(code, why), Clock::now());
   end(id, client);
 }
 

@@ -31,7 +31,7 @@ class EventJournal {
 
   explicit EventJournal(Now now = system_now) : now_(std::move(now)) {}
   /// Calls `listener` (the history's writer) with every event from now on.
-  void tell(std::function<void(const Event&)> listener) { listener_ = std::move(listener); }
+  void on_event(std::function<void(const Event&)> listener) { listener_ = std::move(listener); }
 
   /// The subject has this fault from now on. Each kind of fault is one event per outage, which
   /// begins with the first.

@@ -285,9 +285,9 @@ void EventLog::note_failed_sleeps(std::uint64_t failed) {
   failed_sleeps_ = failed;
 }
 
-void EventLog::note_log(bool stands) {
+void EventLog::note_log(bool is_stalled) {
   const Subject subject{SubjectKind::log, ""};
-  if (stands)
+  if (is_stalled)
     journal_.fault(
         {.subject = subject, .code = "not_taken", .detail = "it is not read, lines are lost"});
   else

@@ -38,8 +38,8 @@ class EventLog {
   /// Refused or cut-off clients and missed notifications: at most one line per minute, so that
   /// clients cannot fill the log.
   void note_socket(const SocketStatistics& statistics);
-  /// @param stands  the log's reader hangs and lines are lost
-  void note_log(bool stands);
+  /// @param is_stalled  the log's reader hangs and lines are lost
+  void note_log(bool is_stalled);
 
  private:
   void note_mode(const Report& report, const std::string& mode);

@@ -55,7 +55,7 @@ class LogQueue {
       const std::uint64_t lost = dropped_ - dropped_reported_;
       dropped_reported_ = dropped_;
       lock.unlock();
-      if (lost > 0) tell_lost(line, lost);
+      if (lost > 0) log_lost(line, lost);
       sink_->log(line);
       lock.lock();
       writing_ = false;
@@ -81,7 +81,7 @@ class LogQueue {
 
  private:
   /// Logged before the first line after the lost ones.
-  void tell_lost(const spdlog::details::log_msg& next, std::uint64_t lost) {
+  void log_lost(const spdlog::details::log_msg& next, std::uint64_t lost) {
     const std::string text = fmt::format("{} lines of the log were lost: it was not read", lost);
     spdlog::details::log_msg line(next.time, next.source, next.logger_name, spdlog::level::warn,
                                   text);

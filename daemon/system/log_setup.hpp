@@ -17,7 +17,7 @@ void set_log_level(const std::string& level);
 /// accepts lines again.
 struct LogStatistics {
   std::uint64_t dropped{0};  ///< since the start
-  bool stands{false};        ///< lines are being dropped
+  bool is_stalled{false};    ///< lines are being dropped
 };
 [[nodiscard]] LogStatistics log_statistics();
 

@@ -169,11 +169,11 @@ void CanSocket::enter(CanState state) {
   state_since_ = monotonic_now();
   state_ = state;
   send_failed_ = false;
-  tell_state();
+  report_state();
 }
 
 /// Sets error() from the state of the bus.
-void CanSocket::tell_state() {
+void CanSocket::report_state() {
   switch (state_) {
     case CanState::bus_off:
       error_ = interface_ + ": bus-off";
@@ -363,7 +363,7 @@ bool CanSocket::send(const CanFrame& frame) {
   if (sent == static_cast<ssize_t>(bytes)) {
     if (send_failed_) {
       send_failed_ = false;
-      tell_state();
+      report_state();
     }
     return true;
   }

@@ -134,7 +134,7 @@ class CanSocket {
   bool configure();
   void ask_for_room() noexcept;
   void enter(CanState state);
-  void tell_state();
+  void report_state();
   void look_for_carrier();
   void fail(const char* what, int code);
   /// Kernel time stamp of a frame; also records the kernel's count of dropped frames.

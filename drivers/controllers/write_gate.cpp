@@ -27,7 +27,7 @@ std::uint32_t WriteGate::synchronised() noexcept {
   looks_ = 0;
   sent_ = {};
   applied_um_.fill(not_a_number);
-  stands_since_.fill(++look_);
+  unchanged_since_.fill(++look_);
   return epoch_;
 }
 
@@ -68,11 +68,11 @@ bool WriteGate::explains(const std::array<double, axes_max>& applied_um) noexcep
     if (lately.count != 0 || !to_be_driven || !std::isfinite(before_um))
       applied_um_[axis] = applied_um[axis];
     if (!std::isfinite(applied_um[axis]) || !std::isfinite(before_um)) continue;
-    const bool stands = std::abs(applied_um[axis] - before_um) <= slack_um_[axis];
-    if (!stands) stands_since_[axis] = look_;
+    const bool is_unchanged = std::abs(applied_um[axis] - before_um) <= slack_um_[axis];
+    if (!is_unchanged) unchanged_since_[axis] = look_;
     if (lately.count == 0) {
       // Not driven yet: the first command starts from the read-back before it.
-      explained = explained && (!to_be_driven || stands);
+      explained = explained && (!to_be_driven || is_unchanged);
       continue;
     }
     // Between the starting point and the setpoints.
@@ -87,7 +87,7 @@ bool WriteGate::explains(const std::array<double, axes_max>& applied_um) noexcep
 
 /// The first command of an axis was computed before the axis was read back where it is.
 bool WriteGate::starts_elsewhere(std::size_t axis) const noexcept {
-  return command_.valid[axis] && sent_[axis].count == 0 && command_.look < stands_since_[axis];
+  return command_.valid[axis] && sent_[axis].count == 0 && command_.look < unchanged_since_[axis];
 }
 
 void WriteGate::offered(const OffsetCommand& command, nanoseconds computed_at) noexcept {

@@ -119,7 +119,7 @@ class WriteGate {
   std::array<SentLately, axes_max> sent_{};
   std::array<double, axes_max> applied_um_{};  ///< last read-back
   /// look() at which the read-back of an axis last jumped.
-  std::array<std::uint64_t, axes_max> stands_since_{};
+  std::array<std::uint64_t, axes_max> unchanged_since_{};
   std::array<double, axes_max> slack_um_{};
 };
 

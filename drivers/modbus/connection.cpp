@@ -134,7 +134,7 @@ class ModbusConnection::Implementation {
   [[nodiscard]] std::uint64_t links() const noexcept { return links_; }
   [[nodiscard]] std::uint64_t breaks() const noexcept { return links_ + closed_unexpectedly_; }
   [[nodiscard]] nanoseconds held() const noexcept { return held_; }
-  void forget_silence() noexcept { silent_asked_ = 0; }
+  void reset_silence() noexcept { silent_asked_ = 0; }
   void share() noexcept { shared_ = true; }
   [[nodiscard]] bool is_shared() const noexcept { return shared_; }
   void time_as(const ModbusLine& line) noexcept;
@@ -492,8 +492,8 @@ std::uint64_t ModbusConnection::breaks() const noexcept {
 nanoseconds ModbusConnection::held() const noexcept {
   return implementation_->held();
 }
-void ModbusConnection::forget_silence() noexcept {
-  implementation_->forget_silence();
+void ModbusConnection::reset_silence() noexcept {
+  implementation_->reset_silence();
 }
 void ModbusConnection::share() noexcept {
   implementation_->share();

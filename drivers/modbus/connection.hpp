@@ -96,7 +96,7 @@ class ModbusConnection {
   /// How long the last silent unit kept a gateway from answering.
   [[nodiscard]] nanoseconds held() const noexcept;
   /// Silent units do not block others on this line: the next answer is not awaited longer.
-  void forget_silence() noexcept;
+  void reset_silence() noexcept;
   void share() noexcept;  ///< the line has users other than sensors
   [[nodiscard]] bool is_shared() const noexcept;
   /// Uses the timing of `line` from now on: each user of a line has its own.

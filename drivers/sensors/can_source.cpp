@@ -147,14 +147,14 @@ CanSource::Arrival CanSource::arrival_of(const CanFrame& frame, Channel& channel
   channel.count_of_frame = count;
   if (!on_page) return Arrival::other_page;
   channel.count_of_page = count;
-  return still ? Arrival::stood_still : Arrival::renewed;
+  return still ? Arrival::unchanged : Arrival::renewed;
 }
 
 void CanSource::note_arrival(Arrival arrival, UnitHealth& unit) {
   if (arrival == Arrival::bad_frame) {
     ++unit.bad_frames;
     unit.last_error = "frame too short";
-  } else if (arrival == Arrival::stood_still) {
+  } else if (arrival == Arrival::unchanged) {
     unit.last_error = "the counter in the frame stands still";
   } else {
     ++unit.answers;
@@ -203,7 +203,7 @@ void CanSource::take(const CanFrame& frame, Channel& channel, std::size_t& count
       return;
     }
   }
-  if (arrival != Arrival::stood_still) {
+  if (arrival != Arrival::unchanged) {
     const CanValue decoded =
         arrival == Arrival::renewed ? decode(frame.payload(), channel.signal) : CanValue{};
     if (decoded.fault == Fault::bad_frame) arrival = Arrival::bad_frame;

@@ -43,7 +43,7 @@ class CanSource final : public CanInterfaceSource {
     nanoseconds last_frame{};
     nanoseconds contested_until{};  ///< until then two senders are assumed
   };
-  enum class Arrival { other_page, stood_still, renewed, bad_frame };
+  enum class Arrival { other_page, unchanged, renewed, bad_frame };
 
   void bus_opened(nanoseconds now) override;
   void bus_closed(nanoseconds now) override;

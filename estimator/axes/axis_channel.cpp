@@ -85,7 +85,7 @@ void AxisChannel::move(const AxisInput& input) noexcept {
   // Without read-back the offset moves only while writes are confirmed: the first offset sent on a
   // new link must be the one applied last.
   const bool reaches = (input.online && input.written) || reads_back_;
-  if (input.may_change && state_.stands_for == 0 && reaches)
+  if (input.may_change && state_.read_backs_awaited == 0 && reaches)
     limiter_.step(in_corridor() ? within_corridor(state_.target_um) : state_.target_um, input.dt_s);
   if (in_corridor()) widen_corridor();
   check_.sent(input.now, limiter_.offset_um());
@@ -116,7 +116,7 @@ void AxisChannel::begin_corridor(StartEvidence by) noexcept {
 /// offset does not move on before a command of the new epoch is written.
 void AxisChannel::take_epoch(std::uint32_t epoch) noexcept {
   if (is_same_link(epoch, state_.epoch))
-    state_.stands_for = read_backs_until_written;
+    state_.read_backs_awaited = read_backs_until_written;
   else
     state_.synced = false;
   state_.epoch = epoch;
@@ -124,7 +124,8 @@ void AxisChannel::take_epoch(std::uint32_t epoch) noexcept {
 
 void AxisChannel::note_read_back(const AxisInput& input) noexcept {
   if (reads_back_) state_.applied_um = input.applied_um;
-  if (state_.stands_for > 0 && input.taken_at != state_.seen_at) --state_.stands_for;
+  if (state_.read_backs_awaited > 0 && input.taken_at != state_.seen_at)
+    --state_.read_backs_awaited;
   state_.seen_at = input.taken_at;
 }
 
@@ -202,7 +203,7 @@ void AxisChannel::start_on_link(const AxisInput& input, bool fresh) noexcept {
   state_.in_doubt = false;
   const bool at_nothing = std::abs(input.applied_um) <= same_read_back_um;
   if (state_.driven_once && !at_nothing && check_.agrees(input.applied_um)) {
-    state_.stands_for = is_applied(input) ? 0 : read_backs_until_written;
+    state_.read_backs_awaited = is_applied(input) ? 0 : read_backs_until_written;
     return;
   }
   state_.unwritten_for = read_backs_until_written;
@@ -269,8 +270,8 @@ void AxisChannel::check_release(const AxisInput& input) noexcept {
   const double sent_um = limiter_.offset_um();
   const bool mended = std::abs(input.applied_um - sent_um) <= same_read_back_um;
   const bool first = std::isnan(state_.released_um);
-  const bool stands = std::abs(input.applied_um - state_.released_um) <= same_read_back_um;
-  if (state_.out_of_bound || !(first || stands) ||
+  const bool is_at_released = std::abs(input.applied_um - state_.released_um) <= same_read_back_um;
+  if (state_.out_of_bound || !(first || is_at_released) ||
       (!mended && state_.latched_mismatch.explains(sent_um, input.applied_um))) {
     state_.releasing = false;
     return;

@@ -171,7 +171,7 @@ class AxisChannel {
     Mismatch latched_mismatch;
     SentAndRead pairs;
     /// After a pause of the link: read-backs until a command of the new epoch is surely written.
-    std::uint8_t stands_for{0};
+    std::uint8_t read_backs_awaited{0};
     std::uint8_t unwritten_for{0};  ///< read-backs until they surely show our offset
     nanoseconds seen_at{};          ///< of the newest report, with or without offsets
     nanoseconds read_back_at{};

@@ -115,7 +115,7 @@ std::span<const double> CycleUpdate::step(nanoseconds now, const Displacement& d
   if (!each_cycle_) return displacement.axis_um;
   if (ends_.take(displacement.known && compensating && !displacement.held)) {
     hold_.cycle_end(now, temps.estimated_degC, signals.of_model, live);
-    state_.share = displacement.believed_share;
+    state_.share = displacement.used_share;
   }
   if (displacement.known && hold_.holds()) evaluate(displacement, reference, signals, learned);
   return state_.axis_um;
@@ -131,7 +131,7 @@ void CycleUpdate::evaluate(const Displacement& displacement, const ReferenceStat
   for (std::size_t i = 0; i < rise_K_.size(); ++i)
     rise_K_[i] = hold_.temps_degC()[i] - reference.temps_degC[i];
   // Held like the temperatures; unknown after a restart.
-  const double share = std::isfinite(state_.share) ? state_.share : displacement.believed_share;
+  const double share = std::isfinite(state_.share) ? state_.share : displacement.used_share;
   for (std::size_t i = 0; i < axis_output_.size(); ++i)
     state_.axis_um[i] = share * ((places_[i].is_node ? node_um_[i] : held_um_[axis_output_[i]]) -
                                  displacement.zero_um[axis_output_[i]]) +

@@ -43,7 +43,7 @@ class ProbedError {
 };
 
 /// Input error that explains a value which contradicts the model's claimed error.
-enum class Slip : std::uint8_t {
+enum class EntryError : std::uint8_t {
   none,     ///< the value agrees
   sign,     ///< its negative agrees
   tenfold,  ///< a tenth of it agrees
@@ -55,29 +55,30 @@ enum class Slip : std::uint8_t {
 inline constexpr double question_sigma = 3.0;
 
 /// @param sd_um  of the difference between model and measurement; NaN: no claimed error
-[[nodiscard]] inline Slip slip_of(double value_um, double expected_um, double sd_um) noexcept {
-  if (!std::isfinite(sd_um) || !std::isfinite(expected_um)) return Slip::none;
+[[nodiscard]] inline EntryError entry_error_of(double value_um, double expected_um,
+                                               double sd_um) noexcept {
+  if (!std::isfinite(sd_um) || !std::isfinite(expected_um)) return EntryError::none;
   const auto agrees = [&](double value) {
     return std::abs(value - expected_um) <= question_sigma * sd_um;
   };
-  if (agrees(value_um)) return Slip::none;
-  if (agrees(-value_um)) return Slip::sign;
-  if (agrees(0.1 * value_um)) return Slip::tenfold;
-  if (agrees(10.0 * value_um)) return Slip::tenth;
-  return Slip::unexplained;
+  if (agrees(value_um)) return EntryError::none;
+  if (agrees(-value_um)) return EntryError::sign;
+  if (agrees(0.1 * value_um)) return EntryError::tenfold;
+  if (agrees(10.0 * value_um)) return EntryError::tenth;
+  return EntryError::unexplained;
 }
 
-[[nodiscard]] constexpr std::string_view text_of(Slip slip) noexcept {
-  switch (slip) {
-    case Slip::none:
+[[nodiscard]] constexpr std::string_view text_of(EntryError entry_error) noexcept {
+  switch (entry_error) {
+    case EntryError::none:
       return "";
-    case Slip::sign:
+    case EntryError::sign:
       return "the opposite sign would fit";
-    case Slip::tenfold:
+    case EntryError::tenfold:
       return "a tenth of it would fit";
-    case Slip::tenth:
+    case EntryError::tenth:
       return "ten times it would fit";
-    case Slip::unexplained:
+    case EntryError::unexplained:
       break;
   }
   return "perhaps another axis or another tool";

@@ -71,8 +71,8 @@ RunningCorrection::RunningCorrection(const CorrectionConfig& config, const Therm
   require(model.course->groups == config.groups, "correction.group", static_cast<double>(groups_),
           "must be the groups of the model's [course]");
   course_.emplace(*model.course, model, output, config.gain_sd);
-  record_.says.gain.fill(1.0);
-  record_.says.sd.fill(config.gain_sd);
+  record_.recorded.gain.fill(1.0);
+  record_.recorded.sd.fill(config.gain_sd);
 }
 
 void RunningCorrection::step(nanoseconds now, std::span<const double> rise_K,
@@ -88,7 +88,7 @@ void RunningCorrection::look_up(std::span<const double> rise_K) noexcept {
   for (std::size_t g = 0; g < groups_; ++g) sum_um += state_.contributions_um[g];
   record_.phase.step(state_.now, state_.contributions_um[0], sum_um);
   if (record_.looked && state_.now - record_.looked_at < look_up_period) return;
-  record_.says = course_->at(record_.phase.phase(), record_.phase.since_s(), rise_K);
+  record_.recorded = course_->at(record_.phase.phase(), record_.phase.since_s(), rise_K);
   record_.looked = true;
   record_.looked_at = state_.now;
 }
@@ -103,19 +103,19 @@ double RunningCorrection::learned_variance(std::size_t group) const noexcept {
 }
 
 double RunningCorrection::joint_variance(std::size_t group) const noexcept {
-  return std::min(record_.says.sd[group] * record_.says.sd[group], learned_variance(group));
+  return std::min(record_.recorded.sd[group] * record_.recorded.sd[group], learned_variance(group));
 }
 
 RunningCorrection::Gains RunningCorrection::joint_gains() const noexcept {
   Gains gains = state_.learned;
   if (!course_) return gains;
   for (std::size_t g = 0; g < groups_; ++g) {
-    const double recorded = record_.says.sd[g] * record_.says.sd[g];
+    const double recorded = record_.recorded.sd[g] * record_.recorded.sd[g];
     const double learned = learned_variance(g);
     double share = 0.0;  // of the learned gain
     if (std::isfinite(learned))
       share = recorded + learned > 0 ? recorded / (recorded + learned) : 1;
-    gains[g] = std::clamp(record_.says.gain[g] + share * (gains[g] - record_.says.gain[g]),
+    gains[g] = std::clamp(record_.recorded.gain[g] + share * (gains[g] - record_.recorded.gain[g]),
                           config_.gain_min, config_.gain_max);
   }
   return gains;
@@ -321,8 +321,8 @@ CorrectionReport RunningCorrection::report() const noexcept {
   report.taken = state_.taken;
   report.refused = state_.refused;
   report.has_record = course_.has_value();
-  report.recorded = record_.says.gain;
-  report.recorded_sd = record_.says.sd;
+  report.recorded = record_.recorded.gain;
+  report.recorded_sd = record_.recorded.sd;
   return report;
 }
 

@@ -129,12 +129,12 @@ class RunningCorrection {
   struct Record {
     explicit Record(double back_um) : phase(back_um) {}
     HeatPhase phase;
-    RecordedGains says{};
+    RecordedGains recorded{};
     bool looked{false};
     nanoseconds looked_at{};
     Contributions probed_sd{};  ///< standard deviation of the learned gains at the last probing
     void visit_state(StateArchive& archive) {
-      archive(phase, says.gain, says.sd, looked, looked_at, probed_sd);
+      archive(phase, recorded.gain, recorded.sd, looked, looked_at, probed_sd);
     }
   };
 

@@ -200,7 +200,7 @@ std::size_t ModelDomain::furthest_column() const {
                                   of_column.begin());
 }
 
-double ModelDomain::believed_share() const noexcept {
+double ModelDomain::used_share() const noexcept {
   if (!outside()) return 1.0;
   const double share = metric_->distance_max / metric_->state.distance;
   return share < 1.0 ? share * share : 0.0;

@@ -94,7 +94,7 @@ class ModelDomain {
   /// Index in `made_from.columns` of the largest part of d^2, over level and low passes; O(n^2).
   [[nodiscard]] std::size_t furthest_column() const;
   /// Share of the model's displacement in use: 1 inside, (distance_max / d)^2 outside.
-  [[nodiscard]] double believed_share() const noexcept;
+  [[nodiscard]] double used_share() const noexcept;
   /// spread_um() of an output at the present distance; NaN: unknown.
   [[nodiscard]] double sd_um(std::size_t output) const noexcept;
 

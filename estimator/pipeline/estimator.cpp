@@ -91,7 +91,7 @@ void take_reference(Stages& stages) noexcept {
   if (!stages.sensing.all_good()) return;
   const std::span<const double> temps_degC = stages.sensing.blocks().temps_degC();
   stages.reference.take(temps_degC);
-  stages.sensing.trust_all();
+  stages.sensing.end_suspicions();
   stages.prediction.restart();
   stages.learned.restart();
   stages.cycle_update.restart(stages.record.now, temps_degC, stages.signals.of_model());

@@ -108,7 +108,7 @@ Displacement Prediction::step(nanoseconds now, const Temperatures& temps,
   found.outside = outside();
   found.held = policy_ == OutsidePolicy::hold && found.outside;
   if (domain_ && found.known) outside_share_.step(now, found.outside);
-  found.believed_share = believed_share();
+  found.used_share = used_share();
   found.zero_um = state_.zero_um;
   found.axis_um = axis_um_;
   return found;

@@ -112,7 +112,7 @@ class Prediction {
     return node_um_[axis] - state_.zero_um[axis_output_[axis]];
   }
   [[nodiscard]] double axis_um(std::size_t axis, const Probings& learned) const noexcept {
-    return believed_share() * model_um(axis) + learned.correction_um(axis);
+    return used_share() * model_um(axis) + learned.correction_um(axis);
   }
   [[nodiscard]] double offset_sd_um(std::size_t axis) const noexcept {
     return certainty_.offset_sd_um(axis);
@@ -151,8 +151,8 @@ class Prediction {
   void look_along_travels(nanoseconds now, const Temperatures& temps,
                           const ReferenceState& reference, const Signals& signals) noexcept;
   [[nodiscard]] bool outside() const noexcept { return domain_ && domain_->outside(); }
-  [[nodiscard]] double believed_share() const noexcept {
-    return policy_ == OutsidePolicy::shrink && domain_ ? domain_->believed_share() : 1.0;
+  [[nodiscard]] double used_share() const noexcept {
+    return policy_ == OutsidePolicy::shrink && domain_ ? domain_->used_share() : 1.0;
   }
 
   const OutsidePolicy policy_;

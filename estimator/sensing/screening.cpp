@@ -42,7 +42,7 @@ Screening::Screening(const ScreeningConfig& config)
 bool Screening::take(nanoseconds now, const Reading& reading) noexcept {
   state_.seen_at = reading.taken_at;
   state_.seen_fault = reading.fault;
-  if (goes_on(now, reading)) {
+  if (is_continuous(now, reading)) {
     if (reading.temp_degC != state_.good.temp_degC) state_.same_since = reading.taken_at;
     state_.good = {true, reading.temp_degC, reading.taken_at};
     state_.verdict = Fault::none;
@@ -63,7 +63,7 @@ bool Screening::take(nanoseconds now, const Reading& reading) noexcept {
 
 /// Fast path for most readings: near the one before, which was confirmed. Times are compared
 /// without differences, which could overflow.
-bool Screening::goes_on(nanoseconds now, const Reading& reading) const noexcept {
+bool Screening::is_continuous(nanoseconds now, const Reading& reading) const noexcept {
   return reading.fault == Fault::none && !state_.waiting && state_.good.known &&
          std::abs(reading.temp_degC - state_.good.temp_degC) <= allowance_K_ &&
          reading.temp_degC >= min_degC_ && reading.temp_degC <= max_degC_ &&

@@ -141,7 +141,7 @@ class Screening {
   };
 
   [[nodiscard]] bool take(nanoseconds now, const Reading& reading) noexcept;
-  [[nodiscard]] bool goes_on(nanoseconds now, const Reading& reading) const noexcept;
+  [[nodiscard]] bool is_continuous(nanoseconds now, const Reading& reading) const noexcept;
   /// The last value in range and fresh, confirmed or not.
   [[nodiscard]] const Value& newest() const noexcept {
     return state_.waiting ? state_.newest : state_.good;

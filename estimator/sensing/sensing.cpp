@@ -166,7 +166,7 @@ Temperatures Sensing::use_all(nanoseconds now) noexcept {
   return join(now, {});
 }
 
-void Sensing::trust_all() noexcept {
+void Sensing::end_suspicions() noexcept {
   if (suspicion_) suspicion_->restart();
 }
 

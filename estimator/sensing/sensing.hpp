@@ -76,7 +76,7 @@ class Sensing {
   [[nodiscard]] Temperatures use_all(nanoseconds now) noexcept;
   void accept(std::size_t sensor) noexcept;
   /// A new reference: the present readings are right, and suspicions end.
-  void trust_all() noexcept;
+  void end_suspicions() noexcept;
 
   void report(std::span<SensorReport> sensors) const noexcept;
   [[nodiscard]] const BlockBank& blocks() const noexcept { return blocks_; }

@@ -278,10 +278,10 @@ void Suspicion::begin(const Suspect& suspect, nanoseconds since) noexcept {
   for (std::size_t other = 0; other < inputs_.size(); ++other) {
     if (other == input) continue;
     for (const std::size_t earlier : inputs_[other]) {
-      if (state_.suspected[earlier] == 0 || believed(other) > 0) continue;
+      if (state_.suspected[earlier] == 0 || unsuspected_sensors(other) > 0) continue;
       for (std::size_t i = 0; i < inputs_.size(); ++i)
-        errors_K_[i] = believed(i) > 0 ? 0.0 : not_a_number;
-      errors_K_[input] = suspect.size_K / static_cast<double>(believed(input));
+        errors_K_[i] = unsuspected_sensors(i) > 0 ? 0.0 : not_a_number;
+      errors_K_[input] = suspect.size_K / static_cast<double>(unsuspected_sensors(input));
       errors_K_[other] = 0.0;
       const double taken_K = check_.remainder_K(other, errors_K_);
       if (std::isfinite(taken_K)) state_.size_K[earlier] -= taken_K;
@@ -298,7 +298,7 @@ void Suspicion::begin(const Suspect& suspect, nanoseconds since) noexcept {
   correct(sensor, suspect.sd_K);
 }
 
-std::size_t Suspicion::believed(std::size_t input) const noexcept {
+std::size_t Suspicion::unsuspected_sensors(std::size_t input) const noexcept {
   std::size_t count = 0;
   for (const std::size_t sensor : inputs_[input])
     if (state_.suspected[sensor] == 0) ++count;

@@ -132,7 +132,7 @@ class Suspicion {
   void forget(std::size_t sensor) noexcept;
   /// The first input of the sensor; the number of inputs: none.
   [[nodiscard]] std::size_t input_of(std::size_t sensor) const noexcept;
-  [[nodiscard]] std::size_t believed(std::size_t input) const noexcept;
+  [[nodiscard]] std::size_t unsuspected_sensors(std::size_t input) const noexcept;
   void correct(std::size_t sensor, double sd_K) noexcept;
 
   const std::vector<std::string> names_;       ///< of the sensors

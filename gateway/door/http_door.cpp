@@ -50,7 +50,7 @@ bool takes_gzip(MHD_Connection* connection) {
   return header(connection, MHD_HTTP_HEADER_ACCEPT_ENCODING).find("gzip") != std::string_view::npos;
 }
 
-void tell_gzip(MHD_Response* response) {
+void add_gzip_headers(MHD_Response* response) {
   if (response == nullptr) return;
   MHD_add_response_header(response, MHD_HTTP_HEADER_CONTENT_ENCODING, "gzip");
   MHD_add_response_header(response, MHD_HTTP_HEADER_VARY, MHD_HTTP_HEADER_ACCEPT_ENCODING);
@@ -257,7 +257,7 @@ MHD_Result HttpDoor::Parts::answer(MHD_Connection* connection, unsigned status, 
   const std::string& sent = gzip.empty() ? text : gzip;
   MHD_Response* response = MHD_create_response_from_buffer(
       sent.size(), const_cast<char*>(sent.data()), MHD_RESPMEM_MUST_COPY);
-  if (!gzip.empty()) tell_gzip(response);
+  if (!gzip.empty()) add_gzip_headers(response);
   return queue(connection, status, type, response);
 }
 
@@ -268,7 +268,7 @@ MHD_Result HttpDoor::Parts::send(MHD_Connection* connection, const PageFile& fil
   const std::string& sent = is_gzip ? file.gzip : file.bytes;
   MHD_Response* response = MHD_create_response_from_buffer(
       sent.size(), const_cast<char*>(sent.data()), MHD_RESPMEM_PERSISTENT);
-  if (is_gzip) tell_gzip(response);
+  if (is_gzip) add_gzip_headers(response);
   return queue(connection, MHD_HTTP_OK, file.type.c_str(), response,
                file.has_own_scripts ? own_scripts : own_files_only);
 }

@@ -45,7 +45,7 @@ struct HttpServer::Parts {
 
   void serve(HttpExchange& exchange);
   void take_command(HttpExchange& exchange);
-  void tell_history(HttpExchange& exchange);
+  void answer_history(HttpExchange& exchange);
   void show_report(HttpExchange& exchange) const;
   void of_daemon(HttpExchange& exchange, json (*part)(const Snapshot&)) const;
   [[nodiscard]] GatewayFigures figures();
@@ -83,7 +83,7 @@ void HttpServer::Parts::serve(HttpExchange& exchange) {
   if (path == "/api/sensors")
     return of_daemon(exchange, [](const Snapshot& all) { return json_of(all.sensors); });
   if (path == "/api/events") return exchange.stream(streams);
-  if (path == "/api/history") return tell_history(exchange);
+  if (path == "/api/history") return answer_history(exchange);
   if (path == "/report") return show_report(exchange);
   if (path == "/api/commands") {
     json offered = commands.offered(exchange.user());
@@ -119,7 +119,7 @@ void HttpServer::Parts::of_daemon(HttpExchange& exchange, json (*part)(const Sna
   exchange.answer(200, json_type, dumped(part(*snapshot)));
 }
 
-void HttpServer::Parts::tell_history(HttpExchange& exchange) {
+void HttpServer::Parts::answer_history(HttpExchange& exchange) {
   timespec now{};
   clock_gettime(CLOCK_REALTIME, &now);
   std::string why;

@@ -57,7 +57,7 @@ struct MqttPublisher::Parts {
   void set_up();
   void run();
   void send_waiting();
-  void say_goodbye();
+  void publish_offline();
   void sleep(milliseconds time) const;
 
   const GatewaySettings& settings;
@@ -68,8 +68,8 @@ struct MqttPublisher::Parts {
 
   mutable std::mutex mutex;  ///< guards the next three
   MessageBuffer buffer;
-  std::map<std::string, nlohmann::json> said;  ///< last state, by topic
-  double said_at_s{0.0};
+  std::map<std::string, nlohmann::json> last_state;  ///< last state, by topic
+  double published_at_s{0.0};
 
   // Publisher's thread only.
   int unacknowledged{0};
@@ -157,7 +157,7 @@ void MqttPublisher::Parts::run() {
     again_after = std::min(2 * again_after, again_after_max);
     if (!stops) code = mosquitto_reconnect_async(client);
   }
-  if (is_connected) say_goodbye();
+  if (is_connected) publish_offline();
 }
 
 /// Keeps at most `unacknowledged_max` messages in libmosquitto, which resends them after a lost
@@ -176,7 +176,7 @@ void MqttPublisher::Parts::send_waiting() {
   }
 }
 
-void MqttPublisher::Parts::say_goodbye() {
+void MqttPublisher::Parts::publish_offline() {
   const std::string offline = offline_payload();
   const std::string topic = topic_of(settings.machine, "status");
   ++unacknowledged;
@@ -200,16 +200,16 @@ void MqttPublisher::show(const SnapshotPointer& snapshot) {
   std::vector<TopicState> states = topic_states(*snapshot, parts_->settings.machine);
   const std::lock_guard lock(parts_->mutex);
   constexpr double early_s = 0.1;  // tolerance of the snapshots' period
-  const double passed_s = snapshot->wall_s - parts_->said_at_s;
+  const double passed_s = snapshot->wall_s - parts_->published_at_s;
   const bool is_due = !(passed_s >= 0.0 && passed_s < parts_->settings.mqtt.period_s - early_s);
-  if (is_due) parts_->said_at_s = snapshot->wall_s;
+  if (is_due) parts_->published_at_s = snapshot->wall_s;
   for (std::size_t i = 0; i < states.size(); ++i) {
     // The status (first) is sent at once, the others once per period.
     if (i > 0 && !is_due) return;
-    nlohmann::json& said = parts_->said[states[i].topic];
-    if (said == states[i].state) continue;
+    nlohmann::json& last_state = parts_->last_state[states[i].topic];
+    if (last_state == states[i].state) continue;
     parts_->buffer.push({states[i].topic, payload_of(states[i].state, snapshot->wall_s)});
-    said = std::move(states[i].state);
+    last_state = std::move(states[i].state);
   }
 }
 

@@ -63,7 +63,7 @@ struct Agent {
   std::string in;
   std::string out;
   bool is_lost{false};
-  Clock::time_point heard_at{Clock::now()};
+  Clock::time_point received_at{Clock::now()};
 };
 
 }  // namespace
@@ -148,11 +148,11 @@ void ShdrAdapter::Parts::take_agent() {
 /// An agent pings once per heartbeat; the one silent longest, for at least two, is replaced by a
 /// new one.
 bool ShdrAdapter::Parts::drop_silent() {
-  const auto silent =
-      std::min_element(agents.begin(), agents.end(),
-                       [](const Agent& a, const Agent& b) { return a.heard_at < b.heard_at; });
-  if (silent == agents.end() ||
-      Clock::now() - silent->heard_at < std::chrono::duration<double>(2.0 * settings.heartbeat_s))
+  const auto silent = std::min_element(
+      agents.begin(), agents.end(),
+      [](const Agent& a, const Agent& b) { return a.received_at < b.received_at; });
+  if (silent == agents.end() || Clock::now() - silent->received_at <
+                                    std::chrono::duration<double>(2.0 * settings.heartbeat_s))
     return false;
   close(silent->fd);
   agents.erase(silent);
@@ -183,7 +183,7 @@ void ShdrAdapter::Parts::read_from(Agent& agent) const {
   agent.is_lost = agent.is_lost || count <= 0;
   if (count > 0) {
     agent.in.append(bytes.data(), static_cast<std::size_t>(count));
-    agent.heard_at = Clock::now();
+    agent.received_at = Clock::now();
   }
   for (std::size_t end = 0; (end = agent.in.find('\n')) != std::string::npos;) {
     agent.out += shdr_answer(std::string_view(agent.in).substr(0, end), settings.heartbeat_s);

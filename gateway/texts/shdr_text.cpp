@@ -127,7 +127,7 @@ std::string shdr_lines(const ShdrStates& before, const ShdrStates& now, double w
   const std::string time = utc_text(wall_s);
   std::string values;
   std::string lines;
-  const auto tell = [&](const std::string& item, const std::vector<std::string>& entries) {
+  const auto add_entries = [&](const std::string& item, const std::vector<std::string>& entries) {
     if (!is_condition(item)) {
       values.append("|").append(item).append("|").append(entries.front());
       return;
@@ -143,10 +143,10 @@ std::string shdr_lines(const ShdrStates& before, const ShdrStates& now, double w
   };
   for (const auto& [item, entries] : now) {
     const auto known = before.find(item);
-    if (known == before.end() || known->second != entries) tell(item, entries);
+    if (known == before.end() || known->second != entries) add_entries(item, entries);
   }
   for (const auto& [item, entries] : before)
-    if (now.count(item) == 0) tell(item, {unavailable});
+    if (now.count(item) == 0) add_entries(item, {unavailable});
   return (values.empty() ? "" : time + values + "\n") + lines;
 }
 

@@ -25,7 +25,7 @@
 namespace thermocomp::diagnosis {
 namespace {
 
-constexpr double probability_told_min = 0.001;
+constexpr double probability_reported_min = 0.001;
 
 struct Options {
   std::string model;
@@ -105,7 +105,7 @@ void print(const Diagnosis& diagnosis) {
 
 void print_weighed(const Diagnosis& diagnosis) {
   for (const Candidate& each : diagnosis.weighed)
-    if (each.probability >= probability_told_min)
+    if (each.probability >= probability_reported_min)
       std::printf("weighed: %s of %s%s%s: probability %.3f, ln L %.0f, left-out rows %.0f %%\n",
                   each.cause.c_str(), each.subject.c_str(), each.run ? " in " : "",
                   each.run ? each.run->c_str() : "", each.probability, each.score,

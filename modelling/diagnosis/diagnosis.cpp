@@ -115,15 +115,15 @@ void add_remainder(ThermalModel& model, const RemainderBank& remainder) {
   model.terms.push_back(remainder.term);
 }
 
-void forget_output(RemainderBank& remainder, const std::string& output) {
+void remove_output(RemainderBank& remainder, const std::string& output) {
   remainder.term.bank.gain_um_per_unit.erase(output);
   for (TermSpec& hinge : remainder.hinges) hinge.per_output["gain_um_per_unit"].erase(output);
 }
 
 /// Adds a bank of lags for the outputs of which enough can be predicted without a name.
 /// @return of each output the share that can
-std::vector<double> carry_remainder(Diagnosis& diagnosis, Extended& extended,
-                                    const MeasuredData& train, const MeasuredData& test) {
+std::vector<double> add_remainder_bank(Diagnosis& diagnosis, Extended& extended,
+                                       const MeasuredData& train, const MeasuredData& test) {
   std::vector<double> predictable;
   diagnosis.remainder = remainder_bank(train, residuals(extended, train), predictable);
   if (!diagnosis.remainder) return predictable;
@@ -133,7 +133,7 @@ std::vector<double> carry_remainder(Diagnosis& diagnosis, Extended& extended,
   for (const auto& [name, gain] : diagnosis.remainder->left_out) outputs.push_back(name);
   diagnosis.remainder->test = gains_on_test(extended, longer, outputs, test);
   for (const auto& [name, gain] : diagnosis.remainder->test)
-    if (!(gain.reduction > 0)) forget_output(*diagnosis.remainder, name);
+    if (!(gain.reduction > 0)) remove_output(*diagnosis.remainder, name);
   if (!diagnosis.remainder->term.bank.gain_um_per_unit.empty())
     add_remainder(extended.model, *diagnosis.remainder);
   return predictable;
@@ -174,7 +174,7 @@ Diagnosis diagnose(const ThermalModel& model, std::vector<RunFile> train,
   if (!diagnosis.findings.empty())
     correct_coefficients(extended.model, model, result.coefficient_errors);
   const std::vector<double> predictable =
-      carry_remainder(diagnosis, extended, train_data, test_data);
+      add_remainder_bank(diagnosis, extended, train_data, test_data);
   diagnosis.extended = extended.model;
   const std::vector<Residuals> train_base = residuals(train_data);
   const std::vector<Residuals> base = residuals(test_data);

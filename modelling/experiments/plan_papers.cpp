@@ -27,7 +27,7 @@ std::string clock(double minutes) {
   return text;
 }
 
-std::string promises(const TestPlan& plan) {
+std::string coverage_text(const TestPlan& plan) {
   std::string text;
   text.append("strength ").append(std::to_string(plan.strength));
   text.append(plan.strength >= 2 ? ": every two factors hold every combination equally often\n"
@@ -81,7 +81,7 @@ bool runs_at(const TestSpec& test, double minute) {
 std::string plan_text(const TestPlan& plan) {
   std::string text = plan.design.name;
   text.append(", ").append(std::to_string(plan.design.rows.size())).append(" tests\n");
-  text.append(promises(plan)).append("\n");
+  text.append(coverage_text(plan)).append("\n");
   std::vector<std::size_t> widths;
   for (const Factor& factor : plan.spec.factors) {
     std::size_t width = factor.name.size();
@@ -147,7 +147,7 @@ std::string test_sheet(const TestPlan& plan) {
   std::string text("# Test sheet\n\n");
   text.append(plan.design.name).append(", ").append(std::to_string(plan.design.rows.size()));
   text.append(" tests of ").append(number_text(test_spec.hours)).append(" h.\n\n");
-  text.append(promises(plan))
+  text.append(coverage_text(plan))
       .append(
           "\nBefore each test the machine stands until it is cold and "
           "even. The first row of a run file is taken before anything "

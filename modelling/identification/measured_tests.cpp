@@ -219,7 +219,7 @@ void leave_out_still_places(MeasuredTests& tests) {
   tests.places = names;
 }
 
-bool stands_still(const MeasuredTests& tests, std::size_t signal) {
+bool is_constant(const MeasuredTests& tests, std::size_t signal) {
   double within = 0.0;
   double size = 0.0;
   for (const TestRun& run : tests.runs) {
@@ -234,7 +234,7 @@ bool stands_still(const MeasuredTests& tests, std::size_t signal) {
 
 /// True if the signal goes up or down at most once in all runs together: its effect cannot be
 /// separated from that of time.
-bool goes_one_way(const MeasuredTests& tests, std::size_t signal) {
+bool is_monotonic(const MeasuredTests& tests, std::size_t signal) {
   const auto column = static_cast<Eigen::Index>(signal);
   const auto selected = [column](const TestRun& run) {
     return run.signals.col(column).tail(run.time_s.size() - run.begin);
@@ -344,7 +344,7 @@ MeasuredTests measured_tests(const std::vector<RunFile>& given, const TestOption
     tests.runs.push_back(
         make_run(run, tests.places, tests.outputs, tests.signals, options.between_probings));
   for (std::size_t i = 0; i < tests.signals.size(); ++i)
-    if (stands_still(tests, i) || goes_one_way(tests, i)) tests.unmoved.push_back(tests.signals[i]);
+    if (is_constant(tests, i) || is_monotonic(tests, i)) tests.unmoved.push_back(tests.signals[i]);
   leave_out_still_places(tests);
   if (tests.places.empty()) refuse(runs.front().name, "", "has no temperature that can be used");
   tests.folds = make_folds(tests.runs, options.folds_of_one_run);

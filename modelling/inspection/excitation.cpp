@@ -81,10 +81,10 @@ void judge_excitation(const Recording& recording, Inspection& inspection) {
   if (recording.time_s.size() == 0) return;
   const MatrixXd slow = from_means(recording, low_pass(recording, recording.values, structure_s));
   const MatrixXd products = slow.transpose() * slow;
-  std::set<std::pair<Index, Index>> told;
+  std::set<std::pair<Index, Index>> reported;
   const auto add_pair = [&](Index i, Index nearest) {
-    if (told.contains({nearest, i})) return;
-    told.emplace(i, nearest);
+    if (reported.contains({nearest, i})) return;
+    reported.emplace(i, nearest);
     const std::string& name = recording.signals[static_cast<std::size_t>(i)];
     const std::string other =
         nearest >= 0 ? recording.signals[static_cast<std::size_t>(nearest)] : "the others";

@@ -12,12 +12,12 @@ namespace thermocomp::inspection {
 namespace {
 
 /// P = of_plain_facts / (1 + (even / score)^steepness): about half at `even`.
-struct Worth {
+struct ScoreCurve {
   std::string_view kind;
   double even;
   double steepness;
 };
-constexpr std::array<Worth, 8> worths{{
+constexpr std::array<ScoreCurve, 8> score_curves{{
     {"spikes", 1.15, 8},
     {"outliers", 1.15, 8},
     {"sensor_step", 8.0, 6},
@@ -31,9 +31,9 @@ constexpr double of_plain_facts = 0.99;  // coarse, copy, gap, clock: evident in
 
 /// Probability of a score, by kind; docs/inspection.md gives the origin of the constants.
 double probability_of(const std::string& kind, double score) {
-  for (const Worth& worth : worths)
-    if (worth.kind == kind)
-      return of_plain_facts / (1.0 + std::pow(worth.even / std::max(score, 1e-9), worth.steepness));
+  for (const ScoreCurve& curve : score_curves)
+    if (curve.kind == kind)
+      return of_plain_facts / (1.0 + std::pow(curve.even / std::max(score, 1e-9), curve.steepness));
   return of_plain_facts;
 }
 
@@ -97,12 +97,12 @@ Eigen::Index rows_max(std::size_t runs) {
 
 Cleaned without_steps(const std::vector<RunFile>& runs, const std::vector<std::string>& outputs,
                       double probability_min) {
-  std::vector<RunFile> calm;
+  std::vector<RunFile> despiked;
   Suspicions spikes;
   Suspicions steps;
   for (const RunFile& run : runs)
-    check_spikes(calm.emplace_back(selected_part(run, outputs)), calm.size() - 1, spikes);
-  check_changes(make_recording(calm, rows_max(runs.size())), Looked::displacements, steps, {});
+    check_spikes(despiked.emplace_back(selected_part(run, outputs)), despiked.size() - 1, spikes);
+  check_changes(make_recording(despiked, rows_max(runs.size())), Looked::displacements, steps, {});
   Inspection inspection;
   for (Suspicion& each : steps) {
     each.finding.probability = probability_of(each.finding.kind, each.score);
@@ -112,24 +112,24 @@ Cleaned without_steps(const std::vector<RunFile>& runs, const std::vector<std::s
   return cleaned(runs, inspection, probability_min);
 }
 
-Inspection inspect(const std::vector<RunFile>& given, double told_min,
+Inspection inspect(const std::vector<RunFile>& given, double probability_min,
                    const std::function<void(double)>& progress) {
   std::vector<RunFile> runs;
   runs.reserve(given.size());
   for (const RunFile& run : given) runs.push_back(of_machine(run));
   Inspection inspection;
   Suspicions suspicions;
-  std::vector<RunFile> calm = runs;
+  std::vector<RunFile> despiked = runs;
   for (std::size_t i = 0; i < runs.size(); ++i) {
     inspection.runs.push_back(sampling_of(runs[i]));
     check_clock(runs[i], i, inspection.runs.back(), suspicions);
     check_empty(runs[i], i, suspicions);
-    check_spikes(calm[i], i, suspicions);
+    check_spikes(despiked[i], i, suspicions);
   }
   check_values(runs, suspicions);
   for (const Suspicion& each : suspicions)
-    if (each.finding.kind == "stuck") bridge(calm[each.finding.run], each.finding);
-  Recording recording = make_recording(calm, rows_max(runs.size()));
+    if (each.finding.kind == "stuck") bridge(despiked[each.finding.run], each.finding);
+  Recording recording = make_recording(despiked, rows_max(runs.size()));
   inspection.groups = groups_of(recording);
   judge_excitation(recording, inspection);
   check_exchanged(recording, suspicions);
@@ -137,7 +137,7 @@ Inspection inspect(const std::vector<RunFile>& given, double told_min,
   for (Suspicion& each : suspicions) {
     each.finding.score = each.score;
     each.finding.probability = probability_of(each.finding.kind, each.score);
-    if (each.finding.probability < told_min) continue;
+    if (each.finding.probability < probability_min) continue;
     describe(each.finding, runs);
     inspection.findings.push_back(std::move(each.finding));
   }

@@ -11,10 +11,10 @@
 
 namespace thermocomp::inspection {
 
-/// @param told_min  least probability of a listed finding
+/// @param probability_min  least probability of a listed finding
 /// @param progress  called with the completed share of the work; may be empty
 /// @pre given is not empty
-[[nodiscard]] Inspection inspect(const std::vector<RunFile>& given, double told_min = 0.5,
+[[nodiscard]] Inspection inspect(const std::vector<RunFile>& given, double probability_min = 0.5,
                                  const std::function<void(double)>& progress = {});
 
 /// Recording with its faults removed.

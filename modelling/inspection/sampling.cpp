@@ -13,7 +13,7 @@ constexpr double hour_s = 3600.0;
 
 /// The temperatures continue over a row as if no time had passed: each changes by at most five
 /// times its usual change per row.
-bool goes_on(const RunFile& run, std::size_t row) {
+bool continues_over(const RunFile& run, std::size_t row) {
   std::size_t judged = 0;
   for (std::size_t i = 0; i < run.columns.size(); ++i) {
     if (!is_temperature(run.columns[i])) continue;
@@ -125,7 +125,7 @@ void check_clock(const RunFile& run, std::size_t index, const RunSampling& sampl
     const double jump_s = steps[i] - sampling.step_s;
     const double hours = std::round(jump_s / hour_s);
     const bool whole_hours = hours >= 1 && std::abs(jump_s - hours * hour_s) <= 2 * sampling.step_s;
-    const bool set_forward = gap && regular && whole_hours && goes_on(run, i + 1);
+    const bool set_forward = gap && regular && whole_hours && continues_over(run, i + 1);
     // Set back by less than a row.
     const bool set_back = !gap && regular && steps[i] < 0.3 * sampling.step_s;
     if (set_forward || set_back) {

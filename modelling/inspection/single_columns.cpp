@@ -47,7 +47,7 @@ bool others_leap(const RunFile& run, std::size_t column, std::size_t row, double
 }
 
 /// The column returns: it changes by less than the jump.
-bool comes_back(const std::vector<double>& values, std::size_t row, double leap) {
+bool returns(const std::vector<double>& values, std::size_t row, double leap) {
   const auto at = values.begin() + static_cast<std::ptrdiff_t>(row);
   const auto before = static_cast<std::ptrdiff_t>(std::min(half_window, row));
   const auto after = static_cast<std::ptrdiff_t>(std::min(half_window, values.size() - 1 - row));
@@ -83,7 +83,7 @@ void check_leaps(RunFile& run, std::size_t index, std::size_t column, Suspicions
   std::vector<std::size_t> leapt;
   for (std::size_t row = 1; row + 1 < values.size(); ++row) {
     const double leap = leaps[row];
-    if (!(std::abs(leap) > least) || !comes_back(values, row, leap) ||
+    if (!(std::abs(leap) > least) || !returns(values, row, leap) ||
         !(std::abs(leap) > leap_deviations_min * deviation_nearby(leaps, row)) ||
         others_leap(run, column, row, leap))
       continue;

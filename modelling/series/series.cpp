@@ -161,7 +161,7 @@ double widening_of(const std::vector<Evidence>& machines, const Assumed& assumed
                    double noise_time_s) {
   if (machines.size() < 3) return 1.0;
   double left = 0.0;
-  double said = 0.0;
+  double expected = 0.0;
   for (std::size_t i = 0; i < std::min(machines.size(), left_out_max); ++i) {
     std::vector<Evidence> others = machines;
     others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
@@ -169,9 +169,9 @@ double widening_of(const std::vector<Evidence>& machines, const Assumed& assumed
     const double left_of_mean_um = left_um(machines[i], population.mean);
     const Eigen::MatrixXd covariance = population.covariance + population.mean_covariance;
     left += std::max(std::pow(left_of_mean_um, 2.0) - std::pow(population.remainder_um, 2.0), 0.0);
-    said += (covariance * machines[i].xx).trace() / machines[i].time_s;
+    expected += (covariance * machines[i].xx).trace() / machines[i].time_s;
   }
-  return std::max(1.0, left / said);
+  return std::max(1.0, left / expected);
 }
 
 OutputSeries output_series(const std::vector<Statistics>& machines, const std::string& output,

@@ -64,10 +64,10 @@ void check_cooling(const Structure& structure, const HeatModel& heat, RegionFind
     }
   }
   const std::vector<Index> parts = parts_of_nodes(structure.mesh);
-  std::vector<bool> told(structure.mesh.part_names.size(), false);
+  std::vector<bool> reported(structure.mesh.part_names.size(), false);
   for (Index node = 0; node < bodies.size(); ++node) {
-    if (told[parts[node]] || find(bodies[node]) == find(air)) continue;
-    told[parts[node]] = true;
+    if (reported[parts[node]] || find(bodies[node]) == find(air)) continue;
+    reported[parts[node]] = true;
     finder.problem({0, "convection", structure.mesh.part_names[parts[node]]},
                    "no heat can leave this part: it needs a [[convection]] to the room or a joint "
                    "that conducts");

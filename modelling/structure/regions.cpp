@@ -104,7 +104,7 @@ namespace {
 
 constexpr double weight_least = 1e-12;
 
-void say_that_they_do_not_meet(RegionFinder& finder, const JointSpec& joint) {
+void refuse_joint_without_contact(RegionFinder& finder, const JointSpec& joint) {
   finder.problem(joint.from.origin, "the faces of joint " + joint.name +
                                         " are nowhere nearer to each other than gap_mm");
 }
@@ -131,7 +131,7 @@ void tie_faces(RegionFinder& finder, const Mesh& mesh, const JointSpec& joint,
     static_cast<void>(reduction.tie(node, found->nodes));
     met = true;
   }
-  if (!met) say_that_they_do_not_meet(finder, joint);
+  if (!met) refuse_joint_without_contact(finder, joint);
 }
 
 std::vector<Coupling> couplings_between(RegionFinder& finder, const Mesh& mesh,
@@ -150,7 +150,7 @@ std::vector<Coupling> couplings_between(RegionFinder& finder, const Mesh& mesh,
         }
         return true;
       });
-  if (couplings.empty()) say_that_they_do_not_meet(finder, joint);
+  if (couplings.empty()) refuse_joint_without_contact(finder, joint);
   return couplings;
 }
 

@@ -265,9 +265,11 @@ std::string method_part(const TestAnswer& answer) {
     }
     lines.push_back(text + ".");
   }
-  for (const std::string& said : answer.before.said) lines.push_back(said + ".");
-  if (answer.after && answer.after->said != answer.before.said)
-    for (const std::string& said : answer.after->said) lines.push_back("After: " + said + ".");
+  for (const std::string& description : answer.before.description)
+    lines.push_back(description + ".");
+  if (answer.after && answer.after->description != answer.before.description)
+    for (const std::string& description : answer.after->description)
+      lines.push_back("After: " + description + ".");
   return html_heading("How these figures were made") + html_list(lines);
 }
 

@@ -134,8 +134,8 @@ void phases_from_times(const RunFile& run, const std::string& running, TestPhase
     refuse(run, "--running", running,
            "must lie in the record, which is " + std::to_string(phases.from_s) + ":" +
                std::to_string(phases.to_s));
-  phases.said = "It ran from " + hours_text(phases.running_from_s) + " to " +
-                hours_text(phases.running_to_s) + ", as --running says";
+  phases.description = "It ran from " + hours_text(phases.running_from_s) + " to " +
+                       hours_text(phases.running_to_s) + ", as --running says";
 }
 
 void phases_from_column(const RunFile& run, const std::string& column, TestPhases& phases) {
@@ -151,8 +151,8 @@ void phases_from_column(const RunFile& run, const std::string& column, TestPhase
   phases.running_to_s = time_s[last];
   if (!(phases.running_to_s > phases.running_from_s))
     refuse(run, column, "(one row)", "says that it ran for one row alone");
-  phases.said = "It ran from " + hours_text(phases.running_from_s) + " to " +
-                hours_text(phases.running_to_s) + ", as " + column + " says";
+  phases.description = "It ran from " + hours_text(phases.running_from_s) + " to " +
+                       hours_text(phases.running_to_s) + ", as " + column + " says";
 }
 
 /// Column that shows when it ran; empty: given by times.
@@ -184,10 +184,10 @@ void read_speed(const RunFile& run, const std::string& column, TestData& data) {
     largest = std::max(largest, std::abs(values[row]));
   }
   if (data.speed.empty() || kind_of(column) == QuantityKind::position) return;
-  double stands_at = data.speed.front();
+  double steady_speed = data.speed.front();
   for (std::size_t i = 1; i < data.speed.size(); ++i) {
-    if (!(std::abs(data.speed[i] - stands_at) > speed_share * largest)) continue;
-    stands_at = data.speed[i];
+    if (!(std::abs(data.speed[i] - steady_speed) > speed_share * largest)) continue;
+    steady_speed = data.speed[i];
     data.breaks_s.push_back(data.speed_time_s[i]);
   }
 }
@@ -224,7 +224,8 @@ TestData test_data(const RunFile& given, const TestOptions& options) {
   std::vector<std::string> outputs;
   std::copy_if(run.columns.begin(), run.columns.end(), std::back_inserter(outputs),
                [](const std::string& column) { return is_output(column); });
-  for (const Blunders& each : leave_out_blunders(run, outputs)) data.said.push_back(each.text());
+  for (const Blunders& each : leave_out_blunders(run, outputs))
+    data.description.push_back(each.text());
   data.kind = options.kind;
   data.file = run.name;
   data.phases.from_s = run.time_s()[run.selected_begin];
@@ -233,8 +234,8 @@ TestData test_data(const RunFile& given, const TestOptions& options) {
   for (const AxisBinding& binding : bindings) data.axes.push_back(axis_of(run, binding, options));
   add_growths(run, bindings, options, data.axes);
   for (const TestAxis& axis : data.axes)
-    data.said.push_back(axis.name + " is " + axis.from + ", " +
-                        std::to_string(axis.measured.value.size()) + " values");
+    data.description.push_back(axis.name + " is " + axis.from + ", " +
+                               std::to_string(axis.measured.value.size()) + " values");
   data.temperatures = temperatures_of(run, options.room);
   if (options.kind == TestKind::environment) {
     if (!options.running.empty())
@@ -251,7 +252,7 @@ TestData test_data(const RunFile& given, const TestOptions& options) {
     phases_from_column(run, column, data.phases);
     read_speed(run, column, data);
   }
-  data.said.push_back(data.phases.said);
+  data.description.push_back(data.phases.description);
   return data;
 }
 

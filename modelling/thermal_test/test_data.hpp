@@ -45,7 +45,7 @@ struct TestPhases {
   bool runs{false};  ///< false: test of the environment
   double running_from_s{0.0};
   double running_to_s{0.0};
-  std::string said;  ///< sentence on how the phases were found
+  std::string description;  ///< sentence on how the phases were found
 };
 
 struct TestAxis {
@@ -73,8 +73,8 @@ struct TestData {
   std::string speed_name;  ///< empty: no such column
   std::vector<double> speed_time_s;
   std::vector<double> speed;
-  std::vector<double> breaks_s;   ///< times of speed changes
-  std::vector<std::string> said;  ///< interpretation of the columns, one line each
+  std::vector<double> breaks_s;          ///< times of speed changes
+  std::vector<std::string> description;  ///< interpretation of the columns, one line each
 };
 
 /// @throws ConfigurationError naming the file and the option to write

@@ -273,7 +273,7 @@ void CanopenSlave::measure(std::span<const double> temps_degC) {
 }
 
 /// Sends emergency messages like a JUMO CANtrans: when a fault begins or ends, and periodically.
-void CanopenSlave::tell_faults() {
+void CanopenSlave::send_emergencies() {
   if (config_.emergency != EmergencyForm::jumo) return;
   const bool again = now_ >= emergency_at_;
   if (again) emergency_at_ = now_ + emergency_again;
@@ -312,7 +312,7 @@ void CanopenSlave::update(nanoseconds now, std::span<const double> temps_degC) {
     frames_.clear();
     return;
   }
-  tell_faults();
+  send_emergencies();
   measure(temps_degC);
   const bool due = config_.period_s > 0.0 ? now >= pdo_at_ : synced_;
   synced_ = false;

@@ -43,7 +43,7 @@ class CanopenSlave final : public FieldNode {
   [[nodiscard]] Shown shown_of(std::size_t channel) const;
   [[nodiscard]] std::optional<std::int64_t> status_of(std::size_t channel) const;
   void measure(std::span<const double> temps_degC);
-  void tell_faults();
+  void send_emergencies();
   void send_values();
   [[nodiscard]] bool is_now(const NodeEvent& event) const;
   [[nodiscard]] bool happens(NodeEventKind kind) const;

@@ -97,10 +97,10 @@ def clock_jumps(rig):
     rig.note_rows()
     rig.daemon.end()
     run = rig.folder / "run.csv"
-    status, said = rig.tool("export", rig.daemon.history, "-o", run)
-    rig.must(status in (0, 1), f"export after it refuses: {said.strip()[:120]}")
-    status, said = rig.tool("replay", rig.daemon.history, "-o", rig.folder / "out.csv")
-    rig.must(status == 0, f"replay after it: {said.strip()[:120]}")
+    status, output = rig.tool("export", rig.daemon.history, "-o", run)
+    rig.must(status in (0, 1), f"export after it refuses: {output.strip()[:120]}")
+    status, output = rig.tool("replay", rig.daemon.history, "-o", rig.folder / "out.csv")
+    rig.must(status == 0, f"replay after it: {output.strip()[:120]}")
 
 
 @attack(links=("tcp",))

@@ -300,7 +300,7 @@ def bridge_takes_and_does_not(rig):
         if rig.random.random() < 0.2:
             bridge.taking = not bridge.taking
         if not bridge.taking:
-            rig.axis.stands_at(0.0)
+            rig.axis.reports_position(0.0)
         return bridge.params()
     rig.machine.wants_um(WANTED_UM)
     bridge.raw = raw

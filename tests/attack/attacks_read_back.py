@@ -62,7 +62,7 @@ def release_is_needed(rig):
     rig.must(not_driven_from_now_on(rig), "driven again without an operator's release")
 
 
-def run_lie(rig, make, likely):
+def run_wrong_read_back(rig, make, likely):
     """The read-back is false from the start, as after wrong commissioning, or from a time when the
     axis moves: then a factor cannot be distinguished from an additive error."""
     from_the_start = rig.random.random() < 0.5 and rig.machine.link != "piezo"
@@ -108,7 +108,7 @@ LIES = {  # name: (constructor, words of which the reason must contain one; None
 }
 for _name, (_make, _likely) in LIES.items():
     attack(links=(*BUSES, "piezo"), name=_name)(
-        functools.partial(run_lie, make=_make, likely=_likely))
+        functools.partial(run_wrong_read_back, make=_make, likely=_likely))
 
 
 @attack(links=BUSES)
@@ -120,7 +120,7 @@ def takes_nothing(rig):
     rig.machine.wants_um(WANTED_UM)
     rig.must(eventually(lambda: set(rig.daemon.status()["reasons"]) &
                         {"mismatch", "mismatch_latched"}, 10.0), "no mismatch is told")
-    rig.axis.stands_at(rig.axis.position_um)
+    rig.axis.reports_position(rig.axis.position_um)
     rig.axis.obeys = True
     rig.follows_again()
 
@@ -205,7 +205,7 @@ def restarts_while_a_write_is_said_again(rig):
 
 
 @attack(links=BUSES)
-def lies_when_it_is_released(rig):
+def wrong_read_back_at_release(rig):
     """Another false read-back begins right after a latched axis is released."""
     if not rig.start(BEFORE_UM):
         return
@@ -269,7 +269,7 @@ def another_writer_now_and_then(rig):
         # Put back near a recently sent offset, the axis may count as obedient: the daemon continues
         # from its last sent offset. From any other position it must restart there.
         if abs(rig.axis.position_um - rig.axis.writes[-1].value_um) > EXPLAINED_UM:
-            rig.axis.stands_at(rig.axis.position_um)
+            rig.axis.reports_position(rig.axis.position_um)
     rig.follows_again()
 
 
@@ -291,7 +291,7 @@ def home_when_read(axis):
     """Homes at the time of a read, so that no write in transit is judged."""
     def home():
         axis.before_shown = lambda: None
-        axis.stands_at(0.0)
+        axis.reports_position(0.0)
     axis.before_shown = home
     eventually(lambda: axis.told, 5.0)
 

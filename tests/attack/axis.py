@@ -96,7 +96,7 @@ class Axis:
                 self.told.setdefault(writer, (now, collections.deque(maxlen=64)))[1].append(shown_um)
             return shown_um
 
-    def stands_at(self, position_um):
+    def reports_position(self, position_um):
         """The controller has moved by itself, or the previous writer is gone: the next value is
         compared with the position at its next read. A writer of this value continues."""
         with self.lock:

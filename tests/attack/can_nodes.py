@@ -93,7 +93,7 @@ class CanController:
         self.silent = False
 
     def restart(self):
-        self.axis.stands_at(0.0)
+        self.axis.reports_position(0.0)
 
     def drop_links(self):
         pass

@@ -69,7 +69,7 @@ class ModbusController:
         """Power cycle: all registers 0."""
         with self.registers.lock:
             self.registers.clear()
-            self.axis.stands_at(0.0)
+            self.axis.reports_position(0.0)
 
 
 class PiezoAmplifier:
@@ -82,7 +82,7 @@ class PiezoAmplifier:
         self.registers = Registers()
         self.registers.before_read = self.show
         self.registers.after_write = self.written
-        axis.stands_at(CURVE[0][1])
+        axis.reports_position(CURVE[0][1])
 
     def show(self, function, address, count):
         if function == 4 and address <= APPLIED < address + count:

@@ -37,7 +37,7 @@ class RogueBridge:
     def restart(self):
         """LinuxCNC restarted: another session, offset 0."""
         self.session += 1
-        self.axis.stands_at(0.0)
+        self.axis.reports_position(0.0)
 
     def drop_links(self):
         pass

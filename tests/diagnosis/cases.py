@@ -28,7 +28,7 @@ def same(finding, truth):
     return (finding["cause"], finding["subject"]) == (truth["cause"], truth["subject"])
 
 
-def said(answer):
+def summary(answer):
     found = answer["findings"]
     return ", ".join("%s(%s)" % (f["cause"], f["subject"]) for f in found) or answer["verdict"]
 
@@ -68,6 +68,6 @@ def short_campaign(program, examine, level, causes, nulls, wrong_max):
             invented += not truth["hidden"]
             print("  seed %d: %s -> %s" % (task[4], ", ".join(
                 "%s(%s)" % (t["cause"], t["subject"]) for t in truth["hidden"]) or "nothing",
-                said(answer)))
+                summary(answer)))
     print("%d of %d wrong, %d of %d untouched named" % (wrong, len(causes), invented, nulls))
     return 1 if wrong > wrong_max or invented else 0

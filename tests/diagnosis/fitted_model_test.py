@@ -73,7 +73,7 @@ def named_and_gained(program, folder, case):
     truth, answer = examined(program, folder, level, seed, [cause], ridge, offset)
     findings = answer["findings"]
     if not findings or not cases.same(findings[0], truth["hidden"][0]):
-        return "said: " + cases.said(answer)
+        return "said: " + cases.summary(answer)
     rms_um = rms_of_written_um(program, folder)
     for output, said in answer["extended"].items():
         if abs(rms_um[output] - said["test_rms_um"]) > 1e-4 * (1.0 + said["test_rms_um"]):
@@ -95,7 +95,7 @@ def main(program, few):
             folder = pathlib.Path(temporary) / ("silent%d" % number)
             _, answer = examined(program, folder, level, seed, [], ridge, offset)
             failed += any(f["probability"] > STATED for f in answer["findings"])
-            print("%s: nothing hidden, said: %s" % (case, cases.said(answer)))
+            print("%s: nothing hidden, said: %s" % (case, cases.summary(answer)))
     return 1 if failed >= 1 else 0
 
 

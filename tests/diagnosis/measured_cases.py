@@ -130,7 +130,7 @@ def right(finding, truth):
     return finding["cause"] == truth["cause"] and subject_right(finding["subject"], truth)
 
 
-def said(answer):
+def summary(answer):
     found = answer["findings"]
     return ", ".join("%s(%s) %.2f" % (f["cause"], f["subject"], f.get("probability", np.nan))
                      for f in found) or answer["verdict"]

@@ -38,7 +38,7 @@ def main(program):
         elif not (answer["findings"] and measured.right(answer["findings"][0], truth)):
             wrong += 1
         print("%s %s: %s" % (task[2], truth and (truth["cause"], truth["subject"]),
-                             measured.said(answer)))
+                             measured.summary(answer)))
     return 1 if wrong > WRONG_MAX or invented else 0
 
 

@@ -32,7 +32,7 @@ def main(program, few):
         right += fine
         wrong += bool(found) and not fine and found[0]["probability"] > measured.STATED
         print("%s: %s of %s, said: %s" % (kind, truths[0]["cause"], truths[0]["subject"],
-                                          measured.said(answer)))
+                                          measured.summary(answer)))
     print("%d of %d right, %d wrong with confidence" % (right, len(kinds), wrong))
     return 1 if wrong > WRONG_MAX or (not few and right < RIGHT_MIN) else 0
 

@@ -175,7 +175,7 @@ bool FaultSchedule::alone(FaultKind kind, nanoseconds time, nanoseconds since) c
   });
 }
 
-nanoseconds FaultSchedule::quiet_since(nanoseconds time) const noexcept {
+nanoseconds FaultSchedule::fault_free_since(nanoseconds time) const noexcept {
   static_cast<void>(episode_at(time));
   return cursor_ == 0 ? start_ : episodes_[cursor_ - 1].end;
 }

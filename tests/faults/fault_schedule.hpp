@@ -114,7 +114,7 @@ class FaultSchedule {
   /// True if this kind, and no other, was active during all of the last `since`.
   [[nodiscard]] bool alone(FaultKind kind, nanoseconds time, nanoseconds since) const noexcept;
   /// End of the last fault at or before `time`; `start` if there was none.
-  [[nodiscard]] nanoseconds quiet_since(nanoseconds time) const noexcept;
+  [[nodiscard]] nanoseconds fault_free_since(nanoseconds time) const noexcept;
   [[nodiscard]] std::bitset<fault_pairs> pairs() const;
   [[nodiscard]] std::array<std::uint64_t, fault_kinds> counts() const;
 

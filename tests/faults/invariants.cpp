@@ -363,7 +363,8 @@ void Invariants::check_held_displacement(const CycleSeen& seen, std::size_t axis
 void Invariants::check_recovery(const CycleSeen& seen, SimulatedController& controller) {
   if (controller.switched_off(seen.now)) switched_off_last_ = seen.now;
   const nanoseconds limit = from_s(recovery_s_max);
-  const nanoseconds begun = std::max({schedule_.quiet_since(seen.now), boot_, switched_off_last_});
+  const nanoseconds begun =
+      std::max({schedule_.fault_free_since(seen.now), boot_, switched_off_last_});
   const Episode* episode = schedule_.episode_at(seen.now);
   if (seen.now - begun < limit || (episode != nullptr && episode->begin <= seen.now)) return;
   demand(seen.report->mode == Mode::compensating, "recovered_in_time", seen.now, [&] {

@@ -38,8 +38,9 @@ void Invariants::check_move(const CycleSeen& seen, const Move& move,
                       rate_um * period_s_ + 2.0 * resolution_um_ +
                       (has_moved_[move.axis] ? 0.0 : leap_um_[move.axis]);
   // A release may rely on read-backs that were false until 4 s ago.
-  const bool lies = controller.lies(move.at) || controller.lies(move.at - from_s(4.0));
-  if (move.disturbed || lies) budget.disturbed_at = move.at;
+  const bool has_wrong_read_back = controller.has_wrong_read_back(move.at) ||
+                                   controller.has_wrong_read_back(move.at - from_s(4.0));
+  if (move.disturbed || has_wrong_read_back) budget.disturbed_at = move.at;
   if (move.at - budget.disturbed_at < settling) {
     // Any applied offset within the range sent recently is taken for an obeyed one.
     const auto end = budget.reported_um.begin() +
@@ -49,7 +50,7 @@ void Invariants::check_move(const CycleSeen& seen, const Move& move,
   }
   const bool knowable =
       (!move.disturbed || move.seen) && (has_moved_[move.axis] || !is_lost_[move.axis]);
-  if (knowable && !lies)
+  if (knowable && !has_wrong_read_back)
     demand(change_um <= allowed_um, "slew_kept_at_controller", seen.now, [&] {
       return fmt::format("axis {}: told {:.4f} um where {:.4f} is applied, {:.4f} allowed",
                          move.axis, move.to_um, move.from_um, allowed_um);

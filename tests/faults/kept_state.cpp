@@ -48,12 +48,12 @@ std::vector<Command> KeptState::note(const PersistentState& now_is, const Machin
                                      nanoseconds now, bool is_waited_for) {
   PersistentState state = now_is;
   state.controller = controller_identity(shape.controller);
-  std::vector<Command> told;
+  std::vector<Command> saved;
   if (writing_ && writing_->done_at <= now) {
     const Save done = *std::exchange(writing_, std::nullopt);
     if (schedule_.find(FaultKind::history_disk_full, now) == nullptr) {
       write(done.state);
-      told = saved_commands(shape.estimator, on_disk_);
+      saved = saved_commands(shape.estimator, on_disk_);
     }
     if (waiting_) begin(*std::exchange(waiting_, std::nullopt), now);
   }
@@ -66,9 +66,9 @@ std::vector<Command> KeptState::note(const PersistentState& now_is, const Machin
     else
       begin(state, now);
   } else if (!writing_ && is_waited_for) {
-    told = saved_commands(shape.estimator, on_disk_);
+    saved = saved_commands(shape.estimator, on_disk_);
   }
-  return told;
+  return saved;
 }
 
 void KeptState::begin(PersistentState state, nanoseconds now) {

@@ -113,7 +113,7 @@ class Life {
   }
 
   void step(std::uint64_t cycle) {
-    say_faults();
+    print_faults();
     const bool main_works = stall() == nullptr;
     if (main_works) serve();
     daemon_->cycle().step(cycle);
@@ -126,9 +126,9 @@ class Life {
                          &daemon_->link().offered(),
                          &report_,
                          &shape_};
-    if (options_.verbose) remember(seen);
+    if (options_.verbose) record(seen);
     judge_.check(seen, world_.controller.moves(), world_.controller);
-    if (options_.verbose && judge_.broken()) say_last_cycles();
+    if (options_.verbose && judge_.broken()) print_last_cycles();
     if (main_works) save_state();
     if (report_.mode == Mode::compensating) ++result_.compensating;
     ++result_.cycles;
@@ -413,25 +413,25 @@ class Life {
 
   [[nodiscard]] double life_s() const { return to_s(world_.now - life_begin); }
 
-  void say_faults() {
+  void print_faults() {
     if (!options_.verbose) return;
     if (const Episode* episode = schedule_.episode_at(world_.now)) {
       for (const FaultEvent& fault : episode->faults) {
-        if (fault.number <= said_ || fault.begin > world_.now) continue;
-        said_ = fault.number;
+        if (fault.number <= printed_ || fault.begin > world_.now) continue;
+        printed_ = fault.number;
         fmt::print("{:>10.1f} s  {} until {:.1f} s, subject {}\n", to_s(fault.begin - life_begin),
                    name_of(fault.kind), to_s(fault.end - life_begin), fault.subject);
       }
     }
-    if (report_.mode == said_mode_) return;
-    said_mode_ = report_.mode;
+    if (report_.mode == printed_mode_) return;
+    printed_mode_ = report_.mode;
     fmt::print("{:>10.1f} s  mode {}, reasons {:#x}, offsets {:.3f} {:.3f} {:.3f} um\n", life_s(),
                to_string(report_.mode), report_.reasons, report_.axes[0].offset_um,
                report_.axes[1].offset_um, report_.axes[2].offset_um);
   }
 
   /// One cycle per line: reported, applied, sent; printed with a broken invariant.
-  void remember(const CycleSeen& seen) {
+  void record(const CycleSeen& seen) {
     std::string line =
         fmt::format("{:>10.2f} s  {:<15} epoch {}{}", life_s(), to_string(report_.mode),
                     seen.reported->link_epoch, seen.reported->online ? "" : " offline");
@@ -452,7 +452,7 @@ class Life {
     if (last_cycles_.size() > 25) last_cycles_.erase(last_cycles_.begin());
   }
 
-  void say_last_cycles() const {
+  void print_last_cycles() const {
     for (const std::string& line : last_cycles_) fmt::print("{}\n", line);
   }
 
@@ -485,8 +485,8 @@ class Life {
   std::uint64_t last_stall_{0};  ///< the last one ended by the service manager
   std::uint64_t last_reload_{0};
   std::optional<ThermalModel> model_before_;  ///< since a promotion
-  std::uint64_t said_{0};
-  Mode said_mode_{Mode::starting};
+  std::uint64_t printed_{0};
+  Mode printed_mode_{Mode::starting};
   std::vector<std::string> last_cycles_;
   LifeResult result_;
 };

@@ -30,20 +30,20 @@ double Thermocouples::true_degC(std::size_t sensor, nanoseconds time) const noex
 }
 
 /// Sensor that comes loose at a rate that screening accepts, and is pressed back.
-double Thermocouples::lie_K(std::size_t sensor, nanoseconds time) const noexcept {
+double Thermocouples::error_K(std::size_t sensor, nanoseconds time) const noexcept {
   constexpr double rate_K_per_s = 0.3;
-  constexpr double lie_K_max = 4.0;
+  constexpr double error_K_max = 4.0;
   if (!judges_sensors(seed_) || sensor != seed_ / 3 % sensors_count) return 0.0;
   const double in_period_s = std::fmod(to_s(time), 7200.0);
   return std::clamp(rate_K_per_s * std::min(in_period_s - 1800.0, 5400.0 - in_period_s), 0.0,
-                    lie_K_max);
+                    error_K_max);
 }
 
 double Thermocouples::creep_K(std::size_t sensor, nanoseconds at) const noexcept {
   const FaultEvent* drift = schedule_.find(FaultKind::sensor_drifting, at, sensor, sensors_count);
   const double drift_K =
       drift == nullptr ? 0.0 : (drift->strength - 0.5) * 0.05 * to_s(at - drift->begin);
-  return drift_K + lie_K(sensor, at);
+  return drift_K + error_K(sensor, at);
 }
 
 double Thermocouples::plausible_degC(std::size_t sensor, nanoseconds time) const noexcept {
@@ -143,13 +143,13 @@ void Thermocouples::read(std::size_t unit, std::size_t address, std::span<std::u
     if (place.has_status && address + words.size() <= at + 2)
       sample.good = sample.good || whole(sensor, time - status_apart_max) ||
                     whole(sensor, time + status_apart_max);
-    remember(sensor, sample);
+    record(sensor, sample);
   }
   for (std::size_t i = 0; i < words.size(); ++i)
     words[i] = address + i < image.size() ? image[address + i] : std::uint16_t{0};
 }
 
-void Thermocouples::remember(std::size_t sensor, const Sample& sample) noexcept {
+void Thermocouples::record(std::size_t sensor, const Sample& sample) noexcept {
   samples_[sensor][given_[sensor]++ % kept] = sample;
   if (sample.good) last_good_[sensor] = std::max(last_good_[sensor], sample.given_at);
 }
@@ -178,7 +178,7 @@ bool SimulatedController::powered(nanoseconds time) const noexcept {
   return schedule_.find(FaultKind::controller_off, time) == nullptr;
 }
 
-bool SimulatedController::says_cutting(nanoseconds time) const noexcept {
+bool SimulatedController::reports_cutting(nanoseconds time) const noexcept {
   const bool cuts = (time / std::chrono::seconds(1)) % 60 < 40;
   const std::int64_t moment = time / std::chrono::seconds(2);
   const bool wrong = corrects_itself(seed_) &&
@@ -191,7 +191,7 @@ bool SimulatedController::switched_off(nanoseconds time) const noexcept {
   return scramble(seed_ * 31u + static_cast<std::uint64_t>(slot)) % 24 == 0;
 }
 
-bool SimulatedController::lies(nanoseconds time) const noexcept {
+bool SimulatedController::has_wrong_read_back(nanoseconds time) const noexcept {
   static constexpr std::array kinds{FaultKind::controller_applies_other,
                                     FaultKind::read_back_scaled,
                                     FaultKind::read_back_negated,
@@ -206,8 +206,8 @@ bool SimulatedController::lies(nanoseconds time) const noexcept {
 }
 
 /// The active fault of this kind for this axis or all axes.
-const FaultEvent* SimulatedController::lie(FaultKind kind, std::size_t axis,
-                                           nanoseconds time) const {
+const FaultEvent* SimulatedController::read_back_fault(FaultKind kind, std::size_t axis,
+                                                       nanoseconds time) const {
   const FaultEvent* found = schedule_.find(kind, time);
   return found != nullptr && (found->subject % 4 == 3 || found->subject % 4 == axis) ? found
                                                                                      : nullptr;
@@ -216,16 +216,16 @@ const FaultEvent* SimulatedController::lie(FaultKind kind, std::size_t axis,
 /// The read-back of an axis.
 double SimulatedController::shown_um(std::size_t axis, nanoseconds time) {
   double shown = applied_um_[axis];
-  if (const FaultEvent* scaled = lie(FaultKind::read_back_scaled, axis, time))
+  if (const FaultEvent* scaled = read_back_fault(FaultKind::read_back_scaled, axis, time))
     shown *= scaled->strength < 0.5 ? 2.0 : 0.5;
-  if (lie(FaultKind::read_back_negated, axis, time) != nullptr) shown = -shown;
-  if (const FaultEvent* shifted = lie(FaultKind::read_back_shifted, axis, time))
+  if (read_back_fault(FaultKind::read_back_negated, axis, time) != nullptr) shown = -shown;
+  if (const FaultEvent* shifted = read_back_fault(FaultKind::read_back_shifted, axis, time))
     shown += (shifted->strength < 0.5 ? -1.0 : 1.0) * (3.0 + 20.0 * shifted->strength);
-  if (const FaultEvent* drift = lie(FaultKind::read_back_drifting, axis, time))
+  if (const FaultEvent* drift = read_back_fault(FaultKind::read_back_drifting, axis, time))
     shown += (drift->strength - 0.5) * to_s(time - drift->begin);
-  if (const FaultEvent* jumped = lie(FaultKind::read_back_jumped, axis, time))
+  if (const FaultEvent* jumped = read_back_fault(FaultKind::read_back_jumped, axis, time))
     shown += jumped->strength < 0.5 ? -1000.0 : 1000.0;
-  if (const FaultEvent* frozen = lie(FaultKind::read_back_frozen, axis, time)) {
+  if (const FaultEvent* frozen = read_back_fault(FaultKind::read_back_frozen, axis, time)) {
     if (frozen_by_[axis] != frozen->number) frozen_um_[axis] = shown;
     frozen_by_[axis] = frozen->number;
     shown = frozen_um_[axis];
@@ -279,7 +279,7 @@ bool SimulatedController::read(std::size_t address, std::span<std::uint16_t> wor
   if (of_written && !shows_registers(seed_)) return false;
   std::array<std::uint16_t, 9> image{};
   for (std::size_t axis = 0; axis < axes_count; ++axis) {
-    if (const FaultEvent* other = lie(FaultKind::second_writer, axis, time))
+    if (const FaultEvent* other = read_back_fault(FaultKind::second_writer, axis, time))
       disturb(axis, 60.0 * (other->strength - 0.5) + 0.02 * to_s(time - other->begin));
     const double shown = shown_um(axis, time);
     if (floats_) {
@@ -291,7 +291,7 @@ bool SimulatedController::read(std::size_t address, std::span<std::uint16_t> wor
           static_cast<std::uint16_t>(static_cast<std::int16_t>(std::lround(shown * 10.0)));
     }
   }
-  image[6] = says_cutting(time) ? 1 : 0;
+  image[6] = reports_cutting(time) ? 1 : 0;
   image[7] = switched_off(time) ? 1 : 0;
   image[8] = static_cast<std::uint16_t>((time / std::chrono::milliseconds(10)) % 500);  // mm
   for (std::size_t i = 0; i < words.size(); ++i) {
@@ -301,12 +301,12 @@ bool SimulatedController::read(std::size_t address, std::span<std::uint16_t> wor
     if (at >= 200 && at < 200 + written_.size()) words[i] = written_[at - 200];
   }
   // A restart is visible in registers, or as a long absence since the last contact with the daemon.
-  const bool tells =
+  const bool detects_restart =
       reads_back(seed_) || of_written || (!shows_registers(seed_) && restart_is_noticed_);
   is_in_contact_ = true;
-  for (std::size_t axis = 0; tells && axis < axes_count; ++axis)
+  for (std::size_t axis = 0; detects_restart && axis < axes_count; ++axis)
     if (!seen_[axis]) seen_at_[axis] = time;
-  if (tells) seen_.fill(true);
+  if (detects_restart) seen_.fill(true);
   ++reads_since_break_;
   looked_at_ = time;
   return true;
@@ -339,7 +339,8 @@ bool SimulatedController::write(std::size_t address, std::span<const std::uint16
           std::bit_cast<float>(static_cast<std::uint32_t>(written_[at]) << 16 | written_[at + 1]));
     moves_.push_back({axis, time, applied_um_[axis], reported_um, disturbed_[axis], seen_[axis],
                       breaks_, looked_at_, seen_at_[axis]});
-    if (reads_back(seed_) && lie(FaultKind::controller_ignoring, axis, time) != nullptr) {
+    if (reads_back(seed_) &&
+        read_back_fault(FaultKind::controller_ignoring, axis, time) != nullptr) {
       disturb(axis, applied_um_[axis]);
       continue;
     }

@@ -116,7 +116,7 @@ class Thermocouples {
  private:
   static constexpr std::size_t kept = 64;
   [[nodiscard]] double true_degC(std::size_t sensor, nanoseconds time) const noexcept;
-  [[nodiscard]] double lie_K(std::size_t sensor, nanoseconds time) const noexcept;
+  [[nodiscard]] double error_K(std::size_t sensor, nanoseconds time) const noexcept;
   [[nodiscard]] double creep_K(std::size_t sensor, nanoseconds at) const noexcept;
   [[nodiscard]] double through_unit(std::size_t sensor, double temp_degC,
                                     nanoseconds time) const noexcept;
@@ -124,7 +124,7 @@ class Thermocouples {
   /// Neither open nor shorted.
   [[nodiscard]] bool whole(std::size_t sensor, nanoseconds time) const noexcept;
   void put(const UnitPlace& place, std::span<std::uint16_t> value, const Sample& sample) const;
-  void remember(std::size_t sensor, const Sample& sample) noexcept;
+  void record(std::size_t sensor, const Sample& sample) noexcept;
 
   std::uint64_t seed_;
   const FaultSchedule& schedule_;
@@ -170,7 +170,7 @@ class SimulatedController {
 
   [[nodiscard]] bool powered(nanoseconds time) const noexcept;
   /// True if the written, applied and read-back offsets may differ.
-  [[nodiscard]] bool lies(nanoseconds time) const noexcept;
+  [[nodiscard]] bool has_wrong_read_back(nanoseconds time) const noexcept;
   /// A line error or new connection: the device may now be another controller, or a restarted one.
   void link_broke() noexcept {
     ++breaks_;
@@ -178,7 +178,7 @@ class SimulatedController {
   }
   [[nodiscard]] std::uint64_t link_breaks() const noexcept { return breaks_; }
   /// The signal as shown: wrong for two seconds at times if the model learns from probings.
-  [[nodiscard]] bool says_cutting(nanoseconds time) const noexcept;
+  [[nodiscard]] bool reports_cutting(nanoseconds time) const noexcept;
   [[nodiscard]] bool switched_off(nanoseconds time) const noexcept;
   [[nodiscard]] double applied_um(std::size_t axis) const noexcept { return applied_um_[axis]; }
   /// Time of the newest accepted command.
@@ -190,7 +190,8 @@ class SimulatedController {
  private:
   void disturb(std::size_t axis, double applied_um);
   void restart();
-  [[nodiscard]] const FaultEvent* lie(FaultKind kind, std::size_t axis, nanoseconds time) const;
+  [[nodiscard]] const FaultEvent* read_back_fault(FaultKind kind, std::size_t axis,
+                                                  nanoseconds time) const;
   [[nodiscard]] double shown_um(std::size_t axis, nanoseconds time);
   [[nodiscard]] std::size_t words_an_offset() const noexcept { return floats_ ? 2 : 1; }
   /// Index in the written registers (from 200) of an axis's offset, and of the valid bits.

@@ -137,8 +137,8 @@ class Campaign {
     for (std::size_t i = 0; i < fault_kinds; ++i) total_.faults[i] += result.faults[i];
     if (result.broken) note(seed, *result.broken);
     const auto now = Clock::now();
-    if (now - told_ < std::chrono::seconds(2) || options_.verbose) return;
-    told_ = now;
+    if (now - printed_at_ < std::chrono::seconds(2) || options_.verbose) return;
+    printed_at_ = now;
     fmt::print(stderr, "\r{:3.0f} %  {} lives, {:.0f} machine hours, {} broken ",
                100.0 * static_cast<double>(lives_) / static_cast<double>(end_ - first_), lives_,
                total_.machine_hours, broken_);
@@ -147,10 +147,10 @@ class Campaign {
   void note(std::uint64_t seed, const Broken& broken) {
     ++broken_;
     if (!found_ || seed < found_->first) found_ = {seed, broken};
-    if (!options_.expect_found && broken_ <= 12) say(seed, broken);
+    if (!options_.expect_found && broken_ <= 12) print(seed, broken);
   }
 
-  void say(std::uint64_t seed, const Broken& broken) const {
+  void print(std::uint64_t seed, const Broken& broken) const {
     const double at_s = 1e-9 * static_cast<double>(broken.at.count()) - 3600.0;
     fmt::print("BROKEN {} in seed {} at {:.2f} s: {}\n", broken.invariant, seed, at_s,
                broken.detail);
@@ -166,7 +166,7 @@ class Campaign {
   int report_found() const {
     if (!found_) return 1;
     const auto& [seed, broken] = *found_;
-    say(seed, broken);
+    print(seed, broken);
     const double in_life_h = 1e-9 * static_cast<double>(broken.at.count()) / 3600.0 - 1.0;
     fmt::print("FOUND {} {} {:.1f}\n", broken.invariant, seed,
                static_cast<double>(seed - first_) * options_.hours + in_life_h);
@@ -184,7 +184,7 @@ class Campaign {
   std::uint64_t broken_{0};
   std::optional<std::pair<std::uint64_t, Broken>> found_;  ///< the smallest seed of them
   Clock::time_point began_{};
-  Clock::time_point told_{};
+  Clock::time_point printed_at_{};
 };
 
 }  // namespace

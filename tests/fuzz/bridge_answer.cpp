@@ -20,11 +20,11 @@ constexpr double offset_mm_max = 0.5;
 void check_answer(std::string_view line) {
   try {
     const Answer answer = read_answer(line, id, axes, offset_mm_max);
-    FUZZ_PROMISE(answer.offset_mm.size() == axes.size());
+    FUZZ_REQUIRE(answer.offset_mm.size() == axes.size());
     for (const auto& offset_mm : answer.offset_mm)
-      FUZZ_PROMISE(!offset_mm || std::abs(*offset_mm) <= offset_mm_max);
+      FUZZ_REQUIRE(!offset_mm || std::abs(*offset_mm) <= offset_mm_max);
   } catch (const BadAnswer& bad) {
-    FUZZ_PROMISE(*bad.what() != '\0');
+    FUZZ_REQUIRE(*bad.what() != '\0');
   }
 }
 
@@ -40,14 +40,14 @@ void check_request(fuzz::ByteFeed& feed) {
   for (std::size_t i = 0; i < axes.size(); ++i)
     view.axes.push_back({feed.f64(), feed.f64(), feed.f64()});
   const std::string line = request_line(feed.u64(), id, axes, view);
-  FUZZ_PROMISE(line.find('\n') == line.size() - 1);
+  FUZZ_REQUIRE(line.find('\n') == line.size() - 1);
   const json request = json::parse(line, nullptr, false);
-  FUZZ_PROMISE(request.is_object() && request["id"] == id);
+  FUZZ_REQUIRE(request.is_object() && request["id"] == id);
   const json& params = request["params"];
   for (const char* table : {"applied_um", "signals"})
     for (const json& value : params[table])
-      FUZZ_PROMISE(value.is_null() || std::isfinite(value.get<double>()));
-  FUZZ_PROMISE(params["applied_um"].size() == axes.size());
+      FUZZ_REQUIRE(value.is_null() || std::isfinite(value.get<double>()));
+  FUZZ_REQUIRE(params["applied_um"].size() == axes.size());
 }
 
 }  // namespace

@@ -102,16 +102,16 @@ bool deliver(fuzz::ByteFeed& feed, std::size_t& frames, mmsghdr& message) {
 }
 
 void check_frame(const CanFrame& frame, const std::vector<CanSignal>& signals) {
-  FUZZ_PROMISE(frame.size <= (frame.fd ? can_bytes_max : can_classic_bytes_max));
-  FUZZ_PROMISE(frame.id.id <= (frame.id.extended ? 0x1FFFFFFFu : 0x7FFu));
+  FUZZ_REQUIRE(frame.size <= (frame.fd ? can_bytes_max : can_classic_bytes_max));
+  FUZZ_REQUIRE(frame.id.id <= (frame.id.extended ? 0x1FFFFFFFu : 0x7FFu));
   const nanoseconds age = monotonic_now() - frame.received_at;
-  FUZZ_PROMISE(age >= nanoseconds{0} && age <= std::chrono::seconds(10));
+  FUZZ_REQUIRE(age >= nanoseconds{0} && age <= std::chrono::seconds(10));
   for (const CanSignal& signal : signals) {
     if (signal.id != frame.id.id || signal.extended_id != frame.id.extended) continue;
     if (!carries(frame.payload(), signal)) continue;
     const CanValue value = decode(frame.payload(), signal);
-    FUZZ_PROMISE(std::isfinite(value.value) == (value.fault == Fault::none));
-    FUZZ_PROMISE(frame.size >= bytes_needed(signal) || value.fault == Fault::bad_frame);
+    FUZZ_REQUIRE(std::isfinite(value.value) == (value.fault == Fault::none));
+    FUZZ_REQUIRE(frame.size >= bytes_needed(signal) || value.fault == Fault::bad_frame);
   }
 }
 
@@ -125,10 +125,10 @@ class TwoFrames {
     for (std::size_t i = 0; i < ids.size(); ++i)
       if (frame.id == CanId{ids[i], false} && frame.size >= 8) newest_[i] = frame;
     if (taken != CanSetReader::Taken::whole) return;
-    FUZZ_PROMISE(newest_[0].data[7] == newest_[1].data[7]);
-    FUZZ_PROMISE(reader_.number() == newest_[0].data[7]);
+    FUZZ_REQUIRE(newest_[0].data[7] == newest_[1].data[7]);
+    FUZZ_REQUIRE(reader_.number() == newest_[0].data[7]);
     for (std::size_t i = 0; i < ids.size(); ++i)
-      FUZZ_PROMISE(reader_.values()[i] == newest_[i].data[0] + 256.0 * newest_[i].data[1]);
+      FUZZ_REQUIRE(reader_.values()[i] == newest_[i].data[0] + 256.0 * newest_[i].data[1]);
   }
 
  private:
@@ -162,19 +162,19 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   std::size_t delivered = 0;
   const fuzz::VirtualCan bus([&](mmsghdr& message) { return deliver(feed, delivered, message); });
   CanSocket socket("can0", wanted);
-  FUZZ_PROMISE(socket.open() && !socket.bus_off() && socket.error().empty());
+  FUZZ_REQUIRE(socket.open() && !socket.bus_off() && socket.error().empty());
   std::size_t handed_out = 0;
   while (!feed.empty()) {
     const auto frames = socket.receive();
-    FUZZ_PROMISE(frames.size() <= CanSocket::batch_max);
+    FUZZ_REQUIRE(frames.size() <= CanSocket::batch_max);
     handed_out += frames.size();
     for (const CanFrame& frame : frames) {
       check_frame(frame, signals);
       two_frames.take(frame);
     }
-    FUZZ_PROMISE(socket.is_open());
-    FUZZ_PROMISE(!socket.bus_off() || !socket.error().empty());
+    FUZZ_REQUIRE(socket.is_open());
+    FUZZ_REQUIRE(!socket.bus_off() || !socket.error().empty());
   }
-  FUZZ_PROMISE(handed_out + socket.errors().error_frames <= delivered);
+  FUZZ_REQUIRE(handed_out + socket.errors().error_frames <= delivered);
   return 0;
 }

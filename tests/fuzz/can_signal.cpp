@@ -55,12 +55,12 @@ void check_insertion(const CanSignal& signal, std::vector<std::uint8_t> payload,
   const CanBits mask = bits_of(signal);
   for (std::size_t i = 0; i < payload.size(); ++i) {
     const auto own = static_cast<std::uint8_t>(((mask >> (8 * i)) & CanBits(0xFF)).to_ulong());
-    FUZZ_PROMISE(((payload[i] ^ before[i]) & static_cast<std::uint8_t>(~own)) == 0);
+    FUZZ_REQUIRE(((payload[i] ^ before[i]) & static_cast<std::uint8_t>(~own)) == 0);
   }
   const std::uint64_t low =
       signal.length_bits == 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << signal.length_bits) - 1;
-  FUZZ_PROMISE(extract_raw(payload, signal) == (raw & low));
-  FUZZ_PROMISE(mask.count() == static_cast<std::size_t>(signal.length_bits));
+  FUZZ_REQUIRE(extract_raw(payload, signal) == (raw & low));
+  FUZZ_REQUIRE(mask.count() == static_cast<std::size_t>(signal.length_bits));
 }
 
 /// Only a multiplexor within the payload can exclude the signal.
@@ -69,7 +69,7 @@ void check_pages(const CanSignal& signal, const std::vector<std::uint8_t>& paylo
     return payload.size() >= bytes_needed(selector.field);
   };
   const bool any = std::any_of(signal.selectors.begin(), signal.selectors.end(), readable);
-  FUZZ_PROMISE(any || carries(payload, signal));
+  FUZZ_REQUIRE(any || carries(payload, signal));
 }
 
 }  // namespace
@@ -80,24 +80,24 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   try {
     check(signal);
   } catch (const InvalidValue& error) {
-    FUZZ_PROMISE(!error.key().empty() && !error.rule().empty());
+    FUZZ_REQUIRE(!error.key().empty() && !error.rule().empty());
     return 0;
   }
   std::vector<std::uint8_t> payload = feed.take(feed.u8() % (signal.fd ? 65 : 9));
   check_pages(signal, payload);
   const CanValue decoded = decode(payload, signal);
-  FUZZ_PROMISE(std::isfinite(decoded.value) == (decoded.fault == Fault::none));
+  FUZZ_REQUIRE(std::isfinite(decoded.value) == (decoded.fault == Fault::none));
   const bool too_short = payload.size() < bytes_needed(signal);
-  FUZZ_PROMISE(!too_short || decoded.fault == Fault::bad_frame);
+  FUZZ_REQUIRE(!too_short || decoded.fault == Fault::bad_frame);
   // The status signal gives the fault of values that have no fault of their own.
   if (signal.status && !too_short) {
     CanSignal alone = signal;
     alone.status.reset();
-    const Fault told = fault_of(*signal.status, extract_raw(payload, signal.status->field));
+    const Fault reported = fault_of(*signal.status, extract_raw(payload, signal.status->field));
     const Fault own = decode(payload, alone).fault;
-    FUZZ_PROMISE(decoded.fault == (own == Fault::none ? told : own));
+    FUZZ_REQUIRE(decoded.fault == (own == Fault::none ? reported : own));
   }
-  FUZZ_PROMISE(bytes_needed(signal) >= 1 &&
+  FUZZ_REQUIRE(bytes_needed(signal) >= 1 &&
                bytes_needed(signal) <= (signal.fd ? can_bytes_max : can_classic_bytes_max));
   if (too_short) return 0;
 
@@ -105,15 +105,15 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const double any = feed.f64();
   const std::vector<std::uint8_t> before = payload;
   const bool fitted = encode(any, payload, signal);
-  if (std::isnan(any)) FUZZ_PROMISE(!fitted && payload == before);
+  if (std::isnan(any)) FUZZ_REQUIRE(!fitted && payload == before);
   const bool ordinary = std::abs(signal.scale) >= 1e-3 && std::abs(signal.scale) <= 1e3 &&
                         std::abs(signal.offset) <= 1e3 && !signal.is_float;
   if (fitted && ordinary && std::abs(any) < 1e9) {
     signal.sentinels.clear();
     signal.status.reset();
     const CanValue again = decode(payload, signal);
-    FUZZ_PROMISE(again.fault == Fault::none);
-    FUZZ_PROMISE(std::abs(again.value - any) <= 0.5 * resolution(signal) + 1e-6);
+    FUZZ_REQUIRE(again.fault == Fault::none);
+    FUZZ_REQUIRE(std::abs(again.value - any) <= 0.5 * resolution(signal) + 1e-6);
   }
   return 0;
 }

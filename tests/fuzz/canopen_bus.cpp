@@ -61,24 +61,24 @@ CanopenBusConfig configuration(std::uint8_t kind) {
 
 void check_line(CanopenLine& line, nanoseconds now, bool open) {
   for (const Reading& reading : line.readings()) {
-    FUZZ_PROMISE(std::isfinite(reading.temp_degC) == (reading.fault == Fault::none));
-    FUZZ_PROMISE(reading.taken_at <= now);
-    FUZZ_PROMISE(open || reading.fault == Fault::no_answer);
+    FUZZ_REQUIRE(std::isfinite(reading.temp_degC) == (reading.fault == Fault::none));
+    FUZZ_REQUIRE(reading.taken_at <= now);
+    FUZZ_REQUIRE(open || reading.fault == Fault::no_answer);
   }
-  FUZZ_PROMISE(line.raw().size() == line.readings().size());
+  FUZZ_REQUIRE(line.raw().size() == line.readings().size());
   for (const RawReading& raw : line.raw()) {
-    FUZZ_PROMISE(open || (raw.value.empty() && raw.status.empty()));
+    FUZZ_REQUIRE(open || (raw.value.empty() && raw.status.empty()));
   }
   int sent = 0;
   while (const auto frame = line.next_frame()) {
-    FUZZ_PROMISE(open);
-    FUZZ_PROMISE(!frame->id.extended && frame->id.id <= 0x7FF && frame->size <= 8);
-    FUZZ_PROMISE(++sent <= frames_at_once_max);
+    FUZZ_REQUIRE(open);
+    FUZZ_REQUIRE(!frame->id.extended && frame->id.id <= 0x7FF && frame->size <= 8);
+    FUZZ_REQUIRE(++sent <= frames_at_once_max);
   }
   for (const UnitHealth& unit : line.health(now)) {
-    FUZZ_PROMISE(unit.last_error.size() < 200);
-    for (const char c : unit.last_error) FUZZ_PROMISE(c >= 0x20 && c < 0x7F);
-    FUZZ_PROMISE(open || !unit.answering);
+    FUZZ_REQUIRE(unit.last_error.size() < 200);
+    for (const char c : unit.last_error) FUZZ_REQUIRE(c >= 0x20 && c < 0x7F);
+    FUZZ_REQUIRE(open || !unit.answering);
   }
 }
 

@@ -68,10 +68,10 @@ class Daemon {
     check_line(answer);
     // A refused report has changed nothing.
     if (results_ == 0) {
-      FUZZ_PROMISE(state().taken_at == before.taken_at);
-      FUZZ_PROMISE(state().link_epoch == before.link_epoch);
+      FUZZ_REQUIRE(state().taken_at == before.taken_at);
+      FUZZ_REQUIRE(state().link_epoch == before.link_epoch);
     }
-    for (const char c : bridge_.health().last_error) FUZZ_PROMISE(c >= 0x20);
+    for (const char c : bridge_.health().last_error) FUZZ_REQUIRE(c >= 0x20);
   }
 
   void wait() {
@@ -96,31 +96,31 @@ class Daemon {
 
   static void check_line(const Answer& answer) {
     if (answer.text.empty()) return;
-    FUZZ_PROMISE(std::count(answer.text.begin(), answer.text.end(), '\n') == 1);
+    FUZZ_REQUIRE(std::count(answer.text.begin(), answer.text.end(), '\n') == 1);
     const json line = json::parse(answer.text, nullptr, false);
-    FUZZ_PROMISE(line.is_object() && line.contains("result") != line.contains("error"));
-    FUZZ_PROMISE(answer.is_error == line.contains("error"));
+    FUZZ_REQUIRE(line.is_object() && line.contains("result") != line.contains("error"));
+    FUZZ_REQUIRE(answer.is_error == line.contains("error"));
     // No client input causes an internal error.
-    if (answer.is_error) FUZZ_PROMISE(line["error"]["code"] != rpc::internal_error);
+    if (answer.is_error) FUZZ_REQUIRE(line["error"]["code"] != rpc::internal_error);
   }
 
   /// An accepted report and its answer.
   void check_taken(const json& params, const json& result) {
     ++results_;
     const auto session = params["session"].get<std::uint64_t>();
-    FUZZ_PROMISE(session == session_ || session_ == 0 ||
+    FUZZ_REQUIRE(session == session_ || session_ == 0 ||
                  clock_now - taken_at_ > from_seconds(places_.silent_after_s));
     session_ = session;
     taken_at_ = clock_now;
     const auto epoch = result["epoch"].get<std::uint32_t>();
-    FUZZ_PROMISE(epoch >= epoch_ && (result["anew"] == (epoch != epoch_)));
-    FUZZ_PROMISE(state().online && state().taken_at == clock_now && state().link_epoch == epoch);
+    FUZZ_REQUIRE(epoch >= epoch_ && (result["anew"] == (epoch != epoch_)));
+    FUZZ_REQUIRE(state().online && state().taken_at == clock_now && state().link_epoch == epoch);
     if (epoch != epoch_) {
-      stands_um_.clear();
+      applied_um_.clear();
       answered_at_ = clock_now;
     }
     epoch_ = epoch;
-    FUZZ_PROMISE(result["mode"].is_string());
+    FUZZ_REQUIRE(result["mode"].is_string());
     for (std::size_t i = 0; i < places_.axes.size(); ++i) {
       const std::string& axis = places_.axes[i];
       check_offset(params["taking"].get<bool>(), params["applied_um"][axis],
@@ -131,21 +131,21 @@ class Daemon {
   /// The offset continues from the applied or last answered one, at most at the slew limit.
   void check_offset(bool taking, const json& applied, const json& offset) {
     if (!taking || !applied.is_number()) {
-      FUZZ_PROMISE(offset.is_null());
-      stands_um_.clear();
+      FUZZ_REQUIRE(offset.is_null());
+      applied_um_.clear();
       return;
     }
-    stands_um_.push_back(applied.get<double>());
-    if (stands_um_.size() > 64) stands_um_.erase(stands_um_.begin());
+    applied_um_.push_back(applied.get<double>());
+    if (applied_um_.size() > 64) applied_um_.erase(applied_um_.begin());
     if (offset.is_null()) return;
     const LimiterConfig& limiter = config_.estimator.axes[0].limiter;
     const double offset_um = offset.get<double>();
-    FUZZ_PROMISE(std::abs(offset_um) <= limiter.offset_um_max);
-    const auto [low, high] = std::minmax_element(stands_um_.begin(), stands_um_.end());
+    FUZZ_REQUIRE(std::abs(offset_um) <= limiter.offset_um_max);
+    const auto [low, high] = std::minmax_element(applied_um_.begin(), applied_um_.end());
     const double moved_um = limiter.rate_um_per_s_max * seconds_d(clock_now - answered_at_).count();
-    FUZZ_PROMISE(offset_um >= *low - moved_um - rounding_um);
-    FUZZ_PROMISE(offset_um <= *high + moved_um + rounding_um);
-    stands_um_.push_back(offset_um);
+    FUZZ_REQUIRE(offset_um >= *low - moved_um - rounding_um);
+    FUZZ_REQUIRE(offset_um <= *high + moved_um + rounding_um);
+    applied_um_.push_back(offset_um);
     answered_at_ = clock_now;
   }
 
@@ -163,7 +163,7 @@ class Daemon {
   std::uint32_t epoch_{0};
   nanoseconds taken_at_{};
   nanoseconds answered_at_{};
-  std::vector<double> stands_um_;  ///< reported as applied or answered recently
+  std::vector<double> applied_um_;  ///< reported as applied or answered recently
 };
 
 }  // namespace

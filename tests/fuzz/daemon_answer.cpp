@@ -27,7 +27,7 @@ namespace {
 json taken(std::string_view line) {
   const json message = parse_outer_json(line);
   const json copy = message;
-  FUZZ_PROMISE(!copy.dump(-1, ' ', false, json::error_handler_t::replace).empty());
+  FUZZ_REQUIRE(!copy.dump(-1, ' ', false, json::error_handler_t::replace).empty());
   return copy;
 }
 
@@ -60,20 +60,20 @@ void check_gateway(const Status& status, const SensorsAnswer& sensors_answer,
   const ShdrStates states = shdr_states(snapshot);
   std::size_t sensors = 0;
   for (const auto& [item, entries] : states) {
-    FUZZ_PROMISE(!entries.empty());
+    FUZZ_REQUIRE(!entries.empty());
     sensors += item.starts_with("temp_") ? 1u : 0u;
-    for (const char c : item) FUZZ_PROMISE(c == '_' || std::isalnum(static_cast<unsigned char>(c)));
+    for (const char c : item) FUZZ_REQUIRE(c == '_' || std::isalnum(static_cast<unsigned char>(c)));
   }
-  FUZZ_PROMISE(sensors == names_of(sensors_answer.sensors).size());
+  FUZZ_REQUIRE(sensors == names_of(sensors_answer.sensors).size());
   for (const char c : shdr_lines({}, states, 0.0))
-    FUZZ_PROMISE(c == '\n' || static_cast<unsigned char>(c) >= ' ');
+    FUZZ_REQUIRE(c == '\n' || static_cast<unsigned char>(c) >= ' ');
 
   std::set<std::string> topics;
   for (const TopicState& state : topic_states(snapshot, "mill")) {
-    FUZZ_PROMISE(state.topic.find_first_of("+# \n") == std::string::npos);
+    FUZZ_REQUIRE(state.topic.find_first_of("+# \n") == std::string::npos);
     topics.insert(state.topic);
   }
-  FUZZ_PROMISE(topics.size() ==
+  FUZZ_REQUIRE(topics.size() ==
                1 + names_of(sensors_answer.sensors).size() + names_of(status.axes).size());
 }
 
@@ -87,7 +87,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     look_at(status, sensors);
     check_gateway(status, sensors, part_from<EventsAnswer>(answer));
   } catch (const JsonError& error) {
-    FUZZ_PROMISE(*error.what() != '\0');
+    FUZZ_REQUIRE(*error.what() != '\0');
   }
   return 0;
 }

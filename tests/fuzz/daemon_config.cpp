@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "common/fuzz.hpp"
-#include "common/model_promises.hpp"
+#include "common/model_properties.hpp"
 #include "drivers/controllers/kinds/make_controller.hpp"
 #include "drivers/sensors/make_source.hpp"
 #include "estimator/pipeline/estimator.hpp"
@@ -26,9 +26,9 @@ constexpr const char* model_name = "/etc/model.toml";
 
 void make_parts(const DaemonConfig& config) {
   for (const BusConfig& bus : config.buses) {
-    FUZZ_PROMISE(make_source(bus)->health().units.size() == outline_of(bus).units);
+    FUZZ_REQUIRE(make_source(bus)->health().units.size() == outline_of(bus).units);
   }
-  FUZZ_PROMISE(make_controller(config.controller) != nullptr);
+  FUZZ_REQUIRE(make_controller(config.controller) != nullptr);
 }
 
 void step_some(const DaemonConfig& config) {
@@ -52,7 +52,7 @@ void step_some(const DaemonConfig& config) {
     estimator.step(now, readings, controller, command);
     for (std::size_t i = 0; i < config.estimator.axes.size(); ++i) {
       const double bound_um = config.estimator.axes[i].limiter.offset_um_max;
-      FUZZ_PROMISE(std::abs(command.offset_um[i]) <= bound_um);
+      FUZZ_REQUIRE(std::abs(command.offset_um[i]) <= bound_um);
     }
     now += std::chrono::milliseconds(100);
   }
@@ -77,8 +77,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     fuzz::check_problems(error.problems(), files);
     return 0;
   }
-  FUZZ_PROMISE(config.text == config_text && config.model_text == model_text);
-  FUZZ_PROMISE(restart_needed(config, config).empty());
+  FUZZ_REQUIRE(config.text == config_text && config.model_text == model_text);
+  FUZZ_REQUIRE(restart_needed(config, config).empty());
   fuzz::check_steps(config.model);
   make_parts(config);
   step_some(config);

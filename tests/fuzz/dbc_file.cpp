@@ -22,18 +22,18 @@ bool is_flawed(const DbcFile& file, const std::string& message, const std::strin
 }
 
 void check_signal(const DbcMessage& message, const DbcSignal& signal) {
-  FUZZ_PROMISE(!signal.name.empty() && signal.line >= message.line);
+  FUZZ_REQUIRE(!signal.name.empty() && signal.line >= message.line);
   if (message.bytes > can_bytes_max) return;  // configurations that use it are refused
   check(signal.place);
-  FUZZ_PROMISE(bytes_needed(signal.place) <= message.bytes);
-  FUZZ_PROMISE(signal.place.id == message.id && signal.place.extended_id == message.extended);
+  FUZZ_REQUIRE(bytes_needed(signal.place) <= message.bytes);
+  FUZZ_REQUIRE(signal.place.id == message.id && signal.place.extended_id == message.extended);
   std::array<std::uint8_t, can_bytes_max> data{};
   for (std::size_t i = 0; i < data.size(); ++i) data[i] = static_cast<std::uint8_t>(37 * i + 11);
   const std::span<const std::uint8_t> frame(data.data(), message.bytes);
   if (!carries(frame, signal.place)) return;
   const CanValue value = decode(frame, signal.place);
-  FUZZ_PROMISE(std::isfinite(value.value) == (value.fault == Fault::none));
-  FUZZ_PROMISE(value.fault != Fault::bad_frame);
+  FUZZ_REQUIRE(std::isfinite(value.value) == (value.fault == Fault::none));
+  FUZZ_REQUIRE(value.fault != Fault::bad_frame);
 }
 
 }  // namespace
@@ -42,17 +42,17 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::string text(reinterpret_cast<const char*>(data), size);
   constexpr const char* name = "machine.dbc";
   const DbcFile file = read_dbc_text(text, name);
-  FUZZ_PROMISE(file.flaws.size() <= 1001);
+  FUZZ_REQUIRE(file.flaws.size() <= 1001);
   std::vector<Problem> problems;
   for (const DbcFlaw& flaw : file.flaws) problems.push_back(flaw.problem);
   const fuzz::NamedText files[] = {{name, text}};
   if (!problems.empty()) fuzz::check_problems(problems, files);
   for (const DbcMessage& message : file.messages) {
     if (is_flawed(file, message.name, "")) continue;
-    FUZZ_PROMISE(file.find(message.name) == &message);
+    FUZZ_REQUIRE(file.find(message.name) == &message);
     for (const DbcSignal& signal : message.signals) {
       if (is_flawed(file, message.name, signal.name)) continue;
-      FUZZ_PROMISE(message.find(signal.name) == &signal);
+      FUZZ_REQUIRE(message.find(signal.name) == &signal);
       check_signal(message, signal);
     }
   }

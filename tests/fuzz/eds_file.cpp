@@ -17,16 +17,16 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   for (const EdsFlaw& flaw : file.flaws) problems.push_back(flaw.problem);
   const fuzz::NamedText files[] = {{name, text}};
   if (!problems.empty()) fuzz::check_problems(problems, files);
-  FUZZ_PROMISE(!file.objects.empty() || !problems.empty());
+  FUZZ_REQUIRE(!file.objects.empty() || !problems.empty());
   const EdsObject* before = nullptr;
   for (const EdsObject& object : file.objects) {
-    FUZZ_PROMISE(file.find(object.address) == &object);
+    FUZZ_REQUIRE(file.find(object.address) == &object);
     const auto named = file.find(object.name);
-    FUZZ_PROMISE(!named.empty());
-    for (const char c : object.name) FUZZ_PROMISE(c >= 0x20 && c < 0x7F);
-    if (object.type) FUZZ_PROMISE(object.type->length_bits >= 1 && object.type->length_bits <= 64);
+    FUZZ_REQUIRE(!named.empty());
+    for (const char c : object.name) FUZZ_REQUIRE(c >= 0x20 && c < 0x7F);
+    if (object.type) FUZZ_REQUIRE(object.type->length_bits >= 1 && object.type->length_bits <= 64);
     if (before != nullptr) {
-      FUZZ_PROMISE(std::pair(before->address.index, before->address.sub) <
+      FUZZ_REQUIRE(std::pair(before->address.index, before->address.sub) <
                    std::pair(object.address.index, object.address.sub));
     }
     before = &object;

@@ -33,16 +33,16 @@ void judge(const std::vector<std::string_view>& fields) {
                              fields[4], fields[5].size(), 1};
   const std::optional<Refusal> refusal = judge_request(request, hosts);
   if (refusal) {
-    FUZZ_PROMISE(refusal->status >= 400 && refusal->status < 500 && !refusal->text.empty());
+    FUZZ_REQUIRE(refusal->status >= 400 && refusal->status < 500 && !refusal->text.empty());
     return;
   }
   const std::optional<std::string> name = host_name(request.host);
-  FUZZ_PROMISE(name && (*name == "localhost" || *name == "127.0.0.1" || *name == "::1" ||
+  FUZZ_REQUIRE(name && (*name == "localhost" || *name == "127.0.0.1" || *name == "::1" ||
                         *name == "10.0.0.5" || *name == "mill.example"));
-  FUZZ_PROMISE(request.path.front() == '/');
+  FUZZ_REQUIRE(request.path.front() == '/');
   // An accepted origin is the host itself.
   if (!request.origin.empty())
-    FUZZ_PROMISE(request.origin.size() == request.host.size() + 7 ||
+    FUZZ_REQUIRE(request.origin.size() == request.host.size() + 7 ||
                  request.origin.size() == request.host.size() + 8);
 }
 
@@ -50,11 +50,11 @@ void read_history(const std::vector<std::string_view>& fields) {
   std::string why;
   constexpr double now_s = 1.7e9;
   const auto request = parse_history_request(fields[5], fields[6], fields[7], now_s, why);
-  FUZZ_PROMISE(request.has_value() != !why.empty());
+  FUZZ_REQUIRE(request.has_value() != !why.empty());
   if (!request) return;
-  FUZZ_PROMISE(std::isfinite(request->from_s) && std::isfinite(request->to_s));
-  FUZZ_PROMISE(request->from_s >= 0.0 && request->to_s > request->from_s);
-  FUZZ_PROMISE(request->points >= 2 && request->points <= 5000);
+  FUZZ_REQUIRE(std::isfinite(request->from_s) && std::isfinite(request->to_s));
+  FUZZ_REQUIRE(request->from_s >= 0.0 && request->to_s > request->from_s);
+  FUZZ_REQUIRE(request->points >= 2 && request->points <= 5000);
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 /// A history of arbitrary bytes: read, replayed and exported like the commands do.
 #include "common/fuzz.hpp"
-#include "common/history_promises.hpp"
+#include "common/history_properties.hpp"
 
 using namespace thermocomp;
 

@@ -12,7 +12,7 @@
 #include <sqlite3.h>
 
 #include "common/fuzz.hpp"
-#include "common/history_promises.hpp"
+#include "common/history_properties.hpp"
 #include "common/recorded_history.hpp"
 #include "daemon/history/format/chunk_codec.hpp"
 #include "daemon/history/reading/history_reader.hpp"
@@ -62,7 +62,7 @@ constexpr std::array statements{
 class Editor {
  public:
   explicit Editor(const std::filesystem::path& file) {
-    FUZZ_PROMISE(sqlite3_open(file.c_str(), &handle_) == SQLITE_OK);
+    FUZZ_REQUIRE(sqlite3_open(file.c_str(), &handle_) == SQLITE_OK);
     run("PRAGMA synchronous = OFF; PRAGMA journal_mode = MEMORY; BEGIN");
   }
   ~Editor() {
@@ -243,7 +243,7 @@ void check_untouched(const std::filesystem::path& file, const std::vector<std::u
     original.write(good);
     Before found{segments_as_text(original.path()), {}};
     const HistoryCheck check = check_history(original.path(), {}, known_setup);
-    FUZZ_PROMISE(check.is_sound() && check.segments.size() == found.texts.size());
+    FUZZ_REQUIRE(check.is_sound() && check.segments.size() == found.texts.size());
     for (const SegmentCheck& part : check.segments) found.records[part.segment.id] = part.records;
     return found;
   }();
@@ -258,13 +258,14 @@ void check_untouched(const std::filesystem::path& file, const std::vector<std::u
     const std::int64_t id = std::stoll(segment);
     const auto part = std::find_if(check.segments.begin(), check.segments.end(),
                                    [id](const SegmentCheck& of) { return of.segment.id == id; });
-    const bool is_told = std::any_of(check.damage.begin(), check.damage.end(),
-                                     [id](const HistoryDamage& of) { return of.segment == id; });
-    FUZZ_PROMISE(part != check.segments.end() || is_told);
+    const bool is_reported =
+        std::any_of(check.damage.begin(), check.damage.end(),
+                    [id](const HistoryDamage& of) { return of.segment == id; });
+    FUZZ_REQUIRE(part != check.segments.end() || is_reported);
     if (part == check.segments.end()) continue;
     if (!part->damage.empty()) std::fprintf(stderr, "%s\n", to_string(part->damage[0]).c_str());
-    FUZZ_PROMISE(part->damage.empty());
-    FUZZ_PROMISE(part->records == before.records.at(id));
+    FUZZ_REQUIRE(part->damage.empty());
+    FUZZ_REQUIRE(part->records == before.records.at(id));
   }
 }
 
@@ -297,9 +298,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const fuzz::HistoryUse use = fuzz::use_history(file.path(), known_setup);
   check_untouched(file.path(), good);
   if (size == 0) {
-    FUZZ_PROMISE(use.replayed && use.exported);
-    FUZZ_PROMISE(use.summary.compared > 0 && use.summary.different == 0);
-    FUZZ_PROMISE(use.summary.damage.empty());
+    FUZZ_REQUIRE(use.replayed && use.exported);
+    FUZZ_REQUIRE(use.summary.compared > 0 && use.summary.different == 0);
+    FUZZ_REQUIRE(use.summary.damage.empty());
   }
   return 0;
 }

@@ -40,20 +40,20 @@ J1939BusConfig configuration(std::uint8_t kind) {
 
 void check_line(J1939Line& line, nanoseconds now, bool open) {
   for (const Reading& reading : line.readings()) {
-    FUZZ_PROMISE(std::isfinite(reading.temp_degC) == (reading.fault == Fault::none));
-    FUZZ_PROMISE(reading.taken_at <= now);
-    FUZZ_PROMISE(open || reading.fault == Fault::no_answer);
+    FUZZ_REQUIRE(std::isfinite(reading.temp_degC) == (reading.fault == Fault::none));
+    FUZZ_REQUIRE(reading.taken_at <= now);
+    FUZZ_REQUIRE(open || reading.fault == Fault::no_answer);
   }
   int sent = 0;
   while (const auto frame = line.next_frame()) {
-    FUZZ_PROMISE(open);
-    FUZZ_PROMISE(frame->id.extended && frame->id.id <= 0x1FFFFFFF && frame->size <= 8);
-    FUZZ_PROMISE(++sent <= frames_at_once_max);
+    FUZZ_REQUIRE(open);
+    FUZZ_REQUIRE(frame->id.extended && frame->id.id <= 0x1FFFFFFF && frame->size <= 8);
+    FUZZ_REQUIRE(++sent <= frames_at_once_max);
   }
-  FUZZ_PROMISE(!line.address_of(1) || *line.address_of(1) <= address_max);
+  FUZZ_REQUIRE(!line.address_of(1) || *line.address_of(1) <= address_max);
   for (const UnitHealth& unit : line.health(now)) {
-    FUZZ_PROMISE(unit.last_error.size() < 200);
-    for (const char c : unit.last_error) FUZZ_PROMISE(c >= 0x20 && c < 0x7F);
+    FUZZ_REQUIRE(unit.last_error.size() < 200);
+    for (const char c : unit.last_error) FUZZ_REQUIRE(c >= 0x20 && c < 0x7F);
   }
 }
 
@@ -76,8 +76,8 @@ void check_transport(std::span<const std::uint8_t> rest) {
     const auto data = rest.first(8);
     if (data[0] == 32) announced = static_cast<std::size_t>(little_endian(data, 1, 2));
     const auto message = receiver.take(data[0] == 32 ? control : packet, data, 1s);
-    FUZZ_PROMISE(receiver.open_transfers() <= 1);
-    if (message) FUZZ_PROMISE(message->bytes.size() == announced && message->pgn == 0xFF10);
+    FUZZ_REQUIRE(receiver.open_transfers() <= 1);
+    if (message) FUZZ_REQUIRE(message->bytes.size() == announced && message->pgn == 0xFF10);
   }
 }
 

@@ -17,7 +17,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   } catch (const ConfigurationError& error) {
     // The body is another file, which does not exist here; its problems name it.
     std::vector<Problem> problems = error.problems();
-    FUZZ_PROMISE(!problems.empty());
+    FUZZ_REQUIRE(!problems.empty());
     std::erase_if(problems, [&](const Problem& problem) { return problem.file != name; });
     if (problems.empty()) return 0;
     const fuzz::NamedText files[] = {{name, text}};

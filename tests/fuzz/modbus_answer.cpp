@@ -135,17 +135,17 @@ Bytes expected_answer(const Asked& asked) {
 void check_ended(const Exchange& exchange, nanoseconds began, const fuzz::VirtualLine& line) {
   const auto took = line.now() - began;
   // Pause after a late answer (6 s), timeout, draining, and the clock readings.
-  FUZZ_PROMISE(took <= std::chrono::milliseconds(7500));
-  FUZZ_PROMISE(exchange.ok() == (exchange.fault() == Fault::none));
-  FUZZ_PROMISE(exchange.ok() || !exchange.detail.empty());
+  FUZZ_REQUIRE(took <= std::chrono::milliseconds(7500));
+  FUZZ_REQUIRE(exchange.ok() == (exchange.fault() == Fault::none));
+  FUZZ_REQUIRE(exchange.ok() || !exchange.detail.empty());
   const bool is_exception = exchange.outcome == ExchangeOutcome::exception;
-  FUZZ_PROMISE(!is_exception || (exchange.exception_code >= 1 && exchange.exception_code <= 255));
-  FUZZ_PROMISE(is_exception || exchange.exception_code == 0);
+  FUZZ_REQUIRE(!is_exception || (exchange.exception_code >= 1 && exchange.exception_code <= 255));
+  FUZZ_REQUIRE(is_exception || exchange.exception_code == 0);
   if (exchange.ok() || is_exception) {
-    FUZZ_PROMISE(exchange.arrived_at >= exchange.sent_at);
-    FUZZ_PROMISE(exchange.sent_at >= began);
+    FUZZ_REQUIRE(exchange.arrived_at >= exchange.sent_at);
+    FUZZ_REQUIRE(exchange.sent_at >= began);
   }
-  FUZZ_PROMISE(exchange.outcome != ExchangeOutcome::cancelled);
+  FUZZ_REQUIRE(exchange.outcome != ExchangeOutcome::cancelled);
 }
 
 Exchange read_some(ModbusConnection& connection, fuzz::ByteFeed& feed,
@@ -157,11 +157,11 @@ Exchange read_some(ModbusConnection& connection, fuzz::ByteFeed& feed,
   asked.words.assign(std::size_t{1} + feed.u8() % 125, untouched);
   const Exchange exchange = connection.read(asked.unit, asked.table, asked.address, asked.words);
   if (!exchange.ok()) {
-    FUZZ_PROMISE(std::all_of(asked.words.begin(), asked.words.end(),
+    FUZZ_REQUIRE(std::all_of(asked.words.begin(), asked.words.end(),
                              [](std::uint16_t word) { return word == untouched; }));
     return exchange;
   }
-  FUZZ_PROMISE(has_arrived(line, expected_answer(asked)));
+  FUZZ_REQUIRE(has_arrived(line, expected_answer(asked)));
   return exchange;
 }
 
@@ -171,7 +171,7 @@ Exchange write_some(ModbusConnection& connection, fuzz::ByteFeed& feed,
   std::vector<std::uint16_t> words(std::size_t{1} + feed.u8() % 123, 0x1234);
   const Exchange exchange = connection.write_registers(unit, address, words);
   if (exchange.ok()) {
-    FUZZ_PROMISE(has_arrived(
+    FUZZ_REQUIRE(has_arrived(
         line,
         {static_cast<std::uint8_t>(unit), 16, static_cast<std::uint8_t>(address >> 8),
          static_cast<std::uint8_t>(address & 0xFF), 0, static_cast<std::uint8_t>(words.size())}));
@@ -201,7 +201,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   ModbusConnection connection(line_of(is_serial));
   std::vector<Exchange> ended;
   for (int i = 0; i < exchanges_max && !feed.empty(); ++i) {
-    FUZZ_PROMISE(connection.connect());
+    FUZZ_REQUIRE(connection.connect());
     const std::uint8_t what = feed.u8();
     const int unit = 1 + (what >> 2) % 4;
     const nanoseconds began = line.now();
@@ -214,7 +214,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   // Details are static texts, unchanged after later exchanges.
   for (const Exchange& exchange : ended) {
-    FUZZ_PROMISE(exchange.ok() || !exchange.detail.empty());
+    FUZZ_REQUIRE(exchange.ok() || !exchange.detail.empty());
   }
   return 0;
 }

@@ -38,21 +38,21 @@ void check_round_trip(const Decoded& decoded, const NumberFormat& format) {
   const Encoded encoded = encode(decoded.value, format);
   if (encoded.result == EncodeResult::refused) {
     // Fails only if the conversion to a raw value overflows.
-    FUZZ_PROMISE(!std::isfinite((decoded.value - format.offset) / format.scale));
+    FUZZ_REQUIRE(!std::isfinite((decoded.value - format.offset) / format.scale));
     return;
   }
-  FUZZ_PROMISE(encoded.count == registers_of(format.encoding));
+  FUZZ_REQUIRE(encoded.count == registers_of(format.encoding));
   const Decoded again = decode(encoded.words(), format, {});
   if (again.fault == Fault::none) {
-    FUZZ_PROMISE(std::bit_cast<std::uint64_t>(again.value) ==
+    FUZZ_REQUIRE(std::bit_cast<std::uint64_t>(again.value) ==
                  std::bit_cast<std::uint64_t>(encoded.value));
   }
   const bool ordinary = std::abs(format.scale) >= 1e-3 && std::abs(format.scale) <= 1e3 &&
                         std::abs(format.offset) <= 1e3;
   const bool whole = format.encoding != Encoding::float32 && format.encoding != Encoding::float64;
   if (ordinary && whole) {
-    FUZZ_PROMISE(encoded.result == EncodeResult::exact);
-    FUZZ_PROMISE(std::abs(again.value - decoded.value) <= 0.5 * std::abs(format.scale) + 1e-6);
+    FUZZ_REQUIRE(encoded.result == EncodeResult::exact);
+    FUZZ_REQUIRE(std::abs(again.value - decoded.value) <= 0.5 * std::abs(format.scale) + 1e-6);
   }
 }
 
@@ -68,21 +68,21 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   for (std::uint16_t& word : registers) word = is_bit_table(table) ? feed.u8() & 1 : feed.u16();
 
   const Decoded decoded = decode(registers, format, sentinels);
-  FUZZ_PROMISE(std::isfinite(decoded.value) == (decoded.fault == Fault::none));
-  FUZZ_PROMISE(static_cast<std::size_t>(decoded.fault) < faults_count);
+  FUZZ_REQUIRE(std::isfinite(decoded.value) == (decoded.fault == Fault::none));
+  FUZZ_REQUIRE(static_cast<std::size_t>(decoded.fault) < faults_count);
   if (decoded.fault == Fault::none) check_round_trip(decoded, format);
 
   const double any = feed.f64();
   const Encoded encoded = encode(any, format);
-  FUZZ_PROMISE(std::isfinite(any) || encoded.result == EncodeResult::refused);
-  FUZZ_PROMISE((encoded.count == 0) == (encoded.result == EncodeResult::refused));
+  FUZZ_REQUIRE(std::isfinite(any) || encoded.result == EncodeResult::refused);
+  FUZZ_REQUIRE((encoded.count == 0) == (encoded.result == EncodeResult::refused));
 
   ModbusStatus status;
   status.table = table;
   status.mask = feed.u16();
   status.codes = sentinels;
   const Fault fault = decode_status(status, registers[0]);
-  FUZZ_PROMISE(static_cast<std::size_t>(fault) < faults_count);
+  FUZZ_REQUIRE(static_cast<std::size_t>(fault) < faults_count);
   for (const Sentinel& sentinel : sentinels) {
     static_cast<void>(is_representable(sentinel.code, format.encoding));
   }

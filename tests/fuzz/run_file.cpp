@@ -14,27 +14,27 @@ namespace {
 constexpr const char* name = "run.csv";
 
 void check_loaded(const RunFile& run) {
-  FUZZ_PROMISE(run.rows() > 0);
-  FUZZ_PROMISE(run.values.size() == run.columns.size());
+  FUZZ_REQUIRE(run.rows() > 0);
+  FUZZ_REQUIRE(run.values.size() == run.columns.size());
   for (const auto& column : run.values) {
-    FUZZ_PROMISE(column.size() == run.rows());
-    for (const double value : column) FUZZ_PROMISE(!std::isinf(value));
+    FUZZ_REQUIRE(column.size() == run.rows());
+    for (const double value : column) FUZZ_REQUIRE(!std::isinf(value));
   }
   const auto& time_s = run.time_s();
   for (std::size_t i = 0; i < time_s.size(); ++i) {
-    FUZZ_PROMISE(std::isfinite(time_s[i]) && (i == 0 || time_s[i] > time_s[i - 1]));
+    FUZZ_REQUIRE(std::isfinite(time_s[i]) && (i == 0 || time_s[i] > time_s[i - 1]));
   }
-  FUZZ_PROMISE(run.selected_begin < run.selected_end && run.selected_end <= run.rows());
+  FUZZ_REQUIRE(run.selected_begin < run.selected_end && run.selected_end <= run.rows());
 }
 
 void check_written(const RunFile& run) {
   const RunFile again = parse_run(write_run(run), name);
-  FUZZ_PROMISE(again.columns == run.columns && again.rows() == run.rows());
+  FUZZ_REQUIRE(again.columns == run.columns && again.rows() == run.rows());
   for (std::size_t i = 0; i < run.columns.size(); ++i) {
     for (std::size_t row = 0; row < run.rows(); ++row) {
       const double a = run.values[i][row];
       const double b = again.values[i][row];
-      FUZZ_PROMISE(std::isnan(a)
+      FUZZ_REQUIRE(std::isnan(a)
                        ? std::isnan(b)
                        : std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b));
     }
@@ -45,10 +45,10 @@ void check_written(const RunFile& run) {
 RunSelection selection_from(std::string_view text) {
   try {
     const RunSelection selection = parse_selection(text.substr(0, text.find('\n')));
-    FUZZ_PROMISE(selection.from_s < selection.to_s && !selection.file.empty());
+    FUZZ_REQUIRE(selection.from_s < selection.to_s && !selection.file.empty());
     return selection;
   } catch (const ConfigurationError& error) {
-    for (const Problem& problem : error.problems()) FUZZ_PROMISE(!problem.rule.empty());
+    for (const Problem& problem : error.problems()) FUZZ_REQUIRE(!problem.rule.empty());
     return {};
   }
 }
@@ -65,8 +65,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     check_loaded(run);
     check_written(run);
   } catch (const ConfigurationError& error) {
-    FUZZ_PROMISE(!loads);
-    FUZZ_PROMISE(error.problems().size() <= 100);
+    FUZZ_REQUIRE(!loads);
+    FUZZ_REQUIRE(error.problems().size() <= 100);
     fuzz::check_problems(error.problems(), files);
   }
   if (!loads) return 0;

@@ -84,19 +84,19 @@ class Rig {
   }
   /// Every other command is answered one round later.
   RpcPending take(const Command& asked) {
-    FUZZ_PROMISE(asked.axis < config_.estimator.axes.size());
-    FUZZ_PROMISE(std::isfinite(asked.value_um));
+    FUZZ_REQUIRE(asked.axis < config_.estimator.axes.size());
+    FUZZ_REQUIRE(std::isfinite(asked.value_um));
     const double before_um = displacement_um(asked.axis);
     estimator_.apply(asked);
     step();
     const CorrectionConfig& correction = config_.estimator.correction;
     for (std::size_t g = 0; g < correction.groups.size(); ++g) {
       const double gain = report_.axes[asked.axis].correction.gain[g];
-      FUZZ_PROMISE(gain >= correction.gain_min && gain <= correction.gain_max);
+      FUZZ_REQUIRE(gain >= correction.gain_min && gain <= correction.gain_max);
     }
     // A new reference removes the learned bias; before the first prediction there is none.
     if (asked.kind != CommandKind::reference && std::isfinite(before_um))
-      FUZZ_PROMISE(std::abs(displacement_um(asked.axis) - before_um) <=
+      FUZZ_REQUIRE(std::abs(displacement_um(asked.axis) - before_um) <=
                    correction.step_um_max + rise_um_a_step);
     bool later = steps_ % 2 == 0;
     return [later]() mutable -> std::optional<json> {
@@ -139,7 +139,7 @@ class Client {
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
     path.string().copy(address.sun_path, sizeof address.sun_path - 1);
-    FUZZ_PROMISE(connect(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0);
+    FUZZ_REQUIRE(connect(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0);
   }
   ~Client() { close(fd_); }
   Client(const Client&) = delete;
@@ -182,29 +182,29 @@ class Client {
 };
 
 void check_answer(const json& answer) {
-  FUZZ_PROMISE(answer.is_object() && answer.value("jsonrpc", "") == "2.0");
+  FUZZ_REQUIRE(answer.is_object() && answer.value("jsonrpc", "") == "2.0");
   if (answer.contains("method")) {  // a subscription's notification
-    FUZZ_PROMISE(answer.contains("params") && !answer.contains("id"));
+    FUZZ_REQUIRE(answer.contains("params") && !answer.contains("id"));
     return;
   }
-  FUZZ_PROMISE(answer.contains("id"));
-  FUZZ_PROMISE(answer.contains("result") != answer.contains("error"));
+  FUZZ_REQUIRE(answer.contains("id"));
+  FUZZ_REQUIRE(answer.contains("result") != answer.contains("error"));
   if (!answer.contains("error")) return;
   const json& error = answer["error"];
-  FUZZ_PROMISE(error.is_object() && error["code"].is_number_integer());
-  FUZZ_PROMISE(error["message"].is_string() && !error["message"].get<std::string>().empty());
+  FUZZ_REQUIRE(error.is_object() && error["code"].is_number_integer());
+  FUZZ_REQUIRE(error["message"].is_string() && !error["message"].get<std::string>().empty());
   // No client input causes an internal error.
-  FUZZ_PROMISE(error["code"] != rpc::internal_error);
+  FUZZ_REQUIRE(error["code"] != rpc::internal_error);
 }
 
 void check_answers(const std::string& text) {
   std::size_t begin = 0;
   for (std::size_t end = 0; (end = text.find('\n', begin)) != std::string::npos; begin = end + 1) {
     const json answer = json::parse(text.substr(begin, end - begin), nullptr, false);
-    FUZZ_PROMISE(!answer.is_discarded());
+    FUZZ_REQUIRE(!answer.is_discarded());
     check_answer(answer);
   }
-  FUZZ_PROMISE(begin == text.size());
+  FUZZ_REQUIRE(begin == text.size());
 }
 
 void check_next_client(Rig& rig) {
@@ -212,7 +212,7 @@ void check_next_client(Rig& rig) {
   rig.server().handle(milliseconds(0));
   const std::string ask = "{\"jsonrpc\":\"2.0\",\"id\":7,\"method\":\"offsets\"}\n";
   client.send({reinterpret_cast<const std::uint8_t*>(ask.data()), ask.size()}, rig);
-  FUZZ_PROMISE(client.received().find("\"result\"") != std::string::npos);
+  FUZZ_REQUIRE(client.received().find("\"result\"") != std::string::npos);
 }
 
 }  // namespace
@@ -235,7 +235,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     check_answers(client.received());
   }
   for (int i = 0; i < 8; ++i) rig.server().handle(milliseconds(0));
-  FUZZ_PROMISE(rig.server().statistics().clients == 0);
+  FUZZ_REQUIRE(rig.server().statistics().clients == 0);
   if (++inputs % 16 == 0) check_next_client(rig);
   return 0;
 }

@@ -11,7 +11,7 @@ using namespace thermocomp;
 namespace {
 
 void check_numbers(const std::map<std::string, double>& values) {
-  for (const auto& [name, value] : values) FUZZ_PROMISE(std::isfinite(value));
+  for (const auto& [name, value] : values) FUZZ_REQUIRE(std::isfinite(value));
 }
 
 bool same(const PersistentState& a, const PersistentState& b) {
@@ -32,12 +32,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   fallback.enabled = false;
   fallback.offset_um["z"] = 12.5;
   const LoadedState loaded = load_state_file(file.path(), fallback);
-  FUZZ_PROMISE(loaded.found == loaded.warning.empty());
-  FUZZ_PROMISE(loaded.found != loaded.damaged);
+  FUZZ_REQUIRE(loaded.found == loaded.warning.empty());
+  FUZZ_REQUIRE(loaded.found != loaded.damaged);
   if (!loaded.found) {
-    FUZZ_PROMISE(same(loaded.state, fallback) && !loaded.reference_lost);
-    FUZZ_PROMISE(loaded.warning.find(file.path().string()) != std::string::npos);
-    FUZZ_PROMISE(!std::filesystem::exists(file.path()));
+    FUZZ_REQUIRE(same(loaded.state, fallback) && !loaded.reference_lost);
+    FUZZ_REQUIRE(loaded.warning.find(file.path().string()) != std::string::npos);
+    FUZZ_REQUIRE(!std::filesystem::exists(file.path()));
     return 0;
   }
   check_numbers(loaded.state.reference_degC);
@@ -47,9 +47,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   check_numbers(loaded.state.held_degC);
   check_numbers(loaded.state.held_signals);
   check_numbers(loaded.state.correction);
-  FUZZ_PROMISE(save_state_file(copy.path(), loaded.state, loaded.reference_lost).empty());
+  FUZZ_REQUIRE(save_state_file(copy.path(), loaded.state, loaded.reference_lost).empty());
   const LoadedState again = load_state_file(copy.path(), fallback);
-  FUZZ_PROMISE(again.found && same(again.state, loaded.state));
-  FUZZ_PROMISE(again.reference_lost == loaded.reference_lost);
+  FUZZ_REQUIRE(again.found && same(again.state, loaded.state));
+  FUZZ_REQUIRE(again.reference_lost == loaded.reference_lost);
   return 0;
 }

@@ -155,8 +155,8 @@ def rejoin(mill, name, old):
     (mill.cnc.folder / "rejoin.hal").write_text(
         hal_file(WAY, f"--arguments={mill.cnc.bridge_arguments}", "--name", old,
                  "--rejoin", name))
-    status, said = mill.cnc.halcmd("-f", "/mnt/rejoin.hal")
-    assert status == 0, said
+    status, output = mill.cnc.halcmd("-f", "/mnt/rejoin.hal")
+    assert status == 0, output
 
 
 def end_bridge(mill, how, name):

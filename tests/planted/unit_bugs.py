@@ -179,7 +179,7 @@ SUITES = {
         ("heartbeat_stands_still", DIALOGUE,
          "heartbeat_ = (heartbeat_ + 1)", "heartbeat_ = (heartbeat_ + ({P} ? 0 : 1))"),
         ("older_look_is_sent", "drivers/controllers/write_gate.cpp",
-         "command_.look < stands_since_[axis];", "!{P} && command_.look < stands_since_[axis];"),
+         "command_.look < unchanged_since_[axis];", "!{P} && command_.look < unchanged_since_[axis];"),
         ("written_without_leave", DIALOGUE,
          "if (verdict != SendVerdict::send) return;",
          "if (verdict != SendVerdict::send && !{P}) return;"),

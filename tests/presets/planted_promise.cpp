@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "tests/fuzz/common/fuzz.hpp"
-#include "tests/fuzz/common/model_promises.hpp"
+#include "tests/fuzz/common/model_properties.hpp"
 
 using namespace thermocomp;
 

@@ -25,7 +25,7 @@ nanoseconds from_seconds(double seconds) {
 /// A controller with its link: applies valid offsets of its epoch and reports them.
 struct Controller {
   std::array<double, axes_count> applied_um{};
-  std::array<double, axes_count> told_um{};  ///< last read-back in the epoch; NaN: none
+  std::array<double, axes_count> read_back_um{};  ///< last read-back in the epoch; NaN: none
   std::uint32_t epoch{0};
   bool connected{false};
   bool exchanging{false};  ///< reads and writes in this step
@@ -266,7 +266,7 @@ class World {
   void read_controller() {
     state_.taken_at = now_;
     const bool is_first = state_.link_epoch != controller_.epoch;
-    if (is_first) controller_.told_um.fill(not_a_number);
+    if (is_first) controller_.read_back_um.fill(not_a_number);
     reads_in_epoch_ = is_first ? 1 : reads_in_epoch_ + 1;
     state_.link_epoch = controller_.epoch;
     for (std::size_t i = 0; i < axes_count; ++i) {
@@ -279,7 +279,7 @@ class World {
                                              std::numeric_limits<double>::infinity()};
         state_.applied_um[i] = nonsense[link_.below(nonsense.size())];
       }
-      if (std::isfinite(state_.applied_um[i])) controller_.told_um[i] = state_.applied_um[i];
+      if (std::isfinite(state_.applied_um[i])) controller_.read_back_um[i] = state_.applied_um[i];
     }
     state_.signals[0] = link_.one_in(50) ? 1e200 : link_.between(0.0, 8000.0);
     state_.signals[1] = link_.one_in(50) ? not_a_number : link_.between(-100.0, 600.0);
@@ -294,10 +294,10 @@ class World {
       for (Reading& reading : readings)
         reading = {reading.temp_degC > -30 && reading.temp_degC < 200 ? reading.temp_degC : 25.0,
                    now_, Fault::none};
-    ControllerState told = state_;
+    ControllerState reported = state_;
     if (options_.planted == Planted::read_back_hidden)
-      std::copy(before_um_.begin(), before_um_.end(), told.applied_um.begin());
-    estimator_->step(now_, readings, told, command_);
+      std::copy(before_um_.begin(), before_um_.end(), reported.applied_um.begin());
+    estimator_->step(now_, readings, reported, command_);
     estimator_stepped_ = true;
     estimator_->report(report_);
     if (options_.planted == Planted::always_valid) command_.valid.fill(true);
@@ -423,12 +423,12 @@ class World {
            0);
     if (!command_.valid[axis]) return;
     note_started(axis);
-    const double told_um = controller_.told_um[axis];
+    const double read_back_um = controller_.read_back_um[axis];
     demand("first_offset_is_known", "an axis whose position is not known is not driven",
-           controller_.epoch > 0 && std::isfinite(told_um), told_um, 0);
+           controller_.epoch > 0 && std::isfinite(read_back_um), read_back_um, 0);
     demand("first_offset_is_known", "an axis at an impossible position is not driven",
-           !(std::abs(told_um) > offset_um_max_of_any_axis + register_rounding_um), told_um,
-           offset_um_max_of_any_axis);
+           !(std::abs(read_back_um) > offset_um_max_of_any_axis + register_rounding_um),
+           read_back_um, offset_um_max_of_any_axis);
   }
 
   /// The link writes the offsets, unless it has just been lost and reconnected.

@@ -35,9 +35,9 @@ enum class Plant { nothing, allocation, lock, fault, system_call };
 
 /// Estimator with 12 s per cycle: sensors are compared with their neighbours every minute; one of
 /// four is wrong in three of every six hours.
-class LiedTo {
+class WithWrongSensor {
  public:
-  LiedTo() : estimator_(config(), model()), report_(estimator_.make_report()) {
+  WithWrongSensor() : estimator_(config(), model()), report_(estimator_.make_report()) {
     controller_.online = true;
     controller_.written = controller_.online;
     controller_.link_epoch = 1;
@@ -45,10 +45,10 @@ class LiedTo {
   }
   void step(std::uint64_t cycle) noexcept {
     const nanoseconds now = std::chrono::seconds(12) * static_cast<std::int64_t>(cycle);
-    const bool lies = cycle / 900 % 2 == 1;
+    const bool is_wrong = cycle / 900 % 2 == 1;
     for (std::size_t i = 0; i < readings_.size(); ++i)
       readings_[i] = {20.0 + 1e-3 * static_cast<double>((cycle + i) % 100), now, Fault::none};
-    if (lies) readings_[1].temp_degC += 2.0;
+    if (is_wrong) readings_[1].temp_degC += 2.0;
     controller_.taken_at = now;
     estimator_.step(now, readings_, controller_, command_);
     estimator_.report(report_);
@@ -109,7 +109,7 @@ class ProbeSource final : public SensorSource {
       counts = test::end_watch();
       done.store(true);
     }
-    lied_to.step(cycle_);
+    with_wrong_sensor.step(cycle_);
     if (cycle_ == cycles_before + cycles_watched / 2) commit_the_plant();
     for (std::size_t i = 0; i + 1 < all.size(); ++i)
       all[i] = {20.0 + 1e-3 * static_cast<double>((cycle_ + i) % 100), nanoseconds(now()),
@@ -119,7 +119,7 @@ class ProbeSource final : public SensorSource {
     if (cycle_ / 700 % 3 == 2) lose(all.first(sensors - 4));
   }
 
-  LiedTo lied_to;
+  WithWrongSensor with_wrong_sensor;
   std::atomic<bool> done{false};
   test::ThreadCounts counts;
 
@@ -277,7 +277,7 @@ int main(int argc, char** argv) {
     std::printf("the reload or a command was not taken\n");
     return 3;
   }
-  if (!probe.lied_to.was_weighed_down()) {
+  if (!probe.with_wrong_sensor.was_weighed_down()) {
     std::printf("a sensor that lies was not weighed down\n");
     return 3;
   }

@@ -36,8 +36,8 @@ def test_a_tree_that_reads_downwards_passes(tree):
     assert "4 files, 3 folders, 0 wrong" in result.stdout
 
 
-def test_the_floors_are_drawn_highest_first(tree):
-    text = (tree / "scripts" / "floors.md").read_text(encoding="utf-8")
+def test_the_levels_are_drawn_highest_first(tree):
+    text = (tree / "scripts" / "include_levels.md").read_text(encoding="utf-8")
     rows = [line for line in text.splitlines() if line.startswith("| ") and "`" in line]
     assert rows == ["| 3 | `daemon` |", "| 2 | `drivers` |", "| 1 | `estimator` |"]
 
@@ -81,4 +81,4 @@ def test_a_drawing_that_is_not_current_is_found(tree):
     write(tree, "config/units.hpp", "estimator/types.hpp")
     result = run(tree)
     assert result.returncode == 1
-    assert "the floors in scripts/floors.md are not those of the tree" in result.stdout
+    assert "the levels in scripts/include_levels.md are not those of the tree" in result.stdout

@@ -61,16 +61,16 @@ class Machine {
     thread_.join();
   }
   std::atomic<int> applied_counts{0};  ///< first axis, 0.01 um
-  std::atomic<bool> tells_applied{true};
-  std::atomic<bool> tells_speed{true};
+  std::atomic<bool> sends_applied{true};
+  std::atomic<bool> sends_speed{true};
   std::atomic<bool> stopping{false};
 
  private:
   void run() {
     while (!stopping) {
       const int counts = applied_counts;
-      if (tells_applied) bus_.send(0x200, {counts & 0xFF, (counts >> 8) & 0xFF, 0, 0});
-      if (tells_speed) bus_.send(0x201, {0xE0, 0x2E});  // 12000
+      if (sends_applied) bus_.send(0x200, {counts & 0xFF, (counts >> 8) & 0xFF, 0, 0});
+      if (sends_speed) bus_.send(0x201, {0xE0, 0x2E});  // 12000
       std::this_thread::sleep_for(20ms);
     }
   }
@@ -136,7 +136,7 @@ TEST_CASE("no offset is sent before the CAN controller has reported everything",
           "[vm][controller]") {
   Candump dump("vcan0,100:7FF");
   Machine machine("vcan0");
-  machine.tells_speed = false;
+  machine.sends_speed = false;
   CanController link(two_axes("vcan0"));
   Cycle cycle(link);
   cycle.want(0, 1.0);
@@ -144,7 +144,7 @@ TEST_CASE("no offset is sent before the CAN controller has reported everything",
   CHECK_FALSE(cycle.state().online);
   CHECK(dump.text().empty());
   CHECK(link.health().writes == 0);
-  machine.tells_speed = true;
+  machine.sends_speed = true;
   REQUIRE(eventually([&] { return dump.shows("100   [7]  64 00"); }));
 }
 
@@ -156,7 +156,7 @@ TEST_CASE("a silent CAN controller is offline, and its return is a new epoch", "
   REQUIRE(eventually([&] { return link.health().writes > 3; }));
   const std::uint32_t epoch = cycle.state().link_epoch;
   cycle.fixed_epoch = epoch;
-  machine.tells_applied = false;  // the speed frames continue
+  machine.sends_applied = false;  // the speed frames continue
   REQUIRE(eventually([&] { return !cycle.state().online; }));
   const std::string silent = "the controller is silent";
   REQUIRE(eventually([&] { return link.health().last_error == silent; }));
@@ -164,7 +164,7 @@ TEST_CASE("a silent CAN controller is offline, and its return is a new epoch", "
   REQUIRE(eventually([&] { return link.health().reads > frames + 5; }));
   CHECK(link.health().last_error == silent);  // its other frames do not clear that error
   machine.applied_counts = 33;
-  machine.tells_applied = true;
+  machine.sends_applied = true;
   REQUIRE(eventually([&] { return cycle.state().online; }));
   CHECK(cycle.state().link_epoch == epoch + 1);
   CHECK(cycle.state().applied_um[0] == Approx(0.33));
@@ -294,7 +294,7 @@ class Interpolator {
   std::atomic<int> near_counts{0};
   std::atomic<int> far_counts{0};
   std::atomic<int> far_shown_behind{0};  ///< its frame reports an older set, by this number
-  std::atomic<bool> tells{true};
+  std::atomic<bool> reports{true};
   std::atomic<bool> takes_over{true};
   std::atomic<int> valid{-1};
   std::atomic<int> sets{0};    ///< applied
@@ -305,7 +305,7 @@ class Interpolator {
   void run() {
     while (!stopping) {
       while (const auto frame = ear_.receive()) take(*frame);
-      if (tells) {
+      if (reports) {
         const int number = number_in_effect;
         show(near_shown, near_counts, number);
         show(far_shown, far_counts, number - far_shown_behind);

@@ -221,18 +221,18 @@ TEST_CASE("the error state of an interface is reported, with the time it was ent
   CHECK(bus.source.health().state == "active");
   REQUIRE(shell("cansend vcan0 181#0A001400"));
   REQUIRE(bus.becomes(0, 1.0));
-  const auto told = [&](const std::string& frame, const std::string& state) {
+  const auto message = [&](const std::string& frame, const std::string& state) {
     const nanoseconds before = monotonic_now();
     REQUIRE(shell("cansend vcan0 " + frame));
     REQUIRE(eventually([&] { return bus.source.health().state == state; }));
     CHECK(bus.source.health().state_since >= before);
     CHECK(bus.source.health().state_since <= monotonic_now());
   };
-  told("20000004#0004000000000000", "warning");  // RX_WARNING
+  message("20000004#0004000000000000", "warning");  // RX_WARNING
   CHECK(bus.source.health().last_error == "vcan0: error warning");
-  told("20000004#0030000000000000", "passive");  // RX_PASSIVE and TX_PASSIVE
-  told("20000004#0008000000000000", "warning");  // on the way back
-  told("20000004#0040000000000000", "active");
+  message("20000004#0030000000000000", "passive");  // RX_PASSIVE and TX_PASSIVE
+  message("20000004#0008000000000000", "warning");  // on the way back
+  message("20000004#0040000000000000", "active");
   CHECK(bus.source.health().last_error.empty());
   const nanoseconds since = bus.source.health().state_since;
   REQUIRE(shell("cansend vcan0 20000004#0001000000000000"));  // an overflow is not a state

@@ -142,7 +142,7 @@ struct HistoryReader::Parts {
 
   void read(const char* order, std::vector<SegmentInfo>& found);
   void limit_to_chunks(SegmentInfo& segment);
-  [[nodiscard]] bool knows(std::int64_t id, const std::vector<SegmentInfo>& found) const;
+  [[nodiscard]] bool contains(std::int64_t id, const std::vector<SegmentInfo>& found) const;
 
   std::filesystem::path file;
   mutable Database database;
@@ -150,7 +150,7 @@ struct HistoryReader::Parts {
   std::vector<HistoryDamage> damage;
 };
 
-bool HistoryReader::Parts::knows(std::int64_t id, const std::vector<SegmentInfo>& found) const {
+bool HistoryReader::Parts::contains(std::int64_t id, const std::vector<SegmentInfo>& found) const {
   return std::any_of(found.begin(), found.end(),
                      [id](const SegmentInfo& segment) { return segment.id == id; }) ||
          std::any_of(damage.begin(), damage.end(),
@@ -162,7 +162,7 @@ void HistoryReader::Parts::read(const char* order, std::vector<SegmentInfo>& fou
   Statement rows(database, (std::string(columns_of_segment) + order).c_str());
   while (rows.step()) {
     const std::int64_t id = rows.number(0);
-    if (knows(id, found)) return;
+    if (contains(id, found)) return;
     try {
       found.push_back(segment_from(rows));
       limit_to_chunks(found.back());

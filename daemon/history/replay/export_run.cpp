@@ -88,7 +88,7 @@ class RunExport {
     append_header(text_, columns_.names());
     row_.resize(columns_.names().size());
     summary_.damage = reader.damage();
-    tell_damage();
+    report_damage();
   }
 
   ExportSummary run(const Progress& progress) {
@@ -125,7 +125,7 @@ class RunExport {
                          summary_.damage);
       std::uint64_t cycle = 0;
       while (walk.next(cycle)) {
-        tell_damage();
+        report_damage();
         const double time_s = clock_.seconds_at(segment, cycle);
         const std::int64_t wall_ns = walk.wall_ns(cycle);
         const bool is_wanted = !(from_ && is_before(time_s, wall_ns, *from_)) &&
@@ -139,7 +139,7 @@ class RunExport {
     } catch (const std::exception& error) {
       summary_.damage.push_back({segment.id, error.what()});
     }
-    tell_damage();
+    report_damage();
   }
 
   void write(const SegmentInfo& segment, std::uint64_t cycle, double time_s, std::int64_t wall_ns,
@@ -153,7 +153,7 @@ class RunExport {
       text_ += gap;
       if (!gap.empty()) ++summary_.gaps;
     }
-    tell_setup(segment);
+    write_setup(segment);
     last_written_ = &segment;
     text_ += wall_.at(row_[0], wall_ns);
     for (const std::string& what : walk.happened()) text_ += comment_at(row_[0], what);
@@ -163,7 +163,7 @@ class RunExport {
     ++summary_.rows;
   }
 
-  void tell_setup(const SegmentInfo& segment) {
+  void write_setup(const SegmentInfo& segment) {
     if (last_written_ != nullptr && last_written_->setup == segment.setup) return;
     const std::string checksum = reader_.setup(segment).model_checksum;
     text_ += comment_at(row_[0], (last_written_ == nullptr ? "model SHA-256 "
@@ -172,7 +172,7 @@ class RunExport {
                                      checksum);
   }
 
-  void tell_damage() {
+  void report_damage() {
     for (; reported_ < summary_.damage.size(); ++reported_)
       text_ += damage_line(summary_.damage[reported_]);
   }

@@ -95,10 +95,11 @@ std::uint64_t cycles_of(const SegmentInfo& segment) {
 using DamageSink = std::function<void(const HistoryDamage&)>;
 
 ReplaySummary replay_all(const HistoryReader& reader, const ParsedSetups& setups,
-                         const OffsetSink& sink, const DamageSink& tell, const Progress& progress) {
+                         const OffsetSink& sink, const DamageSink& on_damage,
+                         const Progress& progress) {
   ReplaySummary summary;
   const auto note = [&](const HistoryDamage& damage) {
-    if (tell) tell(damage);
+    if (on_damage) on_damage(damage);
     summary.damage.push_back(damage);
   };
   for (const HistoryDamage& damage : reader.damage()) note(damage);
@@ -166,8 +167,8 @@ ReplaySummary replay_to_csv(const std::filesystem::path& history, std::ostream& 
     out << text;
     text.clear();
   };
-  const DamageSink tell = [&](const HistoryDamage& damage) { text += damage_line(damage); };
-  ReplaySummary summary = replay_all(reader, setups, sink, tell, progress);
+  const DamageSink on_damage = [&](const HistoryDamage& damage) { text += damage_line(damage); };
+  ReplaySummary summary = replay_all(reader, setups, sink, on_damage, progress);
   out << text;
   return summary;
 }
@@ -212,13 +213,13 @@ void check_records(const HistoryReader& reader, const EstimatorConfig& config,
   InputsInForce inputs;
   inputs.readings.resize(config.sensors.size());
   Record record;
-  for (bool goes_on = true; goes_on;) {
+  for (bool has_more = true; has_more;) {
     const bool is_sound = is_good(check, [&] {
       for (; cursor.next(record); ++check.records) {
         is_good(check, [&] { check_record(record, config, inputs); });
       }
     });
-    goes_on = !is_sound && cursor.resume();
+    has_more = !is_sound && cursor.resume();
   }
   if (cursor.wall_time_was_impossible()) {
     check.damage.push_back({check.segment.id, "a wall time is impossible (clock set wrong?)"});

@@ -135,7 +135,7 @@ void SegmentExport::fill(std::vector<double>& row, std::uint64_t cycle) {
   fill_inputs(row);
   for (std::size_t i = 0; i < places_.sensors.size(); ++i)
     if (places_.sensors[i] != none) row[places_.sensors[i]] = good_value(inputs_.readings[i]);
-  tell_faults();
+  write_faults();
   for (std::size_t i = 0; i < places_.signals.size(); ++i)
     row[places_.signals[i]] = inputs_.controller.signals[i];
   for (std::size_t i = 0; i < places_.offsets.size(); ++i) {
@@ -332,7 +332,7 @@ Fault SegmentExport::fault_of(std::size_t sensor) const {
   return steps_ ? report_.sensors[sensor].fault : inputs_.readings[sensor].fault;
 }
 
-void SegmentExport::tell_faults() {
+void SegmentExport::write_faults() {
   for (std::size_t i = 0; i < faults_reported_.size(); ++i) {
     const Fault fault = fault_of(i);
     if (fault == faults_reported_[i]) continue;

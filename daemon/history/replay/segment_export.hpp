@@ -86,7 +86,7 @@ class SegmentExport {
   void follow(std::uint64_t cycle);
   void give_up_following(const std::string& why);
   void fill_inputs(std::vector<double>& row);
-  void tell_faults();
+  void write_faults();
   [[nodiscard]] Fault fault_of(std::size_t sensor) const;
 
   SegmentInfo segment_;

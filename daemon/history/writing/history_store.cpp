@@ -452,7 +452,8 @@ void HistoryStore::delete_segment(std::int64_t id) {
   transaction.commit();
 }
 
-void HistoryStore::say_deleted(std::int64_t count, std::int64_t records, const std::string& why) {
+void HistoryStore::report_deleted(std::int64_t count, std::int64_t records,
+                                  const std::string& why) {
   if (count == 0) return;
   deleted_ += static_cast<std::uint64_t>(count);
   news_.push_back(
@@ -480,11 +481,11 @@ void HistoryStore::keep_within_bounds(std::int64_t current_token) {
     (is_old ? old_records : much_records) += oldest.records;
     delete_segment(oldest.id);
   }
-  say_deleted(old_count, old_records,
-              fmt::format("more than {} days were recorded after them (history.age_days_max)",
-                          config_.age_days_max));
-  say_deleted(much_count, much_records,
-              fmt::format("the file reaches {} MB (history.size_MB_max)", config_.size_MB_max));
+  report_deleted(old_count, old_records,
+                 fmt::format("more than {} days were recorded after them (history.age_days_max)",
+                             config_.age_days_max));
+  report_deleted(much_count, much_records,
+                 fmt::format("the file reaches {} MB (history.size_MB_max)", config_.size_MB_max));
   // Free pages are reused; only those beyond the bound are returned.
   if (static_cast<double>(database_->number("PRAGMA page_count")) * page_bytes > bytes_max) {
     database_->run("PRAGMA incremental_vacuum");

@@ -146,7 +146,7 @@ class HistoryStore {
     double age_ns{0.0};
   };
   [[nodiscard]] OldSegment oldest_other_than(std::int64_t current);
-  void say_deleted(std::int64_t count, std::int64_t records, const std::string& why);
+  void report_deleted(std::int64_t count, std::int64_t records, const std::string& why);
 
   HistoryConfig config_;
   std::function<nanoseconds()> wall_clock_;

@@ -120,7 +120,7 @@ void CanopenNode::begin_setup(nanoseconds now) {
   refused_.clear();
   cob_ids_reported_.clear();
   lost_ = false;
-  heard_at_ = now;
+  received_at_ = now;
   lose_all(Fault::no_answer, now);
   jobs_.clear();
   for (std::size_t i = 0; i < writes_.size(); ++i) {
@@ -132,7 +132,7 @@ void CanopenNode::begin_setup(nanoseconds now) {
     jobs_.push_back({Work::ask_count, static_cast<std::size_t>(number), 0});
   }
   // Errors may have been reset without our notice.
-  if (knows_emergencies()) jobs_.push_back({Work::ask_errors, 0, 0});
+  if (supports_emergencies()) jobs_.push_back({Work::ask_errors, 0, 0});
   phase_ = Phase::setting_up;
   // Some nodes refuse settings while operational.
   if (!writes_.empty() && starts_) command(command_pre_operational);
@@ -254,7 +254,7 @@ void CanopenNode::setup_done(nanoseconds now) {
   phase_ = Phase::running;
   setup_error_.clear();
   retry_pause_ = first_pause;
-  heard_at_ = now;
+  received_at_ = now;
   start_again_at_ = now + start_again_every;
   if (starts_) command(command_start);
   watched_.clear();
@@ -275,7 +275,7 @@ void CanopenNode::setup_done(nanoseconds now) {
   }
 }
 
-bool CanopenNode::knows_emergencies() const {
+bool CanopenNode::supports_emergencies() const {
   return std::any_of(channels_.begin(), channels_.end(), [](const CanopenChannel& channel) {
     return channel.emergency_channel != 0 || !channel.emergency_codes.empty();
   });
@@ -303,7 +303,7 @@ void CanopenNode::take_heartbeat(std::span<const std::uint8_t> data, nanoseconds
     return;
   }
   if (phase_ == Phase::closed) return;
-  heard_at_ = at;
+  received_at_ = at;
   good_at_ = at;
   const auto state = static_cast<std::uint8_t>(data[0] & ~toggle_bit);
   if (state == state_boot_up) {
@@ -504,7 +504,7 @@ void CanopenNode::take_result(nanoseconds now) {
 void CanopenNode::watch_heartbeat(nanoseconds now) {
   const nanoseconds timeout = from_seconds(config_.heartbeat_timeout_s);
   if (timeout == nanoseconds{0} || lost_ || phase_ != Phase::running) return;
-  if (now - heard_at_ <= timeout) return;
+  if (now - received_at_ <= timeout) return;
   lost_ = true;
   client_.cancel();
   forget_poll();

@@ -130,7 +130,7 @@ class CanopenNode {
   void watch_duplicates(nanoseconds now);
   void renew_pdos(nanoseconds at);
   void command(std::uint8_t what);
-  [[nodiscard]] bool knows_emergencies() const;
+  [[nodiscard]] bool supports_emergencies() const;
   void forget_emergencies();
   void show(std::size_t channel, const CanValue& decoded, nanoseconds at);
   void lose(std::size_t channel, Fault fault, nanoseconds at);
@@ -160,7 +160,7 @@ class CanopenNode {
   std::vector<std::uint32_t> cob_ids_reported_;
   nanoseconds retry_at_{};
   nanoseconds retry_pause_;
-  nanoseconds heard_at_{};  ///< last heartbeat, or start of the wait for it
+  nanoseconds received_at_{};  ///< last heartbeat, or start of the wait for it
   nanoseconds start_again_at_{};
   bool lost_{false};
   RateWatch heartbeats_;

@@ -9,7 +9,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::size_t candidates_told = 3;
+constexpr std::size_t candidates_reported = 3;
 
 Json number(double value) {
   return std::isfinite(value) ? Json(value) : Json(nullptr);
@@ -106,7 +106,7 @@ Json candidate_json(const Candidate& of, const std::string& unit, bool in_full) 
 Json weighed_json(const Diagnosis& diagnosis, bool in_full) {
   Json all = Json::array();
   for (const Candidate& each : diagnosis.weighed) {
-    if (!in_full && all.size() >= candidates_told) break;
+    if (!in_full && all.size() >= candidates_reported) break;
     all.push_back(candidate_json(each, diagnosis.unit, in_full));
   }
   return all;

@@ -57,14 +57,14 @@ struct CauseParameter {
   /// What is physically possible, in this unit.
   double low{-std::numeric_limits<double>::infinity()};
   double high{std::numeric_limits<double>::infinity()};
-  std::string_view says;  ///< before the value
+  std::string_view description;  ///< before the value
   bool of_a_jump{false};  ///< recognised by a jump: nothing else that a machine does looks like it
 };
 
 /// What it says to the machine's owner.
 struct CauseTexts {
   std::string_view title;
-  std::string_view says;  ///< continues "SUBJECT: "
+  std::string_view description;  ///< continues "SUBJECT: "
   std::string_view to_do;
 };
 

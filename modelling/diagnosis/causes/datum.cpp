@@ -117,8 +117,9 @@ std::vector<Parameter> amplitude(const FoundGains& found) {
 /// A sine unrelated to any input, its phase another one in every run: a cooler's or a room's cycle.
 Cause periodic_disturbance() {
   Cause cause{"periodic_disturbance", "datum"};
-  cause.parameters = {{.name = "period_s", .unit = "s", .low = 0.0, .says = "period"},
-                      {.name = "amplitude_um", .unit = "um", .low = 0.0, .says = "amplitude"}};
+  cause.parameters = {
+      {.name = "period_s", .unit = "s", .low = 0.0, .description = "period"},
+      {.name = "amplitude_um", .unit = "um", .low = 0.0, .description = "amplitude"}};
   cause.texts = {"A cycle of its own", "a cycle of its own, which no temperature here explains",
                  "Look for what switches with this period: a cooler, a pump, the room's "
                  "ventilation."};
@@ -154,9 +155,9 @@ Cause displacement_step() {
   Cause cause{"displacement_step", "datum"};
   cause.parameters = {{.name = "at_s",
                        .unit = "s",
-                       .says = "from the start of the recording on",
+                       .description = "from the start of the recording on",
                        .of_a_jump = true},
-                      {.name = "step_um", .unit = "um", .says = "jump", .of_a_jump = true}};
+                      {.name = "step_um", .unit = "um", .description = "jump", .of_a_jump = true}};
   cause.texts = {
       "The datum jumped", "the datum of the displacement jumped once",
       "Do not fit to this run across the jump; look whether the probe was touched or set again."};
@@ -180,7 +181,7 @@ std::vector<Hypothesis> displacement_drift_hypotheses(const Material& material,
 /// The datum creeps through a whole run.
 Cause displacement_drift() {
   Cause cause{"displacement_drift", "datum"};
-  cause.parameters = {{.name = "rate_um_per_h", .unit = "um/h", .says = "creep"}};
+  cause.parameters = {{.name = "rate_um_per_h", .unit = "um/h", .description = "creep"}};
   cause.texts = {"The datum creeps", "the datum of the displacement creeps through the whole run",
                  "Do not fit to this run; look at the probe, its holder and its amplifier's "
                  "warm-up."};

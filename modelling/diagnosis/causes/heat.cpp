@@ -96,11 +96,11 @@ Cause missing_heat_source() {
   cause.parameters = {
       tau,
       power,
-      {.name = "gain_um_per_unit", .unit = "um/?", .says = "effect"},
-      {.name = "gain_um_per_K", .unit = "um/K", .says = "effect of the room"},
+      {.name = "gain_um_per_unit", .unit = "um/?", .description = "effect"},
+      {.name = "gain_um_per_K", .unit = "um/K", .description = "effect of the room"},
       // Of the thermal layer.
-      {.name = "heat_W", .unit = "W", .low = 0.0, .says = "heat"},
-      {.name = "at", .unit = "1", .low = 0.0, .says = "at a signal of"},
+      {.name = "heat_W", .unit = "W", .low = 0.0, .description = "heat"},
+      {.name = "at", .unit = "1", .low = 0.0, .description = "at a signal of"},
   };
   cause.texts = {"Heat that no sensor sees",
                  "the machine goes on moving after this signal changes: heat that no sensor sees",
@@ -131,7 +131,7 @@ std::vector<Hypothesis> speed_growth_hypotheses(const Material& material, const 
 /// c u^2 without lag: centrifugal growth, or the seat of a bearing.
 Cause speed_growth() {
   Cause cause{"speed_growth", "heat"};
-  cause.parameters = {{.name = "gain_um_per_unit2", .unit = "um/?^2", .says = "effect"}};
+  cause.parameters = {{.name = "gain_um_per_unit2", .unit = "um/?^2", .description = "effect"}};
   cause.texts = {"Growth with speed, not with heat",
                  "the displacement jumps with the square of this signal",
                  "Use the extended model; this part is not thermal and no sensor will show it."};

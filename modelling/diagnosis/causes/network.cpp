@@ -84,7 +84,7 @@ bool wrong_heat_source_into_machine(MachineFile& machine, const std::string& sub
 /// A source gives another heat for its signal.
 Cause wrong_heat_source() {
   Cause cause{"wrong_heat_source", "heat"};
-  cause.parameters = {source_factor, {.name = "heat_W", .unit = "W", .says = "heat"}};
+  cause.parameters = {source_factor, {.name = "heat_W", .unit = "W", .description = "heat"}};
   cause.texts = {
       "A source gives another heat", "this source gives another heat than the thermal model says",
       "Put the new heat_W into the thermal model; look at preload, load and speed of what warms."};
@@ -107,8 +107,8 @@ Cause wrong_film_coefficient() {
   Cause cause{"wrong_film_coefficient", "structure"};
   cause.parameters = {
       factor_of_part,
-      {.name = "room_W_per_K", .unit = "W/K", .low = 0.0, .says = "to the air"},
-      {.name = "coolant_W_per_K", .unit = "W/K", .low = 0.0, .says = "to the coolant"},
+      {.name = "room_W_per_K", .unit = "W/K", .low = 0.0, .description = "to the air"},
+      {.name = "coolant_W_per_K", .unit = "W/K", .low = 0.0, .description = "to the coolant"},
   };
   cause.texts = {
       "Air or coolant takes another heat",
@@ -133,7 +133,7 @@ Cause wrong_conductance() {
   Cause cause{"wrong_conductance", "structure"};
   cause.parameters = {
       factor_of_part,
-      {.name = "conductance_W_per_K", .unit = "W/K", .low = 0.0, .says = "conducts"},
+      {.name = "conductance_W_per_K", .unit = "W/K", .low = 0.0, .description = "conducts"},
   };
   cause.texts = {
       "A joint conducts otherwise", "this joint conducts otherwise than the thermal model says",
@@ -157,7 +157,7 @@ Cause wrong_heat_capacity() {
   Cause cause{"wrong_heat_capacity", "structure"};
   cause.parameters = {
       factor_of_part,
-      {.name = "capacity_J_per_K", .unit = "J/K", .low = 0.0, .says = "stores"},
+      {.name = "capacity_J_per_K", .unit = "J/K", .low = 0.0, .description = "stores"},
   };
   cause.texts = {
       "A place stores another heat", "this place stores another heat than the thermal model says",

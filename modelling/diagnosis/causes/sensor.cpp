@@ -101,9 +101,9 @@ Cause sensor_step() {
   Cause cause{"sensor_step", "sensor"};
   cause.parameters = {{.name = "at_s",
                        .unit = "s",
-                       .says = "from the start of the recording on",
+                       .description = "from the start of the recording on",
                        .of_a_jump = true},
-                      {.name = "step_K", .unit = "K", .says = "jump", .of_a_jump = true}};
+                      {.name = "step_K", .unit = "K", .description = "jump", .of_a_jump = true}};
   cause.texts = {
       "A reading jumped", "this reading jumped and stayed",
       "Look at the connector and the amplifier's channel; leave the run out of any fit."};
@@ -142,8 +142,8 @@ std::vector<NetworkHypothesis> sensor_drift_in_network(const NetworkMaterial& ma
 /// A reading creeps in a run.
 Cause sensor_drift() {
   Cause cause{"sensor_drift", "sensor"};
-  cause.parameters = {{.name = "start_s", .unit = "s", .says = "creeps from"},
-                      {.name = "rate_K_per_h", .unit = "K/h", .says = "creep"}};
+  cause.parameters = {{.name = "start_s", .unit = "s", .description = "creeps from"},
+                      {.name = "rate_K_per_h", .unit = "K/h", .description = "creep"}};
   cause.texts = {"A reading creeps",
                  "this reading creeps away from what its neighbours and the displacement say",
                  "Replace or calibrate the sensor; leave the run out of any fit."};
@@ -197,13 +197,13 @@ Cause sensor_loose() {
   Cause cause{"sensor_loose", "sensor"};
   cause.parameters = {{.name = "at_s",
                        .unit = "s",
-                       .says = "from the start of the recording on",
+                       .description = "from the start of the recording on",
                        .of_a_jump = true},
                       {.name = "gain",
                        .unit = "1",
                        .low = kept(lost_max),
                        .high = kept(lost_min),
-                       .says = "of its motion left:"}};
+                       .description = "of its motion left:"}};
   cause.texts = {"A sensor has come loose",
                  "from a time on this sensor shows more of the room than of its place",
                  "Fasten the sensor; leave the rest of the run out of any fit."};
@@ -218,7 +218,7 @@ Hypothesis exchanged(const Material& material, std::size_t input, std::size_t ot
   Hypothesis swap{data.model.inputs[input] + "|" + data.model.inputs[other], Form::no_gain};
   swap.columns = [&material, &data, input, other](const Shapes&, std::size_t output) {
     return material.stacked([&](const MeasuredRun& run) -> Panel {
-      const Panel more_K = run.calm_inputs_K[other] - run.calm_inputs_K[input];
+      const Panel more_K = run.denoised_inputs_K[other] - run.denoised_inputs_K[input];
       return answer_to_errors(data, run, output, input, more_K) +
              answer_to_errors(data, run, output, other, -more_K);
     });

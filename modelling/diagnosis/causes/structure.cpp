@@ -22,7 +22,8 @@ std::vector<Hypothesis> wrong_coefficient_hypotheses(const Material& material,
 /// dK T: the coefficient of a place is off by dK.
 Cause wrong_coefficient() {
   Cause cause{"wrong_coefficient", "structure"};
-  cause.parameters = {{.name = "delta_um_per_K", .unit = "um/K", .says = "the coefficient lacks"}};
+  cause.parameters = {
+      {.name = "delta_um_per_K", .unit = "um/K", .description = "the coefficient lacks"}};
   cause.texts = {
       "The effect of a place has another size",
       "the model moves by the wrong amount for each kelvin of this place",
@@ -68,7 +69,7 @@ std::vector<Hypothesis> thermal_lag_hypotheses(const Material& material, const S
 /// g (LP(T) - T), 0 < g / K <= 1: a share of the structure follows late.
 Cause thermal_lag() {
   Cause cause{"thermal_lag", "structure"};
-  cause.parameters = {lag_tau, {.name = "gain_um_per_K", .unit = "um/K", .says = "effect"}};
+  cause.parameters = {lag_tau, {.name = "gain_um_per_K", .unit = "um/K", .description = "effect"}};
   cause.texts = {
       "Part of the structure follows late", "a part of the structure follows this temperature late",
       "Use the extended model; a sensor deeper in the slow part would make it unnecessary."};
@@ -100,7 +101,8 @@ std::vector<Hypothesis> missing_temperature_hypotheses(const Material& material,
 /// K LP(T) of a place that the model does not use; missing_tau = 0: K T.
 Cause missing_temperature() {
   Cause cause{"missing_temperature", "structure"};
-  cause.parameters = {missing_tau, {.name = "gain_um_per_K", .unit = "um/K", .says = "effect"}};
+  cause.parameters = {missing_tau,
+                      {.name = "gain_um_per_K", .unit = "um/K", .description = "effect"}};
   cause.texts = {
       "A measured place that the model leaves out",
       "a measured place that the model ignores moves the machine",
@@ -124,7 +126,7 @@ std::vector<Hypothesis> nonlinear_expansion_hypotheses(const Material& material,
 /// c T^2.
 Cause nonlinear_expansion() {
   Cause cause{"nonlinear_expansion", "structure"};
-  cause.parameters = {{.name = "gain_um_per_K2", .unit = "um/K^2", .says = "curvature"}};
+  cause.parameters = {{.name = "gain_um_per_K2", .unit = "um/K^2", .description = "curvature"}};
   cause.texts = {
       "The effect of a temperature is curved", "the effect of this temperature is curved",
       "Use the extended model; beyond the temperatures seen here the curve is not known."};
@@ -188,8 +190,8 @@ std::vector<Parameter> gains_along(const FoundGains& found) {
 Cause position_dependence() {
   Cause cause{"position_dependence", "structure"};
   cause.parameters = {
-      {.name = "gain_um_per_K_mm", .unit = "um/(K mm)", .says = "effect along the axis"},
-      {.name = "p0_mm", .unit = "mm", .says = "none at"}};
+      {.name = "gain_um_per_K_mm", .unit = "um/(K mm)", .description = "effect along the axis"},
+      {.name = "p0_mm", .unit = "mm", .description = "none at"}};
   cause.texts = {"The effect grows along the axis",
                  "the effect of this temperature grows along the axis",
                  "Use the extended model, or give the model a guideway along this axis."};
@@ -276,8 +278,8 @@ Cause start_dependence() {
   Cause cause{"start_dependence", "structure"};
   cause.parameters = {start_tau,
                       at_start,
-                      {.name = "gain_um_per_unit_K", .unit = "um/(? K)", .says = "effect"},
-                      {.name = "place0_degC", .unit = "degC", .says = "none at"}};
+                      {.name = "gain_um_per_unit_K", .unit = "um/(? K)", .description = "effect"},
+                      {.name = "place0_degC", .unit = "degC", .description = "none at"}};
   cause.texts = {"An effect depends on how the day began",
                  "its effect depends on the second temperature: where that stood at the start, or "
                  "stands now",
@@ -360,7 +362,7 @@ std::vector<Hypothesis> play_of_input(const Material& material, const Subject& s
   play.columns = [&material, input = subject.index](const Shapes& shapes, std::size_t output) {
     return material.stacked([&](const MeasuredRun& run) {
       return answer_to_errors(material.data(), run, output, input,
-                              played_less_values(run.calm_inputs_K[input], firsts_of(shapes)));
+                              played_less_values(run.denoised_inputs_K[input], firsts_of(shapes)));
     });
   };
   return {std::move(play)};
@@ -378,7 +380,7 @@ std::vector<Hypothesis> play_of_output(const Material& material, const Subject& 
   play.output = subject.index;
   play.columns = [&material, model_um](const Shapes& shapes, std::size_t) {
     return material.stacked([&](const MeasuredRun& run) {
-      return played_less_values(calm(run.time_s, model_um(run)), firsts_of(shapes));
+      return played_less_values(denoised(run.time_s, model_um(run)), firsts_of(shapes));
     });
   };
   return {std::move(play)};
@@ -394,8 +396,8 @@ std::vector<Hypothesis> hysteresis_hypotheses(const Material& material, const Su
 /// on speed.
 Cause hysteresis() {
   Cause cause{"hysteresis", "structure"};
-  cause.parameters = {{.name = "width_K", .unit = "K", .low = 0.0, .says = "dead band"},
-                      {.name = "width_um", .unit = "um", .low = 0.0, .says = "dead band"}};
+  cause.parameters = {{.name = "width_K", .unit = "K", .low = 0.0, .description = "dead band"},
+                      {.name = "width_um", .unit = "um", .low = 0.0, .description = "dead band"}};
   cause.texts = {
       "Something sticks before it follows",
       "what moves sticks before it follows: a loop that does not depend on speed",

@@ -91,8 +91,10 @@ MeasuredRun measured_run(const RunFile& file, const std::string& name, const Mea
   for (const std::string& signal : data.signals)
     run.signals.push_back(taken(file.column(signal), rows));
   if (purpose == Purpose::search) {
-    for (const Column& rise_K : run.inputs_K) run.calm_inputs_K.push_back(calm(run.time_s, rise_K));
-    for (const Column& rise_K : run.others_K) run.calm_others_K.push_back(calm(run.time_s, rise_K));
+    for (const Column& rise_K : run.inputs_K)
+      run.denoised_inputs_K.push_back(denoised(run.time_s, rise_K));
+    for (const Column& rise_K : run.others_K)
+      run.denoised_others_K.push_back(denoised(run.time_s, rise_K));
   }
   take_displacements(file, rows, data, run);
   const bool any = std::any_of(run.measured_um.begin(), run.measured_um.end(),

@@ -34,8 +34,8 @@ struct MeasuredRun {
   std::vector<Column> others_degC;
   std::vector<Column> inputs_degC;
   /// inputs_K and others_K without the noise of single values, as far as it can be seen.
-  std::vector<Column> calm_inputs_K;
-  std::vector<Column> calm_others_K;
+  std::vector<Column> denoised_inputs_K;
+  std::vector<Column> denoised_others_K;
   std::vector<Column> model_um;     ///< order of the outputs, relative to the output's first row
   std::vector<Column> measured_um;  ///< the same; NaN: missing
   [[nodiscard]] Eigen::Index rows() const { return time_s.size(); }

@@ -68,7 +68,7 @@ Column smoothed(const Column& time_s, const Column& values, double tau_s) {
   return smooth;
 }
 
-Column calm(const Column& time_s, const Column& values) {
+Column denoised(const Column& time_s, const Column& values) {
   const Eigen::Index last = values.size() - 1;
   Column best = values;
   if (last < 8) return best;

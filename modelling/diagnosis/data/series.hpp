@@ -29,7 +29,7 @@ using Panel = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMa
 
 /// The values smoothed forwards and backwards over as many rows (0, 1, 2, 4 or 8) as predict a row
 /// left out best: the noise of single values goes, what the values do stays.
-[[nodiscard]] Column calm(const Column& time_s, const Column& values);
+[[nodiscard]] Column denoised(const Column& time_s, const Column& values);
 
 /// The derivative [1/s] of the values smoothed with tau_s.
 [[nodiscard]] Column slope(const Column& time_s, const Column& values, double tau_s);

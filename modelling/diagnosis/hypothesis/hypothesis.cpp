@@ -122,9 +122,11 @@ const std::string& Material::name_of(const Subject& subject) const {
 ColumnOf Material::values_of(const Subject& subject) const {
   const std::size_t index = subject.index;
   if (subject.kind == SubjectKind::input)
-    return [index](const MeasuredRun& run) -> const Column& { return run.calm_inputs_K[index]; };
+    return
+        [index](const MeasuredRun& run) -> const Column& { return run.denoised_inputs_K[index]; };
   if (subject.kind == SubjectKind::other_temperature)
-    return [index](const MeasuredRun& run) -> const Column& { return run.calm_others_K[index]; };
+    return
+        [index](const MeasuredRun& run) -> const Column& { return run.denoised_others_K[index]; };
   THERMOCOMP_ENSURE(subject.kind == SubjectKind::signal);
   return [index](const MeasuredRun& run) -> const Column& { return run.signals[index]; };
 }

@@ -9,7 +9,7 @@
 namespace thermocomp::diagnosis {
 namespace {
 
-bool says(const toml::table& table, const char* key, const std::string& value) {
+bool has_value(const toml::table& table, const char* key, const std::string& value) {
   return table[key].value<std::string>() == value;
 }
 
@@ -24,7 +24,8 @@ toml::table* entry(toml::table& root, const char* kind,
 }
 
 toml::table* named(toml::table& root, const char* kind, const std::string& name) {
-  return entry(root, kind, [&](const toml::table& table) { return says(table, "name", name); });
+  return entry(root, kind,
+               [&](const toml::table& table) { return has_value(table, "name", name); });
 }
 
 bool multiply(toml::table* table, const char* key, double factor) {
@@ -79,7 +80,7 @@ bool MachineFile::multiply_in_link(const TwoNames& nodes, const char* key, doubl
 
 bool MachineFile::multiply_in_source(const TwoNames& source, const char* key, double factor) {
   const auto is = [&](const toml::table& table) {
-    return says(table, "signal", source.first) && says(table, "node", source.second);
+    return has_value(table, "signal", source.first) && has_value(table, "node", source.second);
   };
   return multiply(entry(tables_->root, "source", is), key, factor);
 }

@@ -143,7 +143,7 @@ class Search {
         rows_(rows),
         hypotheses_(hypotheses),
         rules_(rules),
-        tell_(accepted),
+        on_accepted_(accepted),
         progress_(progress),
         readings_(data, rows),
         groups_(place_groups(data)) {}
@@ -184,7 +184,7 @@ class Search {
   }
 
   Fits fits_beside(const std::vector<Explanation>& accepted) {
-    if (tell_) tell_(accepted);
+    if (on_accepted_) on_accepted_(accepted);
     return Fits(data_, rows_, readings_, accepted);
   }
 
@@ -317,7 +317,7 @@ class Search {
   const StackedRows& rows_;
   const std::vector<Hypothesis>& hypotheses_;
   const Rules& rules_;
-  const std::function<void(const std::vector<Explanation>&)>& tell_;
+  const std::function<void(const std::vector<Explanation>&)>& on_accepted_;
   const std::function<void()>& progress_;
   Readings readings_;
   PlaceGroups groups_;

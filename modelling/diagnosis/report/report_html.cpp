@@ -11,10 +11,10 @@
 namespace thermocomp::diagnosis {
 namespace {
 
-constexpr double support_told_min = 0.05;
-constexpr std::size_t candidates_told = 3;
+constexpr double support_reported_min = 0.05;
+constexpr std::size_t candidates_reported = 3;
 /// A share of what the model leaves that is worth an advice.
-constexpr double share_told_min = 0.25;
+constexpr double share_reported_min = 0.25;
 
 /// Beside what every page has.
 constexpr const char* own_style =
@@ -140,7 +140,7 @@ template <class Share>
 std::string outputs_with(const Diagnosis& diagnosis, Share share) {
   std::string names;
   for (const auto& [output, of] : diagnosis.outputs)
-    if (of.headroom && share(*of.headroom) >= share_told_min)
+    if (of.headroom && share(*of.headroom) >= share_reported_min)
       names += (names.empty() ? "" : ", ") + name_of_column(output);
   return names;
 }
@@ -229,7 +229,7 @@ std::string finding_html(const NamedFinding& finding, std::size_t number, const 
          fixed(100 * gain.ci95.low, 0) + " to " + fixed(100 * gain.ci95.high, 0) + " %"});
   std::string more = html_table(gains);
   for (const Alternative& other : finding.alternatives) {
-    if (other.relative_support < support_told_min) continue;
+    if (other.relative_support < support_reported_min) continue;
     more += html_paragraph("It could also be this: " + title_of(other) + " (" +
                            figure(100.0 * other.relative_support) +
                            " % as likely). To tell them apart: " +
@@ -247,9 +247,9 @@ std::string candidates_html(const Diagnosis& diagnosis) {
   if (!diagnosis.findings.empty()) return "";
   Table rows{{"cause", "probability", "of the error on left-out rows", "error on the test rows",
               "what would decide"}};
-  for (std::size_t i = 0; i < std::min(candidates_told, diagnosis.weighed.size()); ++i) {
+  for (std::size_t i = 0; i < std::min(candidates_reported, diagnosis.weighed.size()); ++i) {
     const Candidate& each = diagnosis.weighed[i];
-    if (each.probability < support_told_min) continue;
+    if (each.probability < support_reported_min) continue;
     std::string gains;
     for (const auto& [output, gain] : each.test)
       gains += (gains.empty() ? "" : ", ") + name_of_column(output) + " " + figure(gain.before_um) +

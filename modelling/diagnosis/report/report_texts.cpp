@@ -70,7 +70,8 @@ std::string parameter_words(const std::string& cause, const Parameter& parameter
   }
   const Cause* const of = find_cause(cause);
   const CauseParameter* const known = of == nullptr ? nullptr : find_parameter(*of, parameter.name);
-  const std::string says(known == nullptr ? std::string_view(parameter.name) : known->says);
+  const std::string description(known == nullptr ? std::string_view(parameter.name)
+                                                 : known->description);
   std::string unit(known == nullptr || known->unit == "1" ? std::string_view() : known->unit);
   double scale = 1.0;
   if (const std::size_t at = unit.find('?'); at != std::string::npos) {
@@ -82,7 +83,7 @@ std::string parameter_words(const std::string& cause, const Parameter& parameter
   }
   const bool is_duration = unit == "s";
   if (unit.starts_with("um")) unit.replace(0, 1, "µ");
-  std::string text = says;
+  std::string text = description;
   bool first = true;
   for (const auto& [output, value] : parameter.values) {
     text += first ? " " : ", ";
@@ -149,7 +150,7 @@ std::string sentence_of(const NamedFinding& finding) {
   const CauseTexts* of = texts_of(finding);
   std::string text = finding.subject;
   text += ": ";
-  text += of == nullptr ? std::string_view(finding.cause) : of->says;
+  text += of == nullptr ? std::string_view(finding.cause) : of->description;
   if (finding.run) text.append(" (in ").append(*finding.run).append(")");
   for (const Parameter& parameter : finding.parameters)
     text.append("; ").append(parameter_words(finding.cause, parameter, finding.subject));

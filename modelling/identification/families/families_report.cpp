@@ -87,12 +87,12 @@ std::string families_text(const MeasuredTests& tests, const FamiliesFit& fit) {
       text += claim_text(tests.runs.size(), name, output);
   }
   if (fit.few) text += equation_text(tests, *fit.few);
-  const auto told = [&](const std::string& warning) {
+  const auto is_printed = [&](const std::string& warning) {
     return fit.few && std::find(fit.few->warnings.begin(), fit.few->warnings.end(), warning) !=
                           fit.few->warnings.end();
   };
   for (const std::string& warning : fit.warnings)
-    if (!told(warning)) text.append("warning: ").append(warning).append("\n");
+    if (!is_printed(warning)) text.append("warning: ").append(warning).append("\n");
   return text;
 }
 

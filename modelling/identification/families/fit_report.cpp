@@ -94,9 +94,9 @@ struct LeftOut {
 
 /// Verdict, curves of measured and left-out prediction, warnings, and how the model was chosen.
 /// @param left_out  one per output
-/// @param said      text output of the command
+/// @param summary      text output of the command
 std::string page(const MeasuredTests& tests, const Fit& fit, const std::vector<LeftOut>& left_out,
-                 const std::vector<std::string>& warnings, const std::string& said) {
+                 const std::vector<std::string>& warnings, const std::string& summary) {
   std::string text = html_begin("Model of the thermal displacement");
   const char* judged_on = tests.runs.size() < 2 ? "stretches of the run" : "runs";
   for (std::size_t o = 0; o < tests.outputs.size(); ++o) {
@@ -119,7 +119,7 @@ std::string page(const MeasuredTests& tests, const Fit& fit, const std::vector<L
     text += curves(tests, fit, static_cast<Eigen::Index>(o));
   if (!warnings.empty()) text += html_heading("What to know, and what to do") + html_list(warnings);
   text += "<details><summary>How it was chosen</summary>\n<pre style=\"white-space:pre-wrap\">";
-  text.append(xml_text(said)).append("</pre>\n").append(groups_map(tests, fit));
+  text.append(xml_text(summary)).append("</pre>\n").append(groups_map(tests, fit));
   return text.append("</details>\n").append(html_end());
 }
 

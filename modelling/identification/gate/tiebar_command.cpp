@@ -39,7 +39,7 @@ struct Answer {
   std::string text;
 };
 
-void say_one_tie(const Options& options, const TiedColumns& columns, Answer& answer) {
+void add_one_tie(const Options& options, const TiedColumns& columns, Answer& answer) {
   const TiedCoefficients k = tied_coefficients(columns);
   if (!options.curves.empty()) cli::write_file(options.curves, design_curves_svg(columns));
   answer.json = {{"Ki_um_per_K", k.ki_um_per_K}, {"Kc_um_per_K", k.kc_um_per_K.front()}};
@@ -58,7 +58,7 @@ void say_one_tie(const Options& options, const TiedColumns& columns, Answer& ans
 }
 
 /// Ki, then one line per tie.
-Answer ties_said(const TiedColumns& columns) {
+Answer ties_answer(const TiedColumns& columns) {
   const TiedCoefficients k = tied_coefficients(columns);
   Answer answer{{{"Ki_um_per_K", k.ki_um_per_K}, {"ties", Json::array()}},
                 printed("Ki = %.6g um/K\n", k.ki_um_per_K)};
@@ -74,7 +74,7 @@ Answer ties_said(const TiedColumns& columns) {
   return answer;
 }
 
-void say_courses(const Options& options, const GateFile& file, Answer& answer) {
+void add_courses(const Options& options, const GateFile& file, Answer& answer) {
   std::vector<std::string> notes;
   const std::vector<TieCourse> courses =
       tie_courses(file, cli::RunLoader(options.columns).load(options.course), notes);
@@ -99,9 +99,9 @@ void say_courses(const Options& options, const GateFile& file, Answer& answer) {
     answer.json["courses"].push_back(std::move(json));
   }
   if (best) {
-    const Answer said = ties_said(*best);
-    answer.json["best"] = said.json;
-    answer.text += "\nbest ties, if each keeps its temperatures wherever it is:\n" + said.text;
+    const Answer ties = ties_answer(*best);
+    answer.json["best"] = ties.json;
+    answer.text += "\nbest ties, if each keeps its temperatures wherever it is:\n" + ties.text;
   }
   if (!options.picture.empty())
     cli::write_file(options.picture, tie_picture(file, courses, best ? &*best : nullptr));
@@ -111,14 +111,14 @@ int run(const Options& options) {
   const GateFile file = load_gate_file(options.geometry);
   Answer answer;
   if (file.columns.ties.size() == 1) {
-    say_one_tie(options, file.columns, answer);
+    add_one_tie(options, file.columns, answer);
   } else {
     if (options.ratio || !options.curves.empty())
       throw std::runtime_error("--ratio and --curves are for one tie; " + options.geometry +
                                " has several: --course RUN.csv --optimise");
-    answer = ties_said(file.columns);
+    answer = ties_answer(file.columns);
   }
-  if (!options.course.empty()) say_courses(options, file, answer);
+  if (!options.course.empty()) add_courses(options, file, answer);
   cli::write_file("-", options.json
                            ? answer.json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"
                            : answer.text);

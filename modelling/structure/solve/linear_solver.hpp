@@ -52,7 +52,7 @@ class PetscSolver : public LinearSolver {
   std::filesystem::path folder_;
   int ranks_;
   Index size_;
-  mutable std::string said_;  ///< output of the program: iterations and residuals
+  mutable std::string output_;  ///< output of the program: iterations and residuals
 };
 
 }  // namespace thermocomp::structure

@@ -122,19 +122,19 @@ void PetscSolver::solve(std::span<double> right_sides) const {
   const int status = run({find_program("mpirun").string(), "--oversubscribe", "-n",
                           std::to_string(ranks_), program_.string(), folder_.string()},
                          log);
-  said_ = text_of(log);
+  output_ = text_of(log);
   if (status != 0) {
     throw FactorisationError("thermocomp-petsc failed (status " + std::to_string(status) +
-                             "): " + said_.substr(0, 2000));
+                             "): " + output_.substr(0, 2000));
   }
   std::ifstream file(folder_ / "solutions", std::ios::binary);
   file.read(reinterpret_cast<char*>(right_sides.data()),
             static_cast<std::streamsize>(right_sides.size_bytes()));
-  if (!file) throw FactorisationError("thermocomp-petsc gave no solution: " + said_);
+  if (!file) throw FactorisationError("thermocomp-petsc gave no solution: " + output_);
 }
 
 std::string PetscSolver::report() const {
-  return "solved by PETSc on " + std::to_string(ranks_) + " MPI ranks\n" + said_;
+  return "solved by PETSc on " + std::to_string(ranks_) + " MPI ranks\n" + output_;
 }
 
 }  // namespace thermocomp::structure

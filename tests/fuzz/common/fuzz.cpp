@@ -11,13 +11,14 @@ namespace thermocomp::fuzz {
 
 namespace {
 
-const Problem* told = nullptr;  ///< the problem being checked
+const Problem* problem_in_check = nullptr;  ///< the problem being checked
 
 }  // namespace
 
-void broken(const char* promise, const char* file, int line) {
-  if (told != nullptr) std::fprintf(stderr, "of: %s\n", to_string(*told).c_str());
-  std::fprintf(stderr, "%s:%d: broken promise: %s\n", file, line, promise);
+void broken(const char* condition, const char* file, int line) {
+  if (problem_in_check != nullptr)
+    std::fprintf(stderr, "of: %s\n", to_string(*problem_in_check).c_str());
+  std::fprintf(stderr, "%s:%d: broken promise: %s\n", file, line, condition);
   std::abort();
 }
 
@@ -94,23 +95,23 @@ int lines_of(std::string_view text) {
 }  // namespace
 
 void check_problems(const std::vector<Problem>& problems, std::span<const NamedText> files) {
-  FUZZ_PROMISE(!problems.empty());
+  FUZZ_REQUIRE(!problems.empty());
   std::vector<int> lines;  // counted once for possibly thousands of problems
   for (const NamedText& known : files) lines.push_back(lines_of(known.text));
   for (const Problem& problem : problems) {
-    told = &problem;
+    problem_in_check = &problem;
     const auto file = std::find_if(files.begin(), files.end(), [&](const NamedText& known) {
       return known.name == problem.file;
     });
-    FUZZ_PROMISE(file != files.end());
-    FUZZ_PROMISE(problem.line >= 0);
-    FUZZ_PROMISE(problem.line <= lines[static_cast<std::size_t>(file - files.begin())]);
-    FUZZ_PROMISE(!problem.rule.empty());
+    FUZZ_REQUIRE(file != files.end());
+    FUZZ_REQUIRE(problem.line >= 0);
+    FUZZ_REQUIRE(problem.line <= lines[static_cast<std::size_t>(file - files.begin())]);
+    FUZZ_REQUIRE(!problem.rule.empty());
     const bool of_a_key = !problem.key.empty();
-    FUZZ_PROMISE(!of_a_key || !problem.value.empty());
-    FUZZ_PROMISE(to_string(problem).find('\n') == std::string::npos);
+    FUZZ_REQUIRE(!of_a_key || !problem.value.empty());
+    FUZZ_REQUIRE(to_string(problem).find('\n') == std::string::npos);
   }
-  told = nullptr;
+  problem_in_check = nullptr;
 }
 
 }  // namespace thermocomp::fuzz

@@ -14,7 +14,7 @@
 namespace thermocomp::fuzz {
 
 /// Ends the program, so that libFuzzer keeps the input.
-[[noreturn]] void broken(const char* promise, const char* file, int line);
+[[noreturn]] void broken(const char* condition, const char* file, int line);
 
 /// Fields from the front of an input; zeros after its end.
 class ByteFeed {
@@ -60,6 +60,6 @@ void check_problems(const std::vector<Problem>& problems, std::span<const NamedT
 
 }  // namespace thermocomp::fuzz
 
-#define FUZZ_PROMISE(expression)       \
+#define FUZZ_REQUIRE(expression)       \
   ((expression) ? static_cast<void>(0) \
                 : ::thermocomp::fuzz::broken(#expression, __FILE__, __LINE__))

@@ -53,9 +53,9 @@ void VirtualLine::arrive() {
 bool VirtualLine::wait_readable(nanoseconds until) {
   arrive();
   while (taken_ == arrived_.size() && !hung_up_) {
-    const bool comes = !under_way_.empty() && under_way_.front().at <= until;
-    pass(comes ? under_way_.front().at : until);
-    if (!comes) return false;
+    const bool has_arrived = !under_way_.empty() && under_way_.front().at <= until;
+    pass(has_arrived ? under_way_.front().at : until);
+    if (!has_arrived) return false;
     arrive();
   }
   return true;

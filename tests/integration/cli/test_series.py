@@ -78,16 +78,16 @@ def test_a_new_machine_with_one_hour_is_better_with_its_sisters(series, tmp_path
 
 def test_a_machine_whose_sensors_are_exchanged_departs_from_its_sisters(series, tmp_path):
     healthy = write_run(tmp_path / "healthy.csv", 92, 5.0)
-    said = run("inspect", healthy, "--series", series, "--json", "-")
-    assert json.loads(said.stdout)["departure"]["z_um"]["departs"] is False, said.stdout
+    printed = run("inspect", healthy, "--series", series, "--json", "-")
+    assert json.loads(printed.stdout)["departure"]["z_um"]["departs"] is False, printed.stdout
     other = write_run(tmp_path / "other.csv", 92, 5.0, swap=True)
-    said = run("inspect", other, "--series", series)
-    assert said.returncode == 1 and "it departs" in said.stdout, said.stdout
+    printed = run("inspect", other, "--series", series)
+    assert printed.returncode == 1 and "it departs" in printed.stdout, printed.stdout
 
 
 def departs(run_file, prior):
-    said = run("inspect", run_file, "--series", prior, "--json", "-")
-    return json.loads(said.stdout)["departure"]["z_um"]["departs"]
+    printed = run("inspect", run_file, "--series", prior, "--json", "-")
+    return json.loads(printed.stdout)["departure"]["z_um"]["departs"]
 
 
 def test_beside_its_own_past_a_machine_departs_where_sisters_would_not(series, tmp_path):

@@ -163,8 +163,8 @@ def write_replay_file(path, rows, row_period_s):
 def predicted_um(folder, rows):
     """(rows, axes): predicted displacement, relative to the first row."""
     out = folder / "predicted.csv"
-    status, _, said = run_tool("predict", "--model", MODEL, RUN, "-o", out)
-    assert status == 0, said
+    status, _, output = run_tool("predict", "--model", MODEL, RUN, "-o", out)
+    assert status == 0, output
     columns = read_columns(out)
     return np.column_stack([columns[f"ch{i + 1}_predicted_um"] for i in range(AXES)])[:rows]
 
@@ -205,12 +205,12 @@ def agreement_in_history(bus, folder, history, rows, repeats, row_log, rate_hz):
     not limit the offset (after several rows at once). The number of settled rows depends on how
     busy this machine is."""
     run = folder / "exported.csv"
-    status, _, said = run_tool("export", history, "-o", run)
-    assert status == 0, said
+    status, _, output = run_tool("export", history, "-o", run)
+    assert status == 0, output
     exported = read_columns(run)
-    status, replayed, said = replay(history, folder / "replayed.csv")
-    assert status == 0, said
-    print(said.strip())
+    status, replayed, output = replay(history, folder / "replayed.csv")
+    assert status == 0, output
+    print(output.strip())
     times_s = np.array(replayed["time_s"]) + first_cycle_s(history)
     read = temps_degC(exported)
     assert len(times_s) == len(read)

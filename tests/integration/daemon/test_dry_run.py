@@ -93,17 +93,17 @@ def assert_only_read(controller):
 
 def test_everything_is_read_and_nothing_is_written(lab):
     machine = Machine(lab)
-    status, out, said = run_tool("check", machine.daemon.config)
-    assert status == 0, said
+    status, out, errors = run_tool("check", machine.daemon.config)
+    assert status == 0, errors
     assert "controller cnc (modbus_tcp), DRY RUN: nothing is written to it" in out
     machine.controller.force_applied_um(3.0)  # an offset of another writer
     daemon = machine.dry_run_to(6.0)
-    told = eventually(lambda: (now := daemon.status())["controller"]["shown"]["z"] and now,
+    answered = eventually(lambda: (now := daemon.status())["controller"]["shown"]["z"] and now,
                       "what the controller applies is read")
-    assert told["dry_run"] and told["mode"] == "dry_run" and told["reasons"] == []
-    assert told["controller"]["shown"] == {"z": 3.0}
-    assert told["controller"]["signals"]["x_mm"] == 250.0
-    assert told["controller"]["writes"] == 0
+    assert answered["dry_run"] and answered["mode"] == "dry_run" and answered["reasons"] == []
+    assert answered["controller"]["shown"] == {"z": 3.0}
+    assert answered["controller"]["signals"]["x_mm"] == 250.0
+    assert answered["controller"]["writes"] == 0
     status, out, _ = daemon.cli("status")
     assert status == 1
     assert "Compensating    : no: DRY RUN, nothing is written" in out and "yes" not in out

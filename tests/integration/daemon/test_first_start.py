@@ -55,8 +55,8 @@ def column(daemon):
 def test_nothing_moves_before_an_operator_enables_it_and_what_was_said_survives(day):
     day.show("0:1")
     daemon = day.daemon()
-    status, out, said = run_tool("check", daemon.config)
-    assert status == 0, said
+    status, out, errors = run_tool("check", daemon.config)
+    assert status == 0, errors
     assert "first start: switched off until `thermocomp enable`" in out
     assert "compared: NEVER" in out
     daemon.start()
@@ -67,9 +67,9 @@ def test_nothing_moves_before_an_operator_enables_it_and_what_was_said_survives(
     eventually(lambda: daemon.axis()["displacement"] == pytest.approx(-WANTED_um, abs=0.05),
                "the model sees it")
     eventually(lambda: daemon.axis()["driven"], "the controller is back")
-    told = daemon.status()
-    assert told["axes"][0]["offset"] == 0.0 and told["axes"][0]["applied"] == 0.0
-    assert not told["model"]["compared"]
+    reported = daemon.status()
+    assert reported["axes"][0]["offset"] == 0.0 and reported["axes"][0]["applied"] == 0.0
+    assert not reported["model"]["compared"]
     status, out, _ = daemon.cli("status")
     assert status == 1 and "never switched on yet -> switch it on: thermocomp enable" in out
     assert "NEVER COMPARED with measured displacement" in out
@@ -102,24 +102,24 @@ def test_a_reference_is_refused_where_it_would_be_wrong_unless_forced(day):
     daemon = day.daemon().start()
     eventually(lambda: column(daemon)["rate_K_per_h"] == 0.0, "temperatures, twice")
     began_s = time.time()
-    status, out, said = daemon.cli("reference")
-    assert status == 0, said
+    status, out, errors = daemon.cli("reference")
+    assert status == 0, errors
     assert "the temperatures have been watched for" in out  # too short to detect slow warming
-    told = reference(daemon)
-    assert told["by"] == "operator" and not told["lost"]
-    assert began_s - 1.0 <= told["wall_s"] <= time.time() + 1.0
-    assert told["temps_degC"] == {"column_degC": 20.0, "spindle_degC": 20.0}
+    reported = reference(daemon)
+    assert reported["by"] == "operator" and not reported["lost"]
+    assert began_s - 1.0 <= reported["wall_s"] <= time.time() + 1.0
+    assert reported["temps_degC"] == {"column_degC": 20.0, "spindle_degC": 20.0}
     taken = [line for line in daemon.cli("status")[1].splitlines() if "Reference" in line]
     assert len(taken) == 1 and "by thermocomp reference, at 20.00 degC" in taken[0], taken
 
     # Warming or cooling, with the offsets at zero.
     day.show("1:")
     eventually(lambda: column(daemon)["temp_degC"] == 16.0, "it is cold")
-    status, _, said = daemon.cli("reference")
-    assert status == 1, said
-    assert "no reference is taken: column_degC changes by -" in said and "cooling" in said
-    assert "thermocomp reference --force" in said and "has an offset" not in said
-    assert reference(daemon) == told
+    status, _, errors = daemon.cli("reference")
+    assert status == 1, errors
+    assert "no reference is taken: column_degC changes by -" in errors and "cooling" in errors
+    assert "thermocomp reference --force" in errors and "has an offset" not in errors
+    assert reference(daemon) == reported
 
     # With an offset too.
     assert daemon.cli("enable")[0] == 0
@@ -130,7 +130,7 @@ def test_a_reference_is_refused_where_it_would_be_wrong_unless_forced(day):
     assert len(objections) == 2 and objections[0].startswith("axis z has an offset of +"), objections
     with pytest.raises(Refused, match="params.force must be true or false"):
         daemon.call("reference", force="yes")
-    assert reference(daemon) == told
+    assert reference(daemon) == reported
 
     # While an axis is being proved.
     moving = subprocess.Popen([BIN / "thermocomp", "--socket", daemon.socket, "prove", "z", "4"],
@@ -138,13 +138,13 @@ def test_a_reference_is_refused_where_it_would_be_wrong_unless_forced(day):
     eventually(lambda: daemon.axis()["proving"], "it moves")
     with pytest.raises(Refused, match="axis z is being proved: wait until it has returned"):
         daemon.call("reference")
-    out, said = moving.communicate(timeout=60)
-    assert moving.returncode == 0, (out, said)
+    out, errors = moving.communicate(timeout=60)
+    assert moving.returncode == 0, (out, errors)
 
-    status, out, said = daemon.cli("reference", "--force")
-    assert status == 0 and "taken although axis z has an offset" in out, (out, said)
+    status, out, errors = daemon.cli("reference", "--force")
+    assert status == 0 and "taken although axis z has an offset" in out, (out, errors)
     forced = reference(daemon)
-    assert forced["temps_degC"]["column_degC"] == 16.0 and forced["wall_s"] > told["wall_s"]
+    assert forced["temps_degC"]["column_degC"] == 16.0 and forced["wall_s"] > reported["wall_s"]
     daemon.wait_for_offset(0.0, 0.0)
     # Stored in the state file, also for the next start.
     daemon.kill()
@@ -160,19 +160,19 @@ def test_proving_waits_shows_progress_and_tells_what_was_read(day):
     daemon = day.daemon().start()
     daemon.wait_for_mode("disabled")
     eventually(lambda: daemon.axis()["driven"], "the controller takes orders")
-    status, out, said = daemon.cli("prove", "z", "4")
-    assert status == 0, (out, said)
+    status, out, errors = daemon.cli("prove", "z", "4")
+    assert status == 0, (out, errors)
     assert "axis z: moved and came back: sent +4.00 um at the farthest, read back +4.00 um" in out
     # 3 s there, and no terminal: a line every two seconds
-    assert "axis z: sent +4.00 um, read back +4.00 um\n" in said
+    assert "axis z: sent +4.00 um, read back +4.00 um\n" in errors
     eventually(lambda: not daemon.axis()["proving"] and daemon.axis()["applied"] == 0.0, "back")
 
     # A controller that refuses writes: its read-back does not change.
     day.show("0:1", REJECTS)
     eventually(lambda: daemon.status()["controller"]["online"] and daemon.axis()["driven"],
                "the controller is back")
-    status, out, said = daemon.cli("prove", "z", "4")
-    assert status == 1, (out, said)
+    status, out, errors = daemon.cli("prove", "z", "4")
+    assert status == 1, (out, errors)
     assert "axis z: " in out and "NOT" in out and "read back +0.00 um there" in out, out
 
 

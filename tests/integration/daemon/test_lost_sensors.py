@@ -97,10 +97,10 @@ def test_the_covariance_of_a_history_is_put_into_the_model_file(machine, lab):
         machine.module.show(20.0 + i % 7, 20.0 + 0.5 * (i % 7))
         eventually(lambda: daemon.status()["inputs"][0]["temp_degC"] == 20.0 + i % 7, "a value")
     daemon.end()
-    status, _, said = run_tool("covariance", "--model", machine.model, daemon.history, "-o",
+    status, _, output = run_tool("covariance", "--model", machine.model, daemon.history, "-o",
                                machine.model)
-    assert status == 0, said
-    assert "spindle_degC" in said
+    assert status == 0, output
+    assert "spindle_degC" in output
     text = machine.model.read_text()
     assert text.startswith("# mine\n" + MODEL) and "[covariance]" in text
     assert daemon.cli("check", daemon.config)[0] == 0
@@ -112,8 +112,8 @@ def test_the_covariance_of_a_history_is_put_into_the_model_file(machine, lab):
 def test_a_record_that_says_too_little_is_refused(machine, lab):
     run = lab.folder / "run.csv"
     run.write_text("time_s,column_degC\n0,20\n15,21\n")
-    status, _, said = run_tool("covariance", "--model", machine.model, run, "-o", "-")
-    assert status == 2 and "spindle_degC" in said
+    status, _, output = run_tool("covariance", "--model", machine.model, run, "-o", "-")
+    assert status == 2 and "spindle_degC" in output
     run.write_text("time_s,column_degC,spindle_degC\n0,20,20\n15,21,21\n")
-    status, _, said = run_tool("covariance", "--model", machine.model, run, "-o", "-")
-    assert status == 2 and "at least" in said
+    status, _, output = run_tool("covariance", "--model", machine.model, run, "-o", "-")
+    assert status == 2 and "at least" in output

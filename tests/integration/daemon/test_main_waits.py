@@ -288,8 +288,8 @@ def test_a_service_manager_that_does_not_read(lab):
     assert daemon.call("disable") == {"done": True}
     # Missed messages are reported as soon as it reads.
     deaf.settimeout(PATIENCE_S)
-    while b"stopping" not in (told := deaf.recv(4096)).lower():
-        if b"WATCHDOG" in told and daemon.process.poll() is None:
+    while b"stopping" not in (shown := deaf.recv(4096)).lower():
+        if b"WATCHDOG" in shown and daemon.process.poll() is None:
             daemon.process.terminate()
     assert daemon.process.wait(PATIENCE_S) == 0
 

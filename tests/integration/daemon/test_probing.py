@@ -53,8 +53,8 @@ def test_a_probing_moves_the_estimate_by_a_bounded_step_and_is_replayed(machine,
     assert "a probing is due: the model may be off by" in daemon.cli("status")[1]
     assert daemon.status()["warm"]["z"] == {"remaining_um": None, "minutes": None}  # too short
     # A remainder of 12.3 um: far more than one probing may change.
-    status, out, said = daemon.cli("measured", "z", "12.3")
-    assert status == 0, said
+    status, out, errors = daemon.cli("measured", "z", "12.3")
+    assert status == 0, errors
     after = eventually(lambda: daemon.axis()["displacement"] != before and
                        daemon.axis()["displacement"], "the estimate changes")
     assert 0.1 < abs(after - before) <= STEP_UM + 0.02, (before, after)
@@ -71,8 +71,8 @@ def test_a_probing_moves_the_estimate_by_a_bounded_step_and_is_replayed(machine,
     daemon.end()
     assert_replays_exactly(daemon.history, lab.folder / "out.csv")
     exported = lab.folder / "run.csv"
-    status, _, said = run_tool("export", daemon.history, "-o", exported)
-    assert status == 0, said
+    status, _, errors = run_tool("export", daemon.history, "-o", exported)
+    assert status == 0, errors
     header, *rows = [line for line in exported.read_text().splitlines()
                      if not line.startswith("#")]
     column = header.split(",").index("z_measured_um")
@@ -128,16 +128,16 @@ def test_a_candidate_is_scored_promoted_and_taken_back(machine, lab):
     candidate.write_text("nonsense")
     assert daemon.cli("reload")[0] == 0
     assert "new.toml" in daemon.status()["candidate"]["problem"]
-    status, _, said = daemon.cli("promote")
-    assert status != 0 and "does not run" in said
+    status, _, errors = daemon.cli("promote")
+    assert status != 0 and "does not run" in errors
     daemon.end()
     daemon.start().wait_for_mode("compensating")
     assert abs(daemon.axis()["offset"] - 12.0) < 0.05
     assert_slewed(machine.controller.orders())
     daemon.end()
     assert_replays_exactly(daemon.history, lab.folder / "out.csv")
-    status, week, said = run_tool("report", daemon.history, "-o", "-")
-    assert status == 0, said
+    status, week, errors = run_tool("report", daemon.history, "-o", "-")
+    assert status == 0, errors
     assert "new.toml, z leaves 0.0 of 4.0 um over 1 probing, better with" in week
 
 
@@ -146,17 +146,17 @@ def test_a_candidate_is_named_while_the_daemon_runs(machine, lab):
     new.write_text(machine.model.read_text().replace("[[3.0, -1.5]]", "[[2.0, -1.5]]"))
     daemon = machine.start()
     assert "candidate" not in daemon.status()
-    status, out, said = daemon.cli("candidate", new)
-    assert status == 0 and "runs as the candidate" in out, said
+    status, out, errors = daemon.cli("candidate", new)
+    assert status == 0 and "runs as the candidate" in out, errors
     assert daemon.status()["candidate"]["file"] == str(new)
     machine.warm_by(12.0)
     daemon.wait_for_offset(12.0, 0.05)
     assert daemon.cli("reload")[0] == 0
     assert daemon.status()["candidate"]["file"] == str(new)  # kept by a reload
-    status, _, said = daemon.cli("candidate", machine.model)
-    assert status != 0 and "is the model in use itself" in said, said
-    status, _, said = daemon.cli("candidate", lab.folder / "nothing.toml")
-    assert status != 0 and "does not run" in said and "nothing.toml" in said, said
+    status, _, errors = daemon.cli("candidate", machine.model)
+    assert status != 0 and "is the model in use itself" in errors, errors
+    status, _, errors = daemon.cli("candidate", lab.folder / "nothing.toml")
+    assert status != 0 and "does not run" in errors and "nothing.toml" in errors, errors
     assert daemon.cli("candidate", "none")[0] == 0
     assert "candidate" not in daemon.status()
     assert abs(daemon.axis()["offset"] - 12.0) < 0.05

@@ -36,8 +36,8 @@ def turn(machine, rpm):
 
 def measure(machine, value_um):
     count = len(machine.daemon.call("events")["events"])
-    status, _, said = machine.daemon.cli("measured", "z", str(value_um))
-    assert status == 0, said
+    status, _, errors = machine.daemon.cli("measured", "z", str(value_um))
+    assert status == 0, errors
     eventually(lambda: len(machine.daemon.call("events")["events"]) > count, "it is an event")
     machine.daemon.committed()
 
@@ -51,9 +51,9 @@ def slow_down(history, times=300):
 
 def report(lab, *arguments):
     page, figures = lab.folder / "report.html", lab.folder / "figures.json"
-    status, out, said = run_tool("thermal-test", "report", *arguments, "--noise-um", "0.2", "-o", page,
+    status, out, errors = run_tool("thermal-test", "report", *arguments, "--noise-um", "0.2", "-o", page,
                                  "--json", figures)
-    assert status == 0, said
+    assert status == 0, errors
     return page.read_text(), json.loads(figures.read_text()), out
 
 
@@ -121,7 +121,7 @@ def test_a_history_without_probings_says_what_to_do(machine, lab):
     machine.start()
     machine.daemon.committed()
     machine.daemon.end()
-    status, _, said = run_tool("thermal-test", "report", machine.daemon.history, "--test", "environment",
+    status, _, errors = run_tool("thermal-test", "report", machine.daemon.history, "--test", "environment",
                                "-o", lab.folder / "report.html")
     assert status == 2
-    assert "thermocomp measured" in said and "z_measured_um" in said, said
+    assert "thermocomp measured" in errors and "z_measured_um" in errors, errors

@@ -26,14 +26,14 @@ def alerts():
 
 
 def test_the_rules_load():
-    status, said = promtool("check", "rules", RULES)
-    assert status == 0 and f"{len(alerts())} rules found" in said, said
-    assert "warning" not in said.lower()
+    status, output = promtool("check", "rules", RULES)
+    assert status == 0 and f"{len(alerts())} rules found" in output, output
+    assert "warning" not in output.lower()
 
 
 def test_each_alert_fires_and_ends():
-    status, said = promtool("test", "rules", CASES)
-    assert status == 0, said
+    status, output = promtool("test", "rules", CASES)
+    assert status == 0, output
     cases = CASES.read_text()
     assert [name for name in alerts() if f"alertname: {name}\n" not in cases] == []
 

@@ -36,8 +36,8 @@ def test_without_a_configuration_a_start_is_no_start():
 
 
 def test_the_example_beside_it_is_valid_and_the_manual_is_there():
-    said = run("thermocomp", "check", "/etc/thermocomp/thermocompd.toml.example").stdout
-    assert said.rstrip().endswith("OK")
+    output = run("thermocomp", "check", "/etc/thermocomp/thermocompd.toml.example").stdout
+    assert output.rstrip().endswith("OK")
     for page in ("man1/thermocomp.1.gz", "man5/thermocompd.toml.5.gz", "man8/thermocompd.8.gz"):
         assert pathlib.Path("/usr/share/man", page).exists()
     for program in ("thermocomp", "thermocompd"):

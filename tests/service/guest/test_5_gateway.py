@@ -116,8 +116,8 @@ def test_a_configuration_that_is_wrong_fails_once_and_says_why():
     assert run("systemctl", "restart", UNIT, check=False).returncode != 0
     eventually(lambda: show("ActiveState") == "failed", "failed for good")
     assert show("ExecMainStatus") == "2"
-    said = run("journalctl", "-u", UNIT, "--no-pager", "-o", "cat").stdout
-    assert "http.colour = 1" in said
+    output = run("journalctl", "-u", UNIT, "--no-pager", "-o", "cat").stdout
+    assert "http.colour = 1" in output
     SETTINGS.write_text(GATEWAY)
     run("systemctl", "reset-failed", UNIT)
     run("systemctl", "start", UNIT)

@@ -442,27 +442,27 @@ TEST_CASE("a model that needs a signal is refused without a controller", "[confi
 TEST_CASE("an edit that breaks several rules is reported once per rule", "[config]") {
   const std::string good = example("small_machine.toml");
   const std::string model = example("small_machine_model.toml");
-  const auto told = [&](const std::string& from, const std::string& to) {
+  const auto problems_after = [&](const std::string& from, const std::string& to) {
     return problems_of([&] { return parse(edited(good, from, to), model); });
   };
-  CHECK(mentions(told("name = \"bed_rear\"", "name = \"bed_front\""), "sensor[bed_front].name",
-                 "used twice"));
-  CHECK(mentions(told("name = \"spindle_rpm\"", "name = \"cutting_on\""),
+  CHECK(mentions(problems_after("name = \"bed_rear\"", "name = \"bed_front\""),
+                 "sensor[bed_front].name", "used twice"));
+  CHECK(mentions(problems_after("name = \"spindle_rpm\"", "name = \"cutting_on\""),
                  "controller.signal[cutting_on].name", "used twice"));
-  CHECK(mentions(told("name = \"compensation_off_on\"", "name = \"oil_degC\""),
+  CHECK(mentions(problems_after("name = \"compensation_off_on\"", "name = \"oil_degC\""),
                  "controller.signal[oil_degC].name", "by its unit"));
-  const auto unread = told("name = \"x_mm\"", "name = \"w_mm\"");
+  const auto unread = problems_after("name = \"x_mm\"", "name = \"w_mm\"");
   CHECK(mentions(unread, "controller.signal", "model.toml needs this signal from the controller"));
   CHECK(mentions(unread, "controller.signal", "ignore = [\"x_mm\"]"));
-  CHECK(mentions(told("input = \"room_degC\"", "input = \"bed_degC\""), "block[room].input",
-                 "another block"));
-  CHECK(mentions(told("input = \"room_degC\"", "input = \"oil_degC\""), "block[room].input",
-                 "temperature of the model"));
-  CHECK(mentions(told("input = \"room_degC\"", "input = \"room_um\""), "block[room].input",
-                 "must be a temperature"));
-  CHECK(mentions(told("kind = \"modbus_rtu\"", "kind = \"profibus\""), "bus[column_line].kind",
-                 "must be one of"));
-  CHECK(mentions(told("unit = 7", "unit = 7\nregisters_per_request_max = 1"),
+  CHECK(mentions(problems_after("input = \"room_degC\"", "input = \"bed_degC\""),
+                 "block[room].input", "another block"));
+  CHECK(mentions(problems_after("input = \"room_degC\"", "input = \"oil_degC\""),
+                 "block[room].input", "temperature of the model"));
+  CHECK(mentions(problems_after("input = \"room_degC\"", "input = \"room_um\""),
+                 "block[room].input", "must be a temperature"));
+  CHECK(mentions(problems_after("kind = \"modbus_rtu\"", "kind = \"profibus\""),
+                 "bus[column_line].kind", "must be one of"));
+  CHECK(mentions(problems_after("unit = 7", "unit = 7\nregisters_per_request_max = 1"),
                  "sensor[column_left].address", "registers_per_request_max"));
 }
 

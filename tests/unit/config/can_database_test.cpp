@@ -15,24 +15,24 @@ class Folder : public ExampleFolder {
 };
 
 /// The problems after one edit of the configuration.
-std::string told_after(const std::string& from, const std::string& to) {
+std::string error_after(const std::string& from, const std::string& to) {
   const Folder folder;
   folder.edit("can_dbc.toml", from, to);
-  return folder.told();
+  return folder.problems_text();
 }
 
 }  // namespace
 
 TEST_CASE("names that are not in the DBC file are refused with a suggestion", "[dbc]") {
-  CHECK_THAT(told_after("signal = \"Column\"", "signal = \"Colum\""),
+  CHECK_THAT(error_after("signal = \"Column\"", "signal = \"Colum\""),
              Catch::Contains("sensor[column].signal = \"Colum\": must be a signal of the message "
                              "NODE_TEMPERATURES; did you mean \"Column\"?"));
-  CHECK_THAT(told_after("message = \"NODE_PAGES\"", "message = \"NODE_PAGE\""),
+  CHECK_THAT(error_after("message = \"NODE_PAGES\"", "message = \"NODE_PAGE\""),
              Catch::Contains("sensor[spindle].message = \"NODE_PAGE\": must be a message of the "
                              "bus' DBC file; did you mean \"NODE_PAGES\"?"));
-  CHECK_THAT(told_after("counter = \"Alive\"", "counter = \"Dead\""),
+  CHECK_THAT(error_after("counter = \"Alive\"", "counter = \"Dead\""),
              Catch::Contains("device[node].counter = \"Dead\": must be a signal of the message"));
-  CHECK_THAT(told_after("signal = \"Spindle\"", "signal = \"Spindle\"\ncounter = \"Oil\""),
+  CHECK_THAT(error_after("signal = \"Spindle\"", "signal = \"Spindle\"\ncounter = \"Oil\""),
              Catch::Contains("sensor[spindle].counter = \"Oil\": must be in every frame"));
 }
 
@@ -64,12 +64,12 @@ TEST_CASE("a key overrides the DBC file, and the rest is taken from there", "[db
     s.byte_order = ByteOrder::big_endian;
     s.start_bit = 23;
   });
-  CHECK_THAT(told_after("signal = \"Column\"", "signal = \"Column\"\nmultiplexor_value = 1"),
+  CHECK_THAT(error_after("signal = \"Column\"", "signal = \"Column\"\nmultiplexor_value = 1"),
              Catch::Contains("sensor[column].multiplexor_value = 1: is given by the DBC file"));
-  CHECK_THAT(told_after("signal = \"Column\"",
-                        "signal = \"Column\"\nlength_bits = 12\nbyte_order = \"big_endian\""),
+  CHECK_THAT(error_after("signal = \"Column\"",
+                         "signal = \"Column\"\nlength_bits = 12\nbyte_order = \"big_endian\""),
              Catch::Contains("start_bit = (missing): must be given: the value is not in whole"));
-  CHECK_THAT(told_after("signal = \"Spindle\"", "signal = \"Spindle\"\nextended_id = false"),
+  CHECK_THAT(error_after("signal = \"Spindle\"", "signal = \"Spindle\"\nextended_id = false"),
              Catch::Contains("extended_id = false: is false, but the file's number has more"));
 }
 
@@ -87,21 +87,21 @@ TEST_CASE("a flaw of the DBC file counts if a sensor uses it and no key override
 
   folder.edit("can_dbc.toml", "signal = \"Spindle\"", "signal = \"Oil\"");
   CHECK(
-      folder.told() ==
+      folder.problems_text() ==
       "can_dbc.dbc:17: Oil = 127|16: must end within the 16 bytes of NODE_PAGES; start_bit in the "
       "configuration replaces it\n");
   folder.edit("can_dbc.toml", "signal = \"Oil\"", "signal = \"Oil\"\nstart_bit = 64");
-  CHECK(folder.told().empty());
+  CHECK(folder.problems_text().empty());
 }
 
 TEST_CASE("an unknown name is reported with the flaws that may be the cause", "[dbc]") {
   const Folder folder;
   folder.edit("can_dbc.dbc", "BO_ 385 NODE_TEMPERATURES:", "BO_ 385 NODE_TEMPERATURES");
-  const std::string told = folder.told();
-  CHECK_THAT(told,
+  const std::string problems_text = folder.problems_text();
+  CHECK_THAT(problems_text,
              Catch::Contains("device[node].message = \"NODE_TEMPERATURES\": must be a message "
                              "of the bus' DBC file; a flaw of the file may hide it"));
-  CHECK_THAT(told, Catch::Contains("can_dbc.dbc:9: 8 NODE: must be ':'"));
+  CHECK_THAT(problems_text, Catch::Contains("can_dbc.dbc:9: 8 NODE: must be ':'"));
 }
 
 TEST_CASE("of two messages of one name the identifier selects one", "[dbc]") {
@@ -110,8 +110,9 @@ TEST_CASE("of two messages of one name the identifier selects one", "[dbc]") {
               "BO_ 400 NODE_TEMPERATURES: 8 NODE\n"
               " SG_ Column : 16|16@1- (0.5,0) [0|0] \"degC\" Vector__XXX\n"
               " SG_ Alive : 60|4@1+ (1,0) [0|15] \"\" Vector__XXX\nCM_ SG_ 385");
-  CHECK_THAT(folder.told(), Catch::Contains("NODE_TEMPERATURES: is the name of two messages; id in "
-                                            "the configuration replaces it"));
+  CHECK_THAT(folder.problems_text(),
+             Catch::Contains("NODE_TEMPERATURES: is the name of two messages; id in "
+                             "the configuration replaces it"));
   folder.edit("can_dbc.toml", "signal = \"Column\"", "signal = \"Column\"\nid = 400");
   const CanSignal signal =
       std::get<CanBusConfig>(folder.load().buses.at(0)).devices.at(0).channels.at(0).signal;
@@ -131,22 +132,22 @@ TEST_CASE("two sensors that read one place cause a warning", "[dbc]") {
 }
 
 TEST_CASE("named signals require a DBC file and a message", "[dbc]") {
-  CHECK_THAT(told_after("dbc = \"can_dbc.dbc\"", ""),
+  CHECK_THAT(error_after("dbc = \"can_dbc.dbc\"", ""),
              Catch::Contains("sensor[column].signal = \"Column\": needs a bus that names a DBC"));
-  CHECK_THAT(told_after("message = \"NODE_TEMPERATURES\"", ""),
+  CHECK_THAT(error_after("message = \"NODE_TEMPERATURES\"", ""),
              Catch::Contains("sensor[column].message = (missing): must be given"));
-  CHECK_THAT(told_after("dbc = \"can_dbc.dbc\"", "dbc = \"other.dbc\""),
+  CHECK_THAT(error_after("dbc = \"can_dbc.dbc\"", "dbc = \"other.dbc\""),
              Catch::Contains("bus[machine_bus].dbc = \"other.dbc\": no such file"));
 }
 
 TEST_CASE("a code out of range of the named signal is refused", "[dbc]") {
-  CHECK_THAT(told_after("[0x7FFF]", "[0x10000]"), Catch::Contains("open_circuit_codes"));
+  CHECK_THAT(error_after("[0x7FFF]", "[0x10000]"), Catch::Contains("open_circuit_codes"));
 }
 
 TEST_CASE("a broken DBC file is reported once, by its own name and line", "[dbc]") {
   const Folder folder;
   folder.edit("can_dbc.dbc", "0|16@1-", "0|77@1-");
-  CHECK(folder.told() ==
+  CHECK(folder.problems_text() ==
         "can_dbc.dbc:10: Column = 77: must have 1 to 64 bits; length_bits in the configuration "
         "replaces it\n");
 }
@@ -155,7 +156,7 @@ TEST_CASE("a named signal without a temperature unit is refused, one in degF is 
           "[dbc]") {
   Folder folder;
   folder.edit("can_dbc.dbc", "\"degC\"", "\"bar\"");
-  CHECK_THAT(folder.told(),
+  CHECK_THAT(folder.problems_text(),
              Catch::Contains("sensor[column].signal = bar: the unit of the signal in the DBC file "
                              "is not a temperature unit; give unit = \"degC\", \"K\" or \"degF\""));
   folder.edit("can_dbc.dbc", "(0.1,0) [-100|400] \"bar\"",
@@ -169,7 +170,7 @@ TEST_CASE("a named signal without a temperature unit is refused, one in degF is 
 TEST_CASE("a message of more bytes than its frame format is refused", "[dbc]") {
   const Folder folder;
   folder.edit("can_dbc.dbc", "BO_ 2566844926 15;", "BO_ 2566844926 1;");
-  CHECK_THAT(folder.told(),
+  CHECK_THAT(folder.problems_text(),
              Catch::Contains("sensor[spindle].message = \"NODE_PAGES\": has 16 bytes "
                              "in the DBC file, but is not a CAN FD frame"));
 }

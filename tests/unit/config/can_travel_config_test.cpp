@@ -163,10 +163,10 @@ TEST_CASE("a frame of the controller's set must not be one that is sent", "[conf
   for (const char* key : {"k0_um", "slope_um_per_m"})
     text = edited(text, std::string(key) + " = { id = 0x290", std::string(key) + " = { id = 0x210");
   text = edited(text, "set_numbers = [{ id = 0x290", "set_numbers = [{ id = 0x210");
-  std::size_t told = 0;
+  std::size_t reported = 0;
   for (const Problem& problem : problems_of([&] { return parse(text); }))
-    if (problem.rule == "is in a frame that is sent, not received") ++told;
-  CHECK(told == 3);
+    if (problem.rule == "is in a frame that is sent, not received") ++reported;
+  CHECK(reported == 3);
 }
 
 TEST_CASE("either all sets in frames are read back or none", "[config][travel][can]") {

@@ -526,22 +526,23 @@ TEST_CASE("changes that need a restart are named", "[config]") {
 }
 
 TEST_CASE("a file that is named twice is refused, through any path or link", "[config][files]") {
-  const auto told_with = [&](const std::string& history, const std::string& state) {
+  const auto error_with = [&](const std::string& history, const std::string& state) {
     const ExampleFolder folder({"small_machine.toml", "small_machine_model.toml"});
     folder.name_files(history, state);
-    return folder.told();
+    return folder.problems_text();
   };
-  CHECK(told_with("h.db", "s.json").empty());
-  CHECK_THAT(told_with("small_machine_model.toml", "s.json"),
+  CHECK(error_with("h.db", "s.json").empty());
+  CHECK_THAT(error_with("small_machine_model.toml", "s.json"),
              Catch::Contains("history.file") && Catch::Contains("same file as model.file"));
-  CHECK_THAT(told_with("./sub/../small_machine.toml", "s.json"),
+  CHECK_THAT(error_with("./sub/../small_machine.toml", "s.json"),
              Catch::Contains("same file as this configuration"));
-  CHECK_THAT(told_with("h.db", "h.db"), Catch::Contains("same file as state_file"));
-  CHECK_THAT(told_with("h.db", "h.db-wal"), Catch::Contains("same file"));
-  CHECK_THAT(told_with("link_to_model", "s.json"), Catch::Contains("same file as model.file"));
-  CHECK_THAT(told_with("hard_link_to_model", "s.json"), Catch::Contains("same file as model.file"));
-  CHECK_THAT(told_with("link_to_nothing", "nothing"), Catch::Contains("same file as state_file"));
-  CHECK_THAT(told_with("loop_a", "s.json"), Catch::Contains("loop of links"));
-  CHECK_THAT(told_with("h.db", "loop_a/s.json"), Catch::Contains("loop of links"));
-  CHECK_THAT(told_with("pipe", "s.json"), Catch::Contains("must be a regular file"));
+  CHECK_THAT(error_with("h.db", "h.db"), Catch::Contains("same file as state_file"));
+  CHECK_THAT(error_with("h.db", "h.db-wal"), Catch::Contains("same file"));
+  CHECK_THAT(error_with("link_to_model", "s.json"), Catch::Contains("same file as model.file"));
+  CHECK_THAT(error_with("hard_link_to_model", "s.json"),
+             Catch::Contains("same file as model.file"));
+  CHECK_THAT(error_with("link_to_nothing", "nothing"), Catch::Contains("same file as state_file"));
+  CHECK_THAT(error_with("loop_a", "s.json"), Catch::Contains("loop of links"));
+  CHECK_THAT(error_with("h.db", "loop_a/s.json"), Catch::Contains("loop of links"));
+  CHECK_THAT(error_with("pipe", "s.json"), Catch::Contains("must be a regular file"));
 }

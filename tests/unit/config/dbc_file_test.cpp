@@ -16,11 +16,11 @@ const std::string head = "VERSION \"\"\nNS_ :\nBS_:\nBU_: A B\n";
 
 /// All flaws, one per line; "" for a valid file.
 std::string problems_of(const std::string& body) {
-  std::string told;
+  std::string reported;
   for (const DbcFlaw& flaw : read_dbc_text(head + body, "x.dbc").flaws) {
-    told += to_string(flaw.problem) + "\n";
+    reported += to_string(flaw.problem) + "\n";
   }
-  return told;
+  return reported;
 }
 
 std::string message(const std::string& signals, const std::string& bytes = "8") {
@@ -103,53 +103,56 @@ TEST_CASE("a DBC file may contain unused statements", "[dbc]") {
 }
 
 TEST_CASE("invalid content of a DBC file is refused by line and rule", "[dbc]") {
-  const auto tells = [](const std::string& body, const std::string& start) {
+  const auto reports = [](const std::string& body, const std::string& start) {
     INFO(problems_of(body));
     return problems_of(body).find(start) == 0;
   };
-  CHECK(tells(placed("0|65@1+"), "x.dbc:6: T = 65: must have 1 to 64 bits"));
-  CHECK(tells(placed("0|0@1+"), "x.dbc:6: T = 0: must have 1 to 64 bits"));
-  CHECK(tells(placed("60|8@1+"), "x.dbc:6: T = 60|8: must end within the 8 bytes of NODE"));
-  CHECK(tells(placed("0|16@0+", "1"), "x.dbc:6: T = 0|16: must end within the 1 bytes of NODE"));
-  CHECK(tells(message(" SG_ T : 0|8@1+ (0,0) [0|0] \"\" B\n"), "x.dbc:6: T = 0: the factor must"));
-  CHECK(tells("BO_ 2048 NODE: 8 A\n", "x.dbc:5: NODE = 2048: must be a number of 11 bits"));
-  CHECK(tells("BO_ 3758096384 NODE: 8 A\n", "x.dbc:5: NODE = 3758096384: must be a number"));
-  CHECK(tells(placed("0|8@1+") + placed("0|8@1+"), "x.dbc:7: NODE: is the name of two messages"));
-  CHECK(tells(placed("0|8@1+") + " SG_ T : 8|8@1+ (1,0) [0|0] \"\" B\n",
-              "x.dbc:7: T: is the name of two signals of NODE"));
-  CHECK(tells(placed("0|16@1+") + "SIG_VALTYPE_ 385 T : 1;\n", "x.dbc:7: T = 16: must have 32"));
-  CHECK(tells(placed("0|16@1+") + "SIG_VALTYPE_ 385 U : 1;\n", "x.dbc:7: U: must be a signal of"));
-  CHECK(tells(placed("0|16@1+") + "SIG_VALTYPE_ 9 T : 1;\n",
-              "x.dbc:7: T = 9: is the number of no message"));
-  CHECK(tells(message(" SG_ T m1 : 0|8@1+ (1,0) [0|0] \"\" B\n"), "x.dbc:6: T = m1: needs a"));
-  CHECK(tells(message(" SG_ P M : 0|2@1+ (1,0) [0|0] \"\" B\n"
-                      " SG_ T m4 : 8|8@1+ (1,0) [0|0] \"\" B\n"),
-              "x.dbc:7: T = 4: is more than its multiplexor can be"));
-  CHECK(tells(message(" SG_ P m0M : 0|2@1+ (1,0) [0|0] \"\" B\n") + "SG_MUL_VAL_ 385 P P 0-1;\n",
-              "x.dbc:6: P: must not be selected by itself"));
+  CHECK(reports(placed("0|65@1+"), "x.dbc:6: T = 65: must have 1 to 64 bits"));
+  CHECK(reports(placed("0|0@1+"), "x.dbc:6: T = 0: must have 1 to 64 bits"));
+  CHECK(reports(placed("60|8@1+"), "x.dbc:6: T = 60|8: must end within the 8 bytes of NODE"));
+  CHECK(reports(placed("0|16@0+", "1"), "x.dbc:6: T = 0|16: must end within the 1 bytes of NODE"));
   CHECK(
-      tells(placed("0|8@1+") + "SG_MUL_VAL_ 385 T T 0-1;\n", "x.dbc:7: T: has a multiplexor here"));
-  CHECK(tells("BA_DEF_ BO_ \"VFrameFormat\" ENUM \"a\",\"b\";\n" + placed("0|8@1+") +
-                  "BA_ \"VFrameFormat\" BO_ 385 2;\n",
-              "x.dbc:8: VFrameFormat = 2: must be one of the formats"));
+      reports(message(" SG_ T : 0|8@1+ (0,0) [0|0] \"\" B\n"), "x.dbc:6: T = 0: the factor must"));
+  CHECK(reports("BO_ 2048 NODE: 8 A\n", "x.dbc:5: NODE = 2048: must be a number of 11 bits"));
+  CHECK(reports("BO_ 3758096384 NODE: 8 A\n", "x.dbc:5: NODE = 3758096384: must be a number"));
+  CHECK(reports(placed("0|8@1+") + placed("0|8@1+"), "x.dbc:7: NODE: is the name of two messages"));
+  CHECK(reports(placed("0|8@1+") + " SG_ T : 8|8@1+ (1,0) [0|0] \"\" B\n",
+                "x.dbc:7: T: is the name of two signals of NODE"));
+  CHECK(reports(placed("0|16@1+") + "SIG_VALTYPE_ 385 T : 1;\n", "x.dbc:7: T = 16: must have 32"));
+  CHECK(
+      reports(placed("0|16@1+") + "SIG_VALTYPE_ 385 U : 1;\n", "x.dbc:7: U: must be a signal of"));
+  CHECK(reports(placed("0|16@1+") + "SIG_VALTYPE_ 9 T : 1;\n",
+                "x.dbc:7: T = 9: is the number of no message"));
+  CHECK(reports(message(" SG_ T m1 : 0|8@1+ (1,0) [0|0] \"\" B\n"), "x.dbc:6: T = m1: needs a"));
+  CHECK(reports(message(" SG_ P M : 0|2@1+ (1,0) [0|0] \"\" B\n"
+                        " SG_ T m4 : 8|8@1+ (1,0) [0|0] \"\" B\n"),
+                "x.dbc:7: T = 4: is more than its multiplexor can be"));
+  CHECK(reports(message(" SG_ P m0M : 0|2@1+ (1,0) [0|0] \"\" B\n") + "SG_MUL_VAL_ 385 P P 0-1;\n",
+                "x.dbc:6: P: must not be selected by itself"));
+  CHECK(reports(placed("0|8@1+") + "SG_MUL_VAL_ 385 T T 0-1;\n",
+                "x.dbc:7: T: has a multiplexor here"));
+  CHECK(reports("BA_DEF_ BO_ \"VFrameFormat\" ENUM \"a\",\"b\";\n" + placed("0|8@1+") +
+                    "BA_ \"VFrameFormat\" BO_ 385 2;\n",
+                "x.dbc:8: VFrameFormat = 2: must be one of the formats"));
 }
 
 TEST_CASE("a syntax error of a DBC file is refused at its position", "[dbc]") {
-  const auto tells = [](const std::string& body, const std::string& start) {
+  const auto reports = [](const std::string& body, const std::string& start) {
     INFO(problems_of(body));
     return problems_of(body).find(start) == 0;
   };
-  CHECK(tells(placed("0|8@1+") + "HELLO\n", "x.dbc:7: HELLO: must be a keyword of DBC files"));
-  CHECK(tells(" SG_ T : 0|8@1+ (1,0) [0|0] \"\" B\n", "x.dbc:5: SG_: must follow a message"));
-  CHECK(tells(placed("0|8@2+"), "x.dbc:6: 2+ (1,0) [0|0] \"\" B: must be 1 (Intel) or 0"));
-  CHECK(tells(placed("0|8@1 "), "x.dbc:6: (1,0) [0|0] \"\" B: must be '+'"));
-  CHECK(tells(message(" SG_ T : 0|8@1+ (nan,0) [0|0] \"\" B\n"), "x.dbc:6: nan,0) [0|0] \"\" B: "));
-  CHECK(tells(message(" SG_ T : 0|8@1+ (1e999,0) [0|0] \"\" B\n"), "x.dbc:6: 1e999,0)"));
-  CHECK(tells(message(" SG_ T q1 : 0|8@1+ (1,0) [0|0] \"\" B\n"), "x.dbc:6: q1 : 0|8"));
-  CHECK(tells("BO_ 4294967296 NODE: 8 A\n", "x.dbc:5: 4294967296 NODE: 8 A: must be a message"));
-  CHECK(tells("CM_ \"no end;\n", "x.dbc:5: the string that begins here has no end"));
-  CHECK(tells("VAL_ 385 T 1\n", "x.dbc:6: the end of the file: must be ';'"));
-  CHECK(tells(std::string("BO_ 1 \x01\x02"), "x.dbc:5: ??: must be a message's name"));
+  CHECK(reports(placed("0|8@1+") + "HELLO\n", "x.dbc:7: HELLO: must be a keyword of DBC files"));
+  CHECK(reports(" SG_ T : 0|8@1+ (1,0) [0|0] \"\" B\n", "x.dbc:5: SG_: must follow a message"));
+  CHECK(reports(placed("0|8@2+"), "x.dbc:6: 2+ (1,0) [0|0] \"\" B: must be 1 (Intel) or 0"));
+  CHECK(reports(placed("0|8@1 "), "x.dbc:6: (1,0) [0|0] \"\" B: must be '+'"));
+  CHECK(
+      reports(message(" SG_ T : 0|8@1+ (nan,0) [0|0] \"\" B\n"), "x.dbc:6: nan,0) [0|0] \"\" B: "));
+  CHECK(reports(message(" SG_ T : 0|8@1+ (1e999,0) [0|0] \"\" B\n"), "x.dbc:6: 1e999,0)"));
+  CHECK(reports(message(" SG_ T q1 : 0|8@1+ (1,0) [0|0] \"\" B\n"), "x.dbc:6: q1 : 0|8"));
+  CHECK(reports("BO_ 4294967296 NODE: 8 A\n", "x.dbc:5: 4294967296 NODE: 8 A: must be a message"));
+  CHECK(reports("CM_ \"no end;\n", "x.dbc:5: the string that begins here has no end"));
+  CHECK(reports("VAL_ 385 T 1\n", "x.dbc:6: the end of the file: must be ';'"));
+  CHECK(reports(std::string("BO_ 1 \x01\x02"), "x.dbc:5: ??: must be a message's name"));
 }
 
 TEST_CASE("a flaw of a DBC file belongs to its message and signal, and the others are read",

@@ -12,17 +12,17 @@ using namespace thermocomp;
 namespace {
 
 /// All problems, one per line; "" for a valid file.
-std::string told(const std::string& text) {
-  std::string told;
+std::string reported(const std::string& text) {
+  std::string reported;
   for (const EdsFlaw& flaw : read_eds_text(text, "x.eds").flaws) {
-    told += to_string(flaw.problem) + "\n";
+    reported += to_string(flaw.problem) + "\n";
   }
-  return told;
+  return reported;
 }
 
 EdsFile good(const std::string& text) {
   EdsFile file = read_eds_text(text, "x.eds");
-  INFO(told(text));
+  INFO(reported(text));
   REQUIRE(file.flaws.empty());
   return file;
 }
@@ -91,34 +91,36 @@ TEST_CASE("CompactSubObj makes as many objects, named by its list or numbered", 
       "[7130Name]\nNrOfEntries=1\n2=Spindle\n");
   CHECK(file.names() == std::vector<std::string>{"PV/PV1", "PV/Spindle", "PV/PV3"});
   CHECK(file.find("Spindle").at(0)->address == ObjectAddress{0x7130, 2});
-  CHECK_THAT(told("[7130]\nParameterName=PV\nObjectType=8\nCompactSubObj=255\n"),
+  CHECK_THAT(reported("[7130]\nParameterName=PV\nObjectType=8\nCompactSubObj=255\n"),
              Catch::Contains("x.eds:1: 7130.CompactSubObj = 255: must be at most 254"));
 }
 
 TEST_CASE("a malformed line of a data sheet is refused", "[eds]") {
-  CHECK(told("") == "x.eds: is not an electronic data sheet: it has no objects\n");
-  CHECK_THAT(told("[FileInfo]\nFileName=x\n"), Catch::Contains("it has no object"));
-  CHECK_THAT(told(array + "PDOMapping\n"),
+  CHECK(reported("") == "x.eds: is not an electronic data sheet: it has no objects\n");
+  CHECK_THAT(reported("[FileInfo]\nFileName=x\n"), Catch::Contains("it has no object"));
+  CHECK_THAT(reported(array + "PDOMapping\n"),
              Catch::Contains("x.eds:14: PDOMapping: must be a section, an entry KEY=VALUE or a"));
-  CHECK_THAT(told(array + "=1\n"), Catch::Contains("x.eds:14: =1: must be a section, an entry"));
-  CHECK_THAT(told("FileName=x\n" + array),
+  CHECK_THAT(reported(array + "=1\n"),
+             Catch::Contains("x.eds:14: =1: must be a section, an entry"));
+  CHECK_THAT(reported("FileName=x\n" + array),
              Catch::Contains("x.eds:1: FileName=x: must be in a section"));
-  CHECK_THAT(told(array + "[1018\n"), Catch::Contains("x.eds:14: [1018: must be a section's name"));
-  CHECK_THAT(told(array + "DataType=0x0004\n"),
+  CHECK_THAT(reported(array + "[1018\n"),
+             Catch::Contains("x.eds:14: [1018: must be a section's name"));
+  CHECK_THAT(reported(array + "DataType=0x0004\n"),
              Catch::Contains("x.eds:14: DataType = 0x0004: appears twice in its section"));
-  CHECK_THAT(told(array + "[7130SUB1]\nParameterName=again\n"),
+  CHECK_THAT(reported(array + "[7130SUB1]\nParameterName=again\n"),
              Catch::Contains("x.eds:14: 7130SUB1: appears twice, first in line 8"));
 }
 
 TEST_CASE("invalid objects of a data sheet are refused", "[eds]") {
-  CHECK_THAT(told("[2000]\nDataType=3\n"),
+  CHECK_THAT(reported("[2000]\nDataType=3\n"),
              Catch::Contains("x.eds:1: 2000.ParameterName = (missing): must be given"));
-  CHECK_THAT(told("[2000]\nParameterName=x\nDataType=int16\n"),
+  CHECK_THAT(reported("[2000]\nParameterName=x\nDataType=int16\n"),
              Catch::Contains("x.eds:3: 2000.DataType = int16: must be a whole number"));
-  CHECK_THAT(told("[2000]\nParameterName=x\nDataType=-3\n"), Catch::Contains("whole number"));
-  CHECK_THAT(told("[2000sub1]\nParameterName=x\nDataType=3\n"),
+  CHECK_THAT(reported("[2000]\nParameterName=x\nDataType=-3\n"), Catch::Contains("whole number"));
+  CHECK_THAT(reported("[2000sub1]\nParameterName=x\nDataType=3\n"),
              Catch::Contains("x.eds:1: 2000sub1: is part of a missing object"));
-  CHECK_THAT(told(array + "[7130sub01]\nParameterName=y\nDataType=3\n"),
+  CHECK_THAT(reported(array + "[7130sub01]\nParameterName=y\nDataType=3\n"),
              Catch::Contains("is a duplicate object"));
 }
 
@@ -128,7 +130,7 @@ TEST_CASE("reading a data sheet stops after too many flaws", "[eds]") {
   const EdsFile file = read_eds_text(text, "x.eds");
   CHECK(file.flaws.size() == 1001);
   CHECK(file.objects.empty());
-  CHECK_THAT(told("[2000]\n" + std::string(5000, 'x') + "\n"),
+  CHECK_THAT(reported("[2000]\n" + std::string(5000, 'x') + "\n"),
              Catch::Contains("x.eds:2: " + std::string(60, 'x') + ": must be"));
 }
 

@@ -23,13 +23,13 @@ void check_all(const std::string& file, const std::vector<Broken>& table) {
 }
 
 /// The problems after one edit of the CANopen example or a file next to it.
-std::string told_after(const std::string& file, const std::string& from, const std::string& to) {
+std::string error_after(const std::string& file, const std::string& from, const std::string& to) {
   const ExampleFolder folder({"canopen.toml", "two_channel_module.eds", "column_model.toml"});
   folder.edit(file, from, to);
-  return folder.told();
+  return folder.problems_text();
 }
-std::string told_after(const std::string& from, const std::string& to) {
-  return told_after("canopen.toml", from, to);
+std::string error_after(const std::string& from, const std::string& to) {
+  return error_after("canopen.toml", from, to);
 }
 
 }  // namespace
@@ -128,25 +128,25 @@ TEST_CASE("a CANopen sensor is refused by key and rule", "[canopen][config]") {
 }
 
 TEST_CASE("names must be in the node's data sheet", "[canopen][config]") {
-  CHECK(told_after("heartbeat_s = 1.0 ", "heartbeat_s = 1.0 ").empty());
-  CHECK(told_after("\"AI input PV 1\"", "\"AI input PW 1\"") ==
+  CHECK(error_after("heartbeat_s = 1.0 ", "heartbeat_s = 1.0 ").empty());
+  CHECK(error_after("\"AI input PV 1\"", "\"AI input PW 1\"") ==
         "canopen.toml:76: sensor[table].object = \"AI input PW 1\": is not an object of the data "
         "sheet; "
         "did you mean AI input PV 1?\n");
-  CHECK_THAT(told_after("\"AI input PV 1\"", "\"Number of entries\""),
+  CHECK_THAT(error_after("\"AI input PV 1\"", "\"Number of entries\""),
              Catch::Contains("sensor[table].object = \"Number of entries\": is ambiguous: AI "
                              "sensor type/Number of entries or AI input PV/Number of entries"));
-  CHECK(told_after("two_channel_module.eds\"", "one_channel_module.eds\"") ==
+  CHECK(error_after("two_channel_module.eds\"", "one_channel_module.eds\"") ==
         "canopen.toml:60: device[ai_module].eds = \"one_channel_module.eds\": no such file\n");
-  CHECK_THAT(told_after("eds = \"two_channel_module.eds\"", "#"),
+  CHECK_THAT(error_after("eds = \"two_channel_module.eds\"", "#"),
              Catch::Contains("sensor[table].object = \"AI input PV 1\": needs the data sheet"));
   CHECK_THAT(
-      told_after("read_mappings = [1] ", "#"),
+      error_after("read_mappings = [1] ", "#"),
       Catch::Contains("sensor[table].object = \"AI input PV 1\": needs mappings of its device"));
-  CHECK(told_after("two_channel_module.eds", "DataType=0x0003", "DataType=0x0009") ==
+  CHECK(error_after("two_channel_module.eds", "DataType=0x0003", "DataType=0x0009") ==
         "canopen.toml:76: sensor[table].object = \"AI input PV 1\": is not a number in the data "
         "sheet; give its type\n");
-  CHECK(told_after("two_channel_module.eds", "[7130sub1]\n", "[7130sub1]\nAccess\n") ==
+  CHECK(error_after("two_channel_module.eds", "[7130sub1]\n", "[7130sub1]\nAccess\n") ==
         "two_channel_module.eds:75: Access: must be a section, an entry KEY=VALUE or a comment; "
         "type in the configuration replaces it\n");
 }
@@ -161,10 +161,10 @@ TEST_CASE("a flaw of a data sheet is a warning if no sensor uses it, or if type 
                                          "KEY=VALUE or a comment"));
   folder.edit("two_channel_module.eds", "[7130sub1]\nParameterName=AI input PV 1\nDataType=0x0003",
               "[7130sub1]\nParameterName=AI input PV 1\nDataType=int16");
-  CHECK_THAT(folder.told(), Catch::Contains("DataType = int16: must be a whole number"));
+  CHECK_THAT(folder.problems_text(), Catch::Contains("DataType = int16: must be a whole number"));
   folder.edit("canopen.toml", "object = \"AI input PV 1\"",
               "object = \"AI input PV 1\"\ntype = \"int16\"");
-  CHECK(folder.told().empty());
+  CHECK(folder.problems_text().empty());
 }
 
 TEST_CASE("a J1939 bus and its devices are refused by key and rule", "[j1939][config]") {

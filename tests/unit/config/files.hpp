@@ -92,7 +92,7 @@ class ExampleFolder {
   }
   [[nodiscard]] DaemonConfig load() const { return load_daemon_config(path_ / config_); }
   /// All problems, one per line, without the folder.
-  [[nodiscard]] std::string told() const {
+  [[nodiscard]] std::string problems_text() const {
     std::string text;
     for (const Problem& problem : problems_of([&] { return load(); })) {
       text += to_string(problem).substr(path_.string().size() + 1) + "\n";
@@ -121,9 +121,9 @@ void check_refused(const Broken& broken, const std::string& good, const std::str
                    Parse parse) {
   const std::string text = edited(good, broken.from, broken.to);
   const auto problems = problems_of([&] { return parse(text); });
-  std::string told;
-  for (const Problem& problem : problems) told += to_string(problem) + "\n";
-  INFO(broken.what << "\n" << told);
+  std::string problems_text;
+  for (const Problem& problem : problems) problems_text += to_string(problem) + "\n";
+  INFO(broken.what << "\n" << problems_text);
   CHECK(problems.size() == 1);
   if (problems.empty()) return;
   const Problem& problem = problems.front();

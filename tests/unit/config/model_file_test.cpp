@@ -353,7 +353,7 @@ TEST_CASE("a recorded course is read and written bit for bit", "[config][model]"
 }
 
 TEST_CASE("a broken course is named by key and rule", "[config][model]") {
-  const auto [from, to, said] = GENERATE(table<std::string, std::string, std::string>(
+  const auto [from, to, message] = GENERATE(table<std::string, std::string, std::string>(
       {{"\"cooling\"", "\"cold\"", "must be \"heating\", \"turned\" or \"cooling\""},
        {"since_s = [60.0, 1e3]", "since_s = [60.0]", "must have one value per point (2)"},
        {"[1.2, 0.9]", "[1.2, 1e308]", "must be in [0, 10]"},
@@ -368,7 +368,7 @@ TEST_CASE("a broken course is named by key and rule", "[config][model]") {
   const auto at = text.find(from);
   REQUIRE(at != std::string::npos);
   text.replace(at, from.size(), to);
-  CHECK_THROWS_WITH(parse_model(text, "model.toml"), Catch::Contains(said));
+  CHECK_THROWS_WITH(parse_model(text, "model.toml"), Catch::Contains(message));
 }
 
 TEST_CASE("the uncertainty growth of estimates is read and written bit for bit",

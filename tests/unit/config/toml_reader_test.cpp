@@ -15,7 +15,7 @@ TomlDocument document(const std::string& text) {
   return TomlDocument::from_text(text, "a.toml");
 }
 
-std::vector<std::string> told(const TomlDocument& read) {
+std::vector<std::string> problem_texts(const TomlDocument& read) {
   std::vector<std::string> lines;
   for (const Problem& problem : problems_of([&] {
          read.finish();
@@ -47,9 +47,9 @@ TEST_CASE("a completely read document has no problem", "[config][toml]") {
   CHECK(root.tables("l")[1].text("name") == "second");
   CHECK(root.tables("l")[1].path() == "l[second]");
   CHECK(root.tables("l")[1].line() == 13);
-  CHECK(told(document("")).empty());
+  CHECK(problem_texts(document("")).empty());
   CHECK(root.tables("l")[0].text("name") == "first");
-  CHECK(told(read).empty());
+  CHECK(problem_texts(read).empty());
 }
 
 TEST_CASE("each problem names file, line, key, value and rule", "[config][toml]") {
@@ -59,7 +59,7 @@ TEST_CASE("each problem names file, line, key, value and rule", "[config][toml]"
   CHECK(root.number("b", Range::above(0, 3)) > 0);
   CHECK(root.number("spelling", Range::any(), 2.0) == 2.0);
   CHECK(root.text("c").empty());
-  CHECK(told(read) ==
+  CHECK(problem_texts(read) ==
         std::vector<std::string>{"a.toml:1: a = 9: must be a whole number in [0, 5]",
                                  "a.toml:1: c = (missing): must be given",
                                  "a.toml:3: b = \"x\": must be a number",
@@ -73,12 +73,12 @@ TEST_CASE("values that are not numbers, or out of range, are refused", "[config]
     const TomlDocument read = document(std::string("a = ") + value);
     const double harmless = read.root().number("a", Range::between(0, 3));
     CHECK((harmless >= 0 && harmless <= 3));
-    CHECK(told(read).size() == 1);
+    CHECK(problem_texts(read).size() == 1);
   }
   for (const char* value : {"0", "3", "0.0", "3.0", "-0.0", "1e-300", "9007199254740993"}) {
     const TomlDocument read = document(std::string("a = ") + value);
     static_cast<void>(read.root().number("a", Range::at_least(0)));
-    CHECK(told(read).empty());
+    CHECK(problem_texts(read).empty());
   }
 }
 
@@ -96,7 +96,7 @@ TEST_CASE("every invalid element of a list is reported and the count is kept", "
   CHECK(read.root().numbers("a").size() == 4);
   CHECK(read.root().texts("b").size() == 2);
   CHECK(read.root().matrix("m", 2, 2).empty());
-  CHECK(told(read).size() == 4);
+  CHECK(problem_texts(read).size() == 4);
 }
 
 TEST_CASE("no problems are reported inside a missing table", "[config][toml]") {
@@ -106,13 +106,14 @@ TEST_CASE("no problems are reported inside a missing table", "[config][toml]") {
   CHECK(absent.text("x").empty());
   CHECK(absent.table("y").number("z") == 0.0);
   CHECK(read.root().integer("other", 0, 9) == 5);
-  CHECK(told(read) == std::vector<std::string>{"a.toml:1: needed = (missing): must be given"});
+  CHECK(problem_texts(read) ==
+        std::vector<std::string>{"a.toml:1: needed = (missing): must be given"});
 }
 
 TEST_CASE("an optional section still requires its keys", "[config][toml]") {
   const TomlDocument read = document("");
   CHECK(read.root().table_or_empty("section").text("x").empty());
-  CHECK(told(read).size() == 1);
+  CHECK(problem_texts(read).size() == 1);
 }
 
 TEST_CASE("no suggestion without a near name", "[config][toml]") {
@@ -135,7 +136,7 @@ TEST_CASE("numbers are written so that they parse to the same bits", "[config]")
 TEST_CASE("a problem stays on one line for any names, and shows an empty name", "[config][toml]") {
   const TomlDocument read = document("\"a\\nb\\u001b[2J\" = 1\nname = \"x\"\n");
   read.root().problem("name", "", "is no name");
-  const std::vector<std::string> lines = told(read);
+  const std::vector<std::string> lines = problem_texts(read);
   REQUIRE(lines.size() == 2);
   for (const std::string& line : lines) {
     CHECK(std::none_of(line.begin(), line.end(), [](char c) { return c >= 0 && c < ' '; }));
@@ -193,7 +194,7 @@ TEST_CASE("a hundred problems are reported and the rest is counted", "[config][t
   }
   const TomlDocument read = document(text);
   CHECK(!read.root().has("known"));
-  const auto lines = told(read);
+  const auto lines = problem_texts(read);
   REQUIRE(lines.size() == 101);
   CHECK(lines.front().starts_with("a.toml:1: unknown_0 = 1"));
   CHECK(lines.back() == "a.toml: and 300 more problems");
@@ -206,7 +207,7 @@ TEST_CASE("names with control codes are refused, and never printed as they are",
       document("a = \"x" + odd + "\"\nb = [\"y" + odd + "\"]\n\"k" + odd + "\" = 1\n");
   CHECK(read.root().text("a").empty());
   CHECK(read.root().texts("b") == std::vector<std::string>{""});
-  const auto lines = told(read);
+  const auto lines = problem_texts(read);
   CHECK(lines.size() == 3);
   CHECK_THAT(lines.front(), Catch::Contains("a = ") && Catch::Contains("must be printable"));
   for (const std::string& line : lines) CHECK(is_printable(line));
@@ -215,7 +216,7 @@ TEST_CASE("names with control codes are refused, and never printed as they are",
 TEST_CASE("a very long key does not make the error very long", "[config][toml]") {
   const TomlDocument read = document(std::string(100'000, 'k') + " = 1\n");
   CHECK(!read.root().has("known"));
-  const auto lines = told(read);
+  const auto lines = problem_texts(read);
   REQUIRE(lines.size() == 1);
   CHECK(lines.front().size() < 2000);
 }

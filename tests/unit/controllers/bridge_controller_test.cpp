@@ -21,15 +21,15 @@ struct Bench {
   Bench() : link({"mill", 1.0, {"x", "z"}, {"x_mm"}}, now_of_test) {
     test_now = 1000s;
     link.start();
-    told.session = 7;
-    told.taking = true;
-    told.applied_um[0] = 5.0;
-    told.applied_um[1] = -3.0;
-    told.signals[0] = 120.0;
+    reported.session = 7;
+    reported.taking = true;
+    reported.applied_um[0] = 5.0;
+    reported.applied_um[1] = -3.0;
+    reported.signals[0] = 120.0;
   }
   BridgeAnswer report() {
     test_now += 50ms;
-    const auto answer = link.report(told);
+    const auto answer = link.report(reported);
     REQUIRE(answer);
     return *answer;
   }
@@ -49,7 +49,7 @@ struct Bench {
   }
 
   BridgeController link;
-  BridgeReport told;
+  BridgeReport reported;
 };
 
 }  // namespace
@@ -96,7 +96,7 @@ TEST_CASE("offsets from before a re-homing are not sent after it", "[controllers
   bench.report();
   bench.want(5.0, -3.0);
   bench.report();
-  bench.told.applied_um[0] = 0.0;
+  bench.reported.applied_um[0] = 0.0;
   const BridgeAnswer answer = bench.report();
   CHECK_FALSE(answer.anew);  // the bridge keeps its offset: the same link
   CHECK_FALSE(answer.valid[0]);
@@ -110,7 +110,7 @@ TEST_CASE("a bridge that reads back twice the offset sent gets no more offsets",
   for (double offset_um = 5.0; offset_um < 9.0; offset_um += 0.2) {
     bench.want(offset_um, -3.0);
     CHECK_FALSE(bench.report().anew);
-    bench.told.applied_um[0] = 2.0 * offset_um;
+    bench.reported.applied_um[0] = 2.0 * offset_um;
   }
 }
 
@@ -120,8 +120,8 @@ TEST_CASE("a controller that takes no offsets is online and not synchronised",
   bench.report();
   bench.want(5.0, -3.0);
   bench.report();
-  bench.told.taking = false;
-  bench.told.applied_um[0] = 0.0;
+  bench.reported.taking = false;
+  bench.reported.applied_um[0] = 0.0;
   const BridgeAnswer off = bench.report();
   CHECK(off.anew);
   CHECK_FALSE(off.valid[0]);
@@ -131,14 +131,14 @@ TEST_CASE("a controller that takes no offsets is online and not synchronised",
   bench.want(5.0, -3.0);
   CHECK_FALSE(bench.report().valid[0]);
   CHECK_FALSE(bench.report().anew);  // still off: no new link
-  bench.told.taking = true;
+  bench.reported.taking = true;
   CHECK(bench.report().anew);
   CHECK(bench.state().applied_um[0] == 0.0);
 }
 
 TEST_CASE("an axis with unknown applied offset is not synchronised", "[controllers][bridge]") {
   Bench bench;
-  bench.told.applied_um[1] = not_a_number;
+  bench.reported.applied_um[1] = not_a_number;
   bench.report();
   bench.want(1.0, 1.0);
   CHECK_FALSE(bench.report().valid[0]);
@@ -148,7 +148,7 @@ TEST_CASE("an axis with unknown applied offset is not synchronised", "[controlle
 TEST_CASE("of two bridges the first is accepted until it is silent", "[controllers][bridge]") {
   Bench bench;
   bench.report();
-  BridgeReport other = bench.told;
+  BridgeReport other = bench.reported;
   other.session = 8;
   CHECK_FALSE(bench.link.report(other));
   CHECK(bench.link.health().read_errors == 1);

@@ -49,9 +49,9 @@ TEST_CASE("a report becomes the controller's state and is answered", "[daemon][b
 
 TEST_CASE("null means unknown", "[daemon][bridge]") {
   Rig rig;
-  json told = report();
-  told["signals"]["x_mm"] = nullptr;
-  rig.answer(told);
+  json reported = report();
+  reported["signals"]["x_mm"] = nullptr;
+  rig.answer(reported);
   ControllerState state;
   rig.bridge.newest(state);
   CHECK(std::isnan(state.signals[0]));
@@ -60,9 +60,9 @@ TEST_CASE("null means unknown", "[daemon][bridge]") {
 
 TEST_CASE("an invalid report is refused, counted and has no effect", "[daemon][bridge]") {
   const auto broken = [](const char* pointer, const json& value) {
-    json told = report();
-    told[json::json_pointer(pointer)] = value;
-    return told;
+    json reported = report();
+    reported[json::json_pointer(pointer)] = value;
+    return reported;
   };
   Rig rig;
   std::vector<json> bad = {
@@ -83,9 +83,9 @@ TEST_CASE("an invalid report is refused, counted and has no effect", "[daemon][b
       broken("/signals/coolant_on", -1e10),
       broken("/more", 1),
   };
-  for (const json& told : bad) {
-    INFO(told.dump());
-    CHECK_THROWS_AS(rig.answer(told), RpcError);
+  for (const json& reported : bad) {
+    INFO(reported.dump());
+    CHECK_THROWS_AS(rig.answer(reported), RpcError);
   }
   CHECK(rig.bridge.health().read_errors == bad.size());
   CHECK(rig.bridge.health().reads == 0);

@@ -315,13 +315,13 @@ TEST_CASE("a score survives restart and reload, for its two models only", "[cycl
     machine.probe();
   }
   CycleParts& first = machine.cycle.parts();
-  const double said = better(first);
-  REQUIRE(said > 0.5);
+  const double message = better(first);
+  REQUIRE(message > 0.5);
   PersistentState state = first.estimator.persistent_state(machine.cycle.report());
   first.candidate->add_to(state.correction);
 
   const double pair = GENERATE(1.0, 2.0);
-  const double expected = pair == 1.0 ? said : 0.25;
+  const double expected = pair == 1.0 ? message : 0.25;
   const auto restarted = contested(1.0, 2.0, pair);
   restarted->candidate->restore(state);
   CHECK(better(*restarted) == Approx(expected));

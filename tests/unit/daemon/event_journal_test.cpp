@@ -46,16 +46,16 @@ TEST_CASE("an outage has a fault, a recovery and a duration", "[daemon][events]"
 
 TEST_CASE("an intermittent fault is one outage of four events", "[daemon][events]") {
   Bench bench;
-  int told = 0;
+  int message = 0;
   for (int i = 0; i < 1200; ++i) {  // 4 Hz for five minutes
-    told +=
+    message +=
         bench.journal.fault({.subject = bed, .code = i % 4 == 0 ? "no_answer" : "stale"}) ? 1 : 0;
     bench.pass(125ms);
     CHECK(std::isnan(bench.journal.recovery(bed)) == (i > 0));
     bench.pass(125ms);
     CHECK(bench.journal.settle().empty());
   }
-  CHECK(told == 2);
+  CHECK(message == 2);
   CHECK(bench.journal.comes_and_goes(bed));
   bench.pass(9s);
   CHECK(bench.journal.settle().empty());

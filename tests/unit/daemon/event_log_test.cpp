@@ -54,12 +54,12 @@ TEST_CASE("a suspected sensor is a fault with its size, and recovers", "[daemon]
   bench.report.sensors[1].suspected = false;
   bench.report.reasons = 0;
   bench.pass(1s);
-  const auto told = bench.about("suspected sensor head");
-  REQUIRE(told.size() == 2);
-  CHECK(told[0].kind == EventKind::fault);
-  CHECK(what_text(told[0]) == "off by -2.0 K against its neighbours");
-  CHECK(told[1].kind == EventKind::recovery);
-  CHECK(told[1].duration_s == Approx(60.0));
+  const auto reported = bench.about("suspected sensor head");
+  REQUIRE(reported.size() == 2);
+  CHECK(reported[0].kind == EventKind::fault);
+  CHECK(what_text(reported[0]) == "off by -2.0 K against its neighbours");
+  CHECK(reported[1].kind == EventKind::recovery);
+  CHECK(reported[1].duration_s == Approx(60.0));
   CHECK(bench.about("suspected sensor bed").empty());
   const auto reason = bench.about("reason sensor_suspected");
   REQUIRE(reason.size() == 2);
@@ -76,10 +76,10 @@ TEST_CASE("a target that oscillates about its bound is one outage", "[daemon][ev
   bench.pass(40s);
   CHECK(bench.about("reason at_bound").size() == 1);
   bench.pass(20s);
-  const auto told = bench.about("reason at_bound");
-  REQUIRE(told.size() == 2);
-  CHECK(told[1].kind == EventKind::recovery);
-  CHECK(told[1].duration_s == Approx(99 * 20.0));  // to its last end
+  const auto reported = bench.about("reason at_bound");
+  REQUIRE(reported.size() == 2);
+  CHECK(reported[1].kind == EventKind::recovery);
+  CHECK(reported[1].duration_s == Approx(99 * 20.0));  // to its last end
 }
 
 TEST_CASE("a block that is lost and back four times a second makes a few lines per outage",
@@ -112,9 +112,9 @@ TEST_CASE("a block that is lost and back four times a second makes a few lines p
   bench.pass(20s);
   bench.log.note_estimates(bench.report, bench.config, {"bed_degC", "head_degC"});
   spdlog::set_default_logger(before);
-  const std::string said = text.str();
-  CHECK(std::count(said.begin(), said.end(), '\n') < 30);
-  CHECK(said.find("sensor bed: no_answer: over, lasted 600.0 s") != std::string::npos);
+  const std::string message = text.str();
+  CHECK(std::count(message.begin(), message.end(), '\n') < 30);
+  CHECK(message.find("sensor bed: no_answer: over, lasted 600.0 s") != std::string::npos);
   CHECK(bench.journal.events().size() < 30);
   CHECK(bench.journal.events().back().code == "compensating");
 }
@@ -127,9 +127,9 @@ TEST_CASE("a reason without a limit ends at once", "[daemon][events]") {
   bench.report.reasons = 0;
   bench.report.mode = Mode::compensating;
   bench.pass(7s);
-  const auto told = bench.about("reason block_lost");
-  REQUIRE(told.size() == 2);
-  CHECK(told[1].duration_s == Approx(7.0));
+  const auto reported = bench.about("reason block_lost");
+  REQUIRE(reported.size() == 2);
+  CHECK(reported[1].duration_s == Approx(7.0));
 }
 
 TEST_CASE("failing writes are one outage with its cause, a single failure is none",
@@ -151,9 +151,9 @@ TEST_CASE("failing writes are one outage with its cause, a single failure is non
   controller.write.error.clear();
   bench.monotonic += 1s;
   bench.log.note_controller(controller);
-  const auto told = bench.about("writes to controller plc");
-  REQUIRE(told.size() == 2);
-  CHECK(what_text(told[0]) == "the controller refuses writes (function 16, register 100)");
-  CHECK(told[1].kind == EventKind::recovery);
-  CHECK(told[1].duration_s == Approx(10.0));
+  const auto reported = bench.about("writes to controller plc");
+  REQUIRE(reported.size() == 2);
+  CHECK(what_text(reported[0]) == "the controller refuses writes (function 16, register 100)");
+  CHECK(reported[1].kind == EventKind::recovery);
+  CHECK(reported[1].duration_s == Approx(10.0));
 }

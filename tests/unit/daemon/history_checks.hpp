@@ -32,13 +32,13 @@ inline std::uint64_t records_in(const std::filesystem::path& file) {
   return records;
 }
 
-inline std::string told(const std::vector<HistoryDamage>& damage) {
+inline std::string damage_text(const std::vector<HistoryDamage>& damage) {
   std::string text;
   for (const HistoryDamage& part : damage) text += to_string(part) + "\n";
   return text;
 }
 
-inline std::string told(const std::vector<std::string>& news) {
+inline std::string damage_text(const std::vector<std::string>& news) {
   std::string text;
   for (const std::string& line : news) text += line + "\n";
   return text;

@@ -53,11 +53,11 @@ TEST_CASE("an export is a run file with the daemon's model inputs", "[history][e
   CHECK_FALSE(has_negative_zero(all.str()));
   const auto columns = machine.estimator().model().temperature_columns();
   for (std::size_t i = 0; i < columns.size(); ++i) {
-    const double told = whole.column(columns[i]).back();
+    const double damage_text = whole.column(columns[i]).back();
     if (last.inputs[i].good)
-      CHECK(told == last.inputs[i].temp_degC);  // bitwise
+      CHECK(damage_text == last.inputs[i].temp_degC);  // bitwise
     else
-      CHECK(std::isnan(told));
+      CHECK(std::isnan(damage_text));
   }
 
   std::ostringstream replayed;
@@ -118,14 +118,14 @@ TEST_CASE("a probing is exported as displacement, without the offset in effect",
   for (const char* axis : {"y", "z"}) {
     const std::string name(axis);
     if (!run.find(name + "_um")) continue;
-    const auto said = run.column(name + "_measured_um");
+    const auto message = run.column(name + "_measured_um");
     const auto displacement = run.column(name + "_um");
     const auto applied = run.column(name + "_applied_um");
     for (std::size_t row = 0; row < run.rows(); ++row) {
-      CHECK(std::isnan(said[row]) == std::isnan(displacement[row]));
-      if (std::isnan(said[row]) || !std::isfinite(applied[row])) continue;
+      CHECK(std::isnan(message[row]) == std::isnan(displacement[row]));
+      if (std::isnan(message[row]) || !std::isfinite(applied[row])) continue;
       // The applied offset may be a tenth of a second newer.
-      CHECK(std::abs(said[row] - applied[row] - displacement[row]) < 0.2);
+      CHECK(std::abs(message[row] - applied[row] - displacement[row]) < 0.2);
       ++probed;
     }
   }

@@ -51,7 +51,7 @@ TEST_CASE("a stop in the first cycle of a segment leaves a readable segment", "[
   machine.writer().work();
   const ReplaySummary summary = replay_quietly(config.file);
   CHECK(summary.segments == 2);
-  CHECK(told(summary.damage).empty());
+  CHECK(damage_text(summary.damage).empty());
   CHECK(summary.different == 0);
   CHECK(summary.compared > 0);
 }
@@ -93,9 +93,9 @@ TEST_CASE("rows that no daemon wrote are reported as damage and never make a rep
   }
   INFO(damage << ", with checksums: " << has_checksums);
   std::ostringstream out;
-  const bool only_told = damage.find("wall") != std::string::npos;
+  const bool only_reported = damage.find("wall") != std::string::npos;
   const ReplaySummary replayed = replay_quietly(config.file);
-  CHECK((only_told || !replayed.damage.empty()));
+  CHECK((only_reported || !replayed.damage.empty()));
   const ExportSummary exported = export_run(config.file, {}, {}, out, {}, parse_test_setup);
   CHECK(!exported.damage.empty());
   CHECK_THAT(out.str(), Catch::Contains("# damaged: segment 1: "));
@@ -124,7 +124,8 @@ TEST_CASE("one flipped bit costs one chunk; all others are exported and replayed
           " WHERE segment = 1 AND number = 2");
   const HistoryCheck check = check_history(config.file, {}, parse_test_setup);
   REQUIRE(check.segments.size() == 2);
-  CHECK_THAT(told(check.segments[0].damage), Catch::Contains("chunk 2 does not fit its checksum"));
+  CHECK_THAT(damage_text(check.segments[0].damage),
+             Catch::Contains("chunk 2 does not fit its checksum"));
   CHECK(check.segments[1].damage.empty());
   std::ostringstream out;
   const ExportSummary after = export_run(config.file, {}, {}, out, {}, parse_test_setup);
@@ -149,7 +150,7 @@ TEST_CASE("a clock set beyond the year 2116 costs only the wall time", "[history
   std::ostringstream out;
   const ExportSummary after = export_run(config.file, {}, {}, out, {}, parse_test_setup);
   CHECK(after.rows == before.rows);
-  CHECK_THAT(told(after.damage), Catch::Contains("segment 2: its wall time is impossible"));
+  CHECK_THAT(damage_text(after.damage), Catch::Contains("segment 2: its wall time is impossible"));
   CHECK(replay_quietly(config.file).segments == 2);
 }
 
@@ -159,7 +160,7 @@ TEST_CASE("a segment that claims more cycles than its chunks hold is replayed to
   const HistoryConfig config = recorded_history(folder / "h.db", 500);
   run_sql(config.file, "UPDATE segment SET last_cycle = last_cycle + 1");
   const ReplaySummary summary = replay_quietly(config.file);
-  CHECK_THAT(told(summary.damage), Catch::Contains("end before its last cycle"));
+  CHECK_THAT(damage_text(summary.damage), Catch::Contains("end before its last cycle"));
   CHECK(summary.compared > 0);
   CHECK(summary.different == 0);
 }
@@ -170,7 +171,7 @@ TEST_CASE("a start state later than the segment's first cycle is refused", "[his
   run_sql(config.file,
           "UPDATE segment SET grid_start_ns = grid_start_ns - 3600000000000,"
           " checksum = NULL");
-  CHECK_THAT(told(replay_quietly(config.file).damage), Catch::Contains("of a later time"));
+  CHECK_THAT(damage_text(replay_quietly(config.file).damage), Catch::Contains("of a later time"));
 }
 
 TEST_CASE("segments that overlap in time are damage", "[history][damage]") {
@@ -178,7 +179,8 @@ TEST_CASE("segments that overlap in time are damage", "[history][damage]") {
   const HistoryConfig config = recorded_history(folder / "h.db", 500, 500);
   run_sql(config.file, "UPDATE segment SET first_cycle = 0 WHERE id = 2");
   const ReplaySummary summary = replay_quietly(config.file);
-  CHECK_THAT(told(summary.damage), Catch::Contains("segment 2: begins before the one in front"));
+  CHECK_THAT(damage_text(summary.damage),
+             Catch::Contains("segment 2: begins before the one in front"));
   CHECK(summary.segments == 1);
   CHECK(summary.different == 0);
 }

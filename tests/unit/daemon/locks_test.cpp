@@ -79,9 +79,9 @@ TEST_CASE("a locked file is refused with its holder, until released", "[locks]")
   const TempFolder folder;
   {
     const FileLock lock(folder / "history.db");
-    const std::string said = refusal([&] { FileLock second(folder / "history.db"); });
-    CHECK(said.find((folder / "history.db").string()) != std::string::npos);
-    CHECK(said.find(this_process()) != std::string::npos);
+    const std::string printed = refusal([&] { FileLock second(folder / "history.db"); });
+    CHECK(printed.find((folder / "history.db").string()) != std::string::npos);
+    CHECK(printed.find(this_process()) != std::string::npos);
   }
   CHECK_FALSE(std::filesystem::exists(folder / "history.db.lock"));
   const FileLock again(folder / "history.db");
@@ -145,9 +145,9 @@ TEST_CASE("of two processes started at the same moment exactly one gets the name
   for (int round = 0; round < 20; ++round) {
     const std::string name = own_name() + " " + std::to_string(round);
     int go[2];
-    int told[2];
+    int shown[2];
     REQUIRE(pipe(go) == 0);
-    REQUIRE(pipe(told) == 0);
+    REQUIRE(pipe(shown) == 0);
     std::vector<pid_t> children;
     for (int i = 0; i < 2; ++i) {
       children.push_back(fork());
@@ -160,18 +160,18 @@ TEST_CASE("of two processes started at the same moment exactly one gets the name
       } catch (const LockHeld&) {
         byte = '-';
       }
-      static_cast<void>(write(told[1], &byte, 1) == 1);
+      static_cast<void>(write(shown[1], &byte, 1) == 1);
       for (;;) pause();
     }
     REQUIRE(write(go[1], "ab", 2) == 2);
     std::string results(2, '?');
-    for (char& result : results) CHECK(read(told[0], &result, 1) == 1);
+    for (char& result : results) CHECK(read(shown[0], &result, 1) == 1);
     CHECK(std::count(results.begin(), results.end(), 'x') == 1);
     for (const pid_t child : children) {
       ::kill(child, SIGKILL);
       waitpid(child, nullptr, 0);
     }
-    for (const int fd : {go[0], go[1], told[0], told[1]}) close(fd);
+    for (const int fd : {go[0], go[1], shown[0], shown[1]}) close(fd);
   }
 }
 

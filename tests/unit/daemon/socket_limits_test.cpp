@@ -60,12 +60,12 @@ TEST_CASE("a subscriber that does not read takes no memory and is sent the numbe
   }
   CHECK(server.statistics().missed >= 3);
   CHECK(server.statistics().buffered_bytes < 1000000);
-  json told = {{"method", ""}};
-  for (int i = 0; i < 100 && told.value("method", "") != "missed"; ++i) {
-    told = json::parse(slow.line(), nullptr, false);
+  json reported = {{"method", ""}};
+  for (int i = 0; i < 100 && reported.value("method", "") != "missed"; ++i) {
+    reported = json::parse(slow.line(), nullptr, false);
   }
-  REQUIRE(told["method"] == "missed");
-  CHECK(told["params"]["notifications"].get<int>() >= 3);
+  REQUIRE(reported["method"] == "missed");
+  CHECK(reported["params"]["notifications"].get<int>() >= 3);
 }
 
 TEST_CASE("a flood of requests is delayed, not refused, and other clients are answered",

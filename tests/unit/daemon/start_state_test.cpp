@@ -98,10 +98,10 @@ TEST_CASE("a first start is disabled unless configured otherwise", "[state]") {
   const DaemonConfig config = in_folder(folder);
   CHECK_FALSE(find_start_state(config).state.enabled);
   // An operator's command overrides the configuration.
-  PersistentState said;
-  said.enabled = true;
+  PersistentState message;
+  message.enabled = true;
   REQUIRE(
-      save_state_file(config.state_file, said, false, {12.0, ReferenceOrigin::command}).empty());
+      save_state_file(config.state_file, message, false, {12.0, ReferenceOrigin::command}).empty());
   const StartState start = find_start_state(config);
   CHECK(start.state.enabled);
   CHECK(start.reference.wall_s == 12.0);

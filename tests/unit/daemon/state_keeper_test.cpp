@@ -15,13 +15,13 @@ using namespace std::chrono_literals;
 
 namespace {
 
-std::atomic<bool> disk_stands{false};
+std::atomic<bool> disk_is_stalled{false};
 
 }  // namespace
 
 /// Replaces the C library's.
 extern "C" int fsync(int file) {
-  while (disk_stands) std::this_thread::sleep_for(1ms);
+  while (disk_is_stalled) std::this_thread::sleep_for(1ms);
   return static_cast<int>(syscall(SYS_fsync, file));
 }
 
@@ -97,7 +97,7 @@ TEST_CASE("a failed write is retried until it succeeds", "[state]") {
 
 TEST_CASE("a hanging disk blocks nobody and then gets the newest state only", "[state]") {
   Kept kept;
-  disk_stands = true;
+  disk_is_stalled = true;
   StateKeeper keeper(kept.file, with_offset(1.0), true, false);
   const auto begun = StateKeeper::Clock::now();
   for (int i = 2; i <= 50; ++i) keeper.save(with_offset(i), kept.now);
@@ -109,7 +109,7 @@ TEST_CASE("a hanging disk blocks nobody and then gets the newest state only", "[
   CHECK(keeper.error().empty());
   keeper.poll(kept.now + 6s);
   CHECK_THAT(keeper.error(), Catch::Contains("does not answer"));
-  disk_stands = false;
+  disk_is_stalled = false;
   REQUIRE(keeper.wait(20s));
   CHECK(keeper.error().empty());
   CHECK(keeper.saving(1) == StateKeeper::Saving::on_disk);
@@ -136,14 +136,14 @@ TEST_CASE("the state on disk is reported with its serial", "[state]") {
 
 TEST_CASE("a keeper ends while its disk hangs", "[state]") {
   Kept kept;
-  disk_stands = true;
+  disk_is_stalled = true;
   const auto begun = StateKeeper::Clock::now();
   {
     StateKeeper keeper(kept.file, with_offset(1.0), false, false);
     keeper.save(with_offset(1.0), kept.now);
   }
   CHECK(StateKeeper::Clock::now() - begun < 20s);
-  disk_stands = false;
+  disk_is_stalled = false;
 }
 
 TEST_CASE("a lost reference stays lost across restarts until one is taken", "[state]") {

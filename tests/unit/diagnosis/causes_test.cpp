@@ -107,14 +107,14 @@ TEST_CASE("every cause is complete, and none is there twice", "[diagnosis][cause
     CHECK(families.contains(cause.family));
     CHECK((cause.hypotheses != nullptr || cause.in_network != nullptr));
     CHECK_FALSE(cause.texts.title.empty());
-    CHECK_FALSE(cause.texts.says.empty());
+    CHECK_FALSE(cause.texts.description.empty());
     REQUIRE_FALSE(cause.texts.to_do.empty());
     CHECK(cause.texts.to_do.back() == '.');
     Names parameters;
     for (const CauseParameter& parameter : cause.parameters) {
       INFO(parameter.name);
       CHECK(parameters.insert(std::string(parameter.name)).second);
-      CHECK_FALSE(parameter.says.empty());
+      CHECK_FALSE(parameter.description.empty());
       REQUIRE_FALSE(parameter.unit.empty());
       CHECK(parameter.low < parameter.high);
       if (parameter.unit != "1") CHECK(parameter.name.ends_with(suffix_of(parameter.unit)));

@@ -118,9 +118,9 @@ TEST_CASE("faults of a reading have the columns that a prediction with them has"
 TEST_CASE("exchanged readings and play of one act through a bank of lags", "[diagnosis]") {
   const ThermalModel model = model_with_bank();
   const MeasuredData data = data_of(model, 300);
-  MeasuredRun calm = data.runs.front();
-  calm.inputs_K = calm.calm_inputs_K;
-  const Column before_um = model_over(model, calm, data)[0];
+  MeasuredRun denoised = data.runs.front();
+  denoised.inputs_K = denoised.denoised_inputs_K;
+  const Column before_um = model_over(model, denoised, data)[0];
   for (const Hypothesis& of : hypotheses(data, stacked_rows(data))) {
     const bool play = of.cause == "hysteresis" && of.subject == "t1_degC";
     if (of.cause != "sensor_swap" && !play) continue;
@@ -128,7 +128,7 @@ TEST_CASE("exchanged readings and play of one act through a bank of lags", "[dia
     ThermalModel extended = model;
     extended.terms.push_back({of.cause, of.subject, {}, {}});
     if (play) extended.terms.back().shared["width_K"] = shape[0];
-    const Column more_um = model_over(extended, calm, data)[0] - before_um;
+    const Column more_um = model_over(extended, denoised, data)[0] - before_um;
     INFO(of.cause);
     CHECK((of.columns({shape}, 0).col(0) - more_um).cwiseAbs().maxCoeff() < 1e-9);
     CHECK(more_um.cwiseAbs().maxCoeff() > 0.1);

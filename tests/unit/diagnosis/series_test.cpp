@@ -87,8 +87,8 @@ TEST_CASE("a reading is calmed of its noise, and left alone where it has none", 
     truth[row] = 5.0 * std::sin(time_s[row] / 3000.0);
     noisy[row] = truth[row] + noise(random);
   }
-  CHECK((calm(time_s, noisy) - truth).norm() < 0.6 * (noisy - truth).norm());
-  CHECK((calm(time_s, truth) - truth).cwiseAbs().maxCoeff() < 1e-9);
+  CHECK((denoised(time_s, noisy) - truth).norm() < 0.6 * (noisy - truth).norm());
+  CHECK((denoised(time_s, truth) - truth).cwiseAbs().maxCoeff() < 1e-9);
 }
 
 TEST_CASE("a shifted series is late by the shift, held at its ends", "[diagnosis]") {

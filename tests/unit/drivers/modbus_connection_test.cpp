@@ -301,7 +301,7 @@ TEST_CASE("RTU: the echo of the request and bytes before the answer are skipped"
 
 TEST_CASE("bytes received in place of the answer are described", "[connection]") {
   Lines lines;
-  const auto said = [&](bool rtu, const peer::Handler& handler) {
+  const auto message = [&](bool rtu, const peer::Handler& handler) {
     lines.handle(handler);
     ModbusConnection connection(lines.line(rtu));
     REQUIRE(connection.connect());
@@ -316,20 +316,20 @@ TEST_CASE("bytes received in place of the answer are described", "[connection]")
     return reply;
   };
   for (const bool rtu : {false, true})
-    CHECK_THAT(said(rtu, of_unit_9), Catch::Contains("unit 9 answered, asked was unit 3"));
+    CHECK_THAT(message(rtu, of_unit_9), Catch::Contains("unit 9 answered, asked was unit 3"));
   const auto of_transaction_0 = [](const peer::Request&) {
     return peer::Reply{.raw = {0, 0, 0, 0, 0, 7, 3, 4, 4, 0, 1, 0, 2}};
   };
-  CHECK_THAT(said(false, of_transaction_0), Catch::Contains("expected transaction 1, got 0") &&
-                                                Catch::Contains("ignore_transaction = true"));
+  CHECK_THAT(message(false, of_transaction_0), Catch::Contains("expected transaction 1, got 0") &&
+                                                   Catch::Contains("ignore_transaction = true"));
   const auto wide = [](const peer::Request&) {
     return peer::Reply{peer::registers_pdu(4, {1, 2, 3, 4})};
   };
   for (const bool rtu : {false, true})
-    CHECK_THAT(said(rtu, wide), Catch::Contains("expected 4 bytes of data, got 8") &&
-                                    Catch::Contains("wide_registers = true"));
+    CHECK_THAT(message(rtu, wide), Catch::Contains("expected 4 bytes of data, got 8") &&
+                                       Catch::Contains("wide_registers = true"));
   const auto part = [](const peer::Request&) { return peer::Reply{.raw = {3, 4, 4, 0, 7}}; };
-  CHECK_THAT(said(true, part),
+  CHECK_THAT(message(true, part),
              Catch::Contains("broke off: 5 of 9 bytes (03 04 04 00 07) within timeout_ms = 300"));
 }
 

@@ -14,7 +14,7 @@ namespace {
 
 /// A controller that applies (and shows) `answer(offset)`.
 template <class Answer>
-Bench lied_to(double target_um, const Answer& answer) {
+Bench wrong_read_back(double target_um, const Answer& answer) {
   Bench bench;
   bench.obeys = false;
   bench.input.applied_um = answer(0.0);
@@ -30,7 +30,7 @@ Bench lied_to(double target_um, const Answer& answer) {
   return bench;
 }
 
-std::string said(const Bench& bench) {
+std::string cause_text(const Bench& bench) {
   return likely_text(bench.axis().latched_mismatch());
 }
 
@@ -149,9 +149,9 @@ TEST_CASE("a read-back from before the first write is not an answer to it", "[ax
     if (i >= 2 && bench.axis().driven()) bench.input.applied_um = bench.axis().offset_um() + 3.0;
   }
   REQUIRE(bench.axis().latched());
-  const std::string told = likely_text(bench.axis().latched_mismatch());
-  CHECK(told.find("constant +3.0 um") != std::string::npos);
-  CHECK(told.find("another writer") == std::string::npos);
+  const std::string message = likely_text(bench.axis().latched_mismatch());
+  CHECK(message.find("constant +3.0 um") != std::string::npos);
+  CHECK(message.find("another writer") == std::string::npos);
 }
 
 TEST_CASE("a factor that explains the older read-backs badly is not sure and can be released",
@@ -164,25 +164,26 @@ TEST_CASE("a factor that explains the older read-backs badly is not sure and can
 }
 
 TEST_CASE("the usual mistakes of commissioning are reported by name", "[axis]") {
-  CHECK(said(lied_to(-30.0, [](double um) { return 2.0 * um; })) ==
+  CHECK(cause_text(wrong_read_back(-30.0, [](double um) { return 2.0 * um; })) ==
         "reads back twice what is sent: check scale");
-  CHECK(said(lied_to(30.0, [](double um) { return 0.5 * um; })) ==
+  CHECK(cause_text(wrong_read_back(30.0, [](double um) { return 0.5 * um; })) ==
         "reads back half of what is sent: check scale");
-  CHECK(said(lied_to(30.0, [](double um) { return 10.0 * um; })) ==
+  CHECK(cause_text(wrong_read_back(30.0, [](double um) { return 10.0 * um; })) ==
         "reads back 10 times what is sent: check scale");
-  CHECK(said(lied_to(-30.0, [](double um) { return -um; })) == "opposite sign: check sign");
-  CHECK(said(lied_to(30.0, [](double um) { return -2.0 * um; })) ==
+  CHECK(cause_text(wrong_read_back(-30.0, [](double um) { return -um; })) ==
+        "opposite sign: check sign");
+  CHECK(cause_text(wrong_read_back(30.0, [](double um) { return -2.0 * um; })) ==
         "reads back -2 times what is sent: check scale and sign");
-  CHECK(said(lied_to(-30.0, [](double um) { return um + 3.0; })) ==
+  CHECK(cause_text(wrong_read_back(-30.0, [](double um) { return um + 3.0; })) ==
         "constant +3.0 um: check the offset's zero");
-  CHECK(said(lied_to(30.0, [](double) { return 1.0; })) ==
+  CHECK(cause_text(wrong_read_back(30.0, [](double) { return 1.0; })) ==
         "does not take what is sent (rejects it or stands still)");
   Bench bench;
   bench.steps(100, 10.0);
   bench.obeys = false;
   bench.input.applied_um = 31.0;
   bench.steps(3, 10.0);
-  CHECK(said(bench) == "changes without us: another writer?");
+  CHECK(cause_text(bench) == "changes without us: another writer?");
 }
 
 TEST_CASE("a sign that flips while running is reported by name", "[axis]") {
@@ -195,7 +196,7 @@ TEST_CASE("a sign that flips while running is reported by name", "[axis]") {
       bench.step(moves ? 30.0 : 10.0);
     }
     REQUIRE(bench.axis().latched());
-    CHECK(said(bench) == "opposite sign: check sign");
+    CHECK(cause_text(bench) == "opposite sign: check sign");
     bench.release();
     bench.steps(50, 10.0);
     CHECK(bench.axis().latched());  // still opposite
@@ -203,7 +204,7 @@ TEST_CASE("a sign that flips while running is reported by name", "[axis]") {
 }
 
 TEST_CASE("a release is refused while the same cause persists", "[axis]") {
-  Bench bench = lied_to(-30.0, [](double um) { return 2.0 * um; });
+  Bench bench = wrong_read_back(-30.0, [](double um) { return 2.0 * um; });
   const double sent_um = bench.axis().offset_um();
   bench.release();
   bench.steps(50, -30.0);
@@ -218,7 +219,7 @@ TEST_CASE("a release is refused while the same cause persists", "[axis]") {
 }
 
 TEST_CASE("a latched mismatch survives a new link and a reload", "[axis]") {
-  Bench bench = lied_to(-30.0, [](double um) { return -um; });
+  Bench bench = wrong_read_back(-30.0, [](double um) { return -um; });
   bench.input.link_epoch = 2;
   bench.input.applied_um = 0.0;
   bench.steps(10, -30.0);
@@ -229,5 +230,5 @@ TEST_CASE("a latched mismatch survives a new link and a reload", "[axis]") {
   after.steps(10, -30.0);
   CHECK(after.axis().latched());
   CHECK_FALSE(after.axis().driven());
-  CHECK(said(after) == "opposite sign: check sign");
+  CHECK(cause_text(after) == "opposite sign: check sign");
 }

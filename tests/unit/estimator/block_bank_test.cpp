@@ -96,8 +96,8 @@ TEST_CASE("a difference sensor gives the difference to its reference of the same
 
 TEST_CASE("sensors, columns or references that do not exist are refused", "[blocks]") {
   auto config = config_of({"a"}, {{"one", "t1_degC", {0}}});
-  const auto refuses = [&config](const char* column, const char* said) {
-    CHECK_THROWS_WITH(BlockBank(config, {column}), said);
+  const auto refuses = [&config](const char* column, const char* message) {
+    CHECK_THROWS_WITH(BlockBank(config, {column}), message);
   };
   refuses("t2_degC", "model.inputs = t2_degC: no [[block]] has this input");
   config.blocks[0].sensors = {1};

@@ -26,7 +26,7 @@ struct MonthResult {
   double rms_um{0.0};
   int given{0};
   int asked_back{0};
-  int wrong_believed{0};
+  int wrong_accepted{0};
 };
 
 /// The machine's head warms by 12 K in an hour, its column by 5 K in four; both differ from the
@@ -35,7 +35,7 @@ class Month {
  public:
   Month(Lesson lesson, std::uint32_t seed)
       : lesson_(lesson), engine_(seed), estimator_(config(lesson), small_model()) {
-    for (int i = 0; i < 3; ++i) slip_at_[static_cast<std::size_t>(i)] = 20 + 40 * i;
+    for (int i = 0; i < 3; ++i) entry_error_at_[static_cast<std::size_t>(i)] = 20 + 40 * i;
   }
 
   MonthResult run() {
@@ -92,21 +92,22 @@ class Month {
     const double sd_um = std::uniform_real_distribution<double>(0.5, 2.0)(engine_);
     const double true_um = cut_um_ + std::normal_distribution<double>(0.0, sd_um)(engine_);
     const bool is_missing = parts_ % 3 == 0;
-    const auto slip = std::find(slip_at_.begin(), slip_at_.end(), parts_) - slip_at_.begin();
-    if (is_missing && slip == 3) return;
+    const auto entry_error =
+        std::find(entry_error_at_.begin(), entry_error_at_.end(), parts_) - entry_error_at_.begin();
+    if (is_missing && entry_error == 3) return;
     // That of another tool; the wrong sign after a day with 20 um; ten times 2 um or more.
     const double tenfold_um = 10.0 * std::copysign(std::max(2.0, std::abs(true_um)), true_um);
     const std::array<double, 4> typed{31.0, -true_um - 20.0, tenfold_um, true_um};
-    const double typed_um = typed[static_cast<std::size_t>(slip)];
+    const double typed_um = typed[static_cast<std::size_t>(entry_error)];
     const AxisReport axis = estimator_.make_report().axes[0];
     const double expected_um = axis.displacement_um + controller_.applied_um[0];
     if (lesson_ == Lesson::asked &&
-        slip_of(typed_um, expected_um, std::hypot(claimed_um, sd_um)) != Slip::none) {
+        entry_error_of(typed_um, expected_um, std::hypot(claimed_um, sd_um)) != EntryError::none) {
       ++result_.asked_back;
-      if (slip == 3) give(typed_um, sd_um);  // correct, and confirmed
+      if (entry_error == 3) give(typed_um, sd_um);  // correct, and confirmed
       return;
     }
-    if (slip < 3) ++result_.wrong_believed;
+    if (entry_error < 3) ++result_.wrong_accepted;
     give(typed_um, sd_um);
   }
 
@@ -137,7 +138,7 @@ class Month {
   double entered_um_{0.0};
   double cut_um_{0.0};
   int parts_{0};
-  std::array<int, 3> slip_at_{};
+  std::array<int, 3> entry_error_at_{};
   double square_um2_{0.0};
   int count_{0};
   MonthResult result_;
@@ -156,7 +157,7 @@ TEST_CASE("operators' corrections are learned; values that contradict the claim 
       rms_um[static_cast<std::size_t>(lesson)] += month.rms_um / 4.0;
       if (lesson != Lesson::asked) continue;
       asked += month.asked_back;
-      CHECK(month.wrong_believed == 0);
+      CHECK(month.wrong_accepted == 0);
     }
   }
   CAPTURE(asked);
@@ -192,10 +193,10 @@ TEST_CASE("an operator's correction moves nothing: it is already entered at the 
 }
 
 TEST_CASE("the likely input error of a contradicting value is named", "[month]") {
-  CHECK(slip_of(3.0, 2.0, 1.0) == Slip::none);
-  CHECK(slip_of(-20.0, 20.0, 2.0) == Slip::sign);
-  CHECK(slip_of(50.0, 5.0, 2.0) == Slip::tenfold);
-  CHECK(slip_of(2.0, 20.0, 1.0) == Slip::tenth);
-  CHECK(slip_of(90.0, 0.0, 1.0) == Slip::unexplained);
-  CHECK(slip_of(90.0, 0.0, not_a_number) == Slip::none);  // no claimed error
+  CHECK(entry_error_of(3.0, 2.0, 1.0) == EntryError::none);
+  CHECK(entry_error_of(-20.0, 20.0, 2.0) == EntryError::sign);
+  CHECK(entry_error_of(50.0, 5.0, 2.0) == EntryError::tenfold);
+  CHECK(entry_error_of(2.0, 20.0, 1.0) == EntryError::tenth);
+  CHECK(entry_error_of(90.0, 0.0, 1.0) == EntryError::unexplained);
+  CHECK(entry_error_of(90.0, 0.0, not_a_number) == EntryError::none);  // no claimed error
 }

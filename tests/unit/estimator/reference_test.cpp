@@ -15,7 +15,7 @@ namespace {
 struct Moment {
   std::vector<double> temps_degC{20.0, 21.0};
   std::vector<std::uint8_t> good{1, 1};
-  std::vector<double> told{3000.0};
+  std::vector<double> reported{3000.0};
   bool online{true};
   nanoseconds now{0};
   std::vector<nanoseconds> refuted_at{nanoseconds::min(), nanoseconds::min()};
@@ -27,7 +27,7 @@ struct Moment {
     temps.refuted_at = refuted_at;
     Signals signals;
     signals.online = online;
-    signals.of_model = told;
+    signals.of_model = reported;
     return reference.step(now, temps, signals);
   }
 };

@@ -92,7 +92,7 @@ EstimatorConfig config_of(SuspectedPolicy policy, std::size_t sensors_a_block = 
   return config;
 }
 
-using Lie = std::function<double(std::size_t sensor, double true_degC, double time_s)>;
+using ReadingError = std::function<double(std::size_t sensor, double true_degC, double time_s)>;
 double honest(std::size_t, double temp_degC, double) {
   return temp_degC;
 }
@@ -112,11 +112,11 @@ struct Shop {
     controller.link_epoch = 1;
     controller.applied_um.fill(0.0);
   }
-  void step(const Lie& lie) {
+  void step(const ReadingError& error_of) {
     time_s += 12.0;
     const nanoseconds now{static_cast<std::int64_t>(1e9 * time_s)};
     for (std::size_t i = 0; i < readings.size(); ++i) {
-      const double temp_degC = lie(i, true_degC(i / per_block, time_s), time_s);
+      const double temp_degC = error_of(i, true_degC(i / per_block, time_s), time_s);
       readings[i] = {temp_degC, now, std::isnan(temp_degC) ? Fault::open_circuit : Fault::none};
     }
     controller.taken_at = now;
@@ -128,8 +128,8 @@ struct Shop {
     for (std::size_t i = 0; i < readings.size(); ++i)
       if (report.sensors[i].suspected && first_s.at(i) == 0.0) first_s.at(i) = time_s;
   }
-  void run_until(double hours, const Lie& lie) {
-    while (time_s < hours * hour_s) step(lie);
+  void run_until(double hours, const ReadingError& error_of) {
+    while (time_s < hours * hour_s) step(error_of);
   }
   [[nodiscard]] std::vector<std::string> suspected() const {
     std::vector<std::string> names;
@@ -303,23 +303,24 @@ TEST_CASE("a new reference ends suspicions", "[estimator][suspicion]") {
 
 TEST_CASE("with weigh_down the error leaves the offset at the slew rate, without a pause",
           "[estimator][suspicion]") {
-  Shop lied_to(config_of(SuspectedPolicy::weigh_down));
+  Shop with_wrong_sensor(config_of(SuspectedPolicy::weigh_down));
   Shop true_one(config_of(SuspectedPolicy::off));
-  lied_to.run_until(20.0, jumped);
+  with_wrong_sensor.run_until(20.0, jumped);
   true_one.run_until(20.0, honest);
   double worst_um = 0.0;
-  while (lied_to.time_s < 23.0 * hour_s) {
-    lied_to.step(jumped);
+  while (with_wrong_sensor.time_s < 23.0 * hour_s) {
+    with_wrong_sensor.step(jumped);
     true_one.step(honest);
-    const double off_um = std::abs(lied_to.command.offset_um[0] - true_one.command.offset_um[0]);
-    if (lied_to.time_s > 20.0 * hour_s + 600.0) worst_um = std::max(worst_um, off_um);
+    const double off_um =
+        std::abs(with_wrong_sensor.command.offset_um[0] - true_one.command.offset_um[0]);
+    if (with_wrong_sensor.time_s > 20.0 * hour_s + 600.0) worst_um = std::max(worst_um, off_um);
   }
-  CHECK(lied_to.report.sensors[2].weighed_down);
-  CHECK(lied_to.report.inputs[2].estimated);
-  CHECK(lied_to.report.inputs[2].sd_K > 0.0);
+  CHECK(with_wrong_sensor.report.sensors[2].weighed_down);
+  CHECK(with_wrong_sensor.report.inputs[2].estimated);
+  CHECK(with_wrong_sensor.report.inputs[2].sd_K > 0.0);
   CHECK(worst_um < 1.0);  // of the 2 um that 2 K give
-  CHECK(lied_to.idle_steps == 0);
-  CHECK(lied_to.largest_step_um <= 0.05 * 12.0 + 1e-9);
+  CHECK(with_wrong_sensor.idle_steps == 0);
+  CHECK(with_wrong_sensor.largest_step_um <= 0.05 * 12.0 + 1e-9);
 }
 
 TEST_CASE("where an estimate would be too uncertain the suspected sensor is still used",
@@ -337,10 +338,10 @@ TEST_CASE("where an estimate would be too uncertain the suspected sensor is stil
 
 TEST_CASE("a block of several sensors continues without the wrong one", "[estimator][suspicion]") {
   Shop shop(config_of(SuspectedPolicy::weigh_down, 3));
-  const auto lie = [](std::size_t sensor, double temp_degC, double time_s) {
+  const auto error_of = [](std::size_t sensor, double temp_degC, double time_s) {
     return sensor == 7 && time_s > 20.0 * hour_s ? temp_degC + 3.0 : temp_degC;
   };
-  shop.run_until(22.0, lie);
+  shop.run_until(22.0, error_of);
   REQUIRE(shop.suspected() == Names{"s3x"});
   CHECK(shop.report.inputs[2].good);
   CHECK(shop.report.inputs[2].temp_degC == Approx(true_degC(2, shop.time_s)).margin(0.15));

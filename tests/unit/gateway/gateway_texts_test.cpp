@@ -185,7 +185,8 @@ TEST_CASE("the page uses the texts of thermocomp status", "[gateway][page]") {
   snapshot.status.reasons = static_cast<std::uint32_t>(Reason::block_lost);
   state = page_state(snapshot, "mill");
   CHECK(state["verdict"]["level"] == "bad");
-  CHECK_THAT(state["verdict"]["advice"].get<std::string>(), Catch::Contains("do not finish a precise cut"));
+  CHECK_THAT(state["verdict"]["advice"].get<std::string>(),
+             Catch::Contains("do not finish a precise cut"));
   CHECK(state["problems"][0]["what"] == "an input of the model has no good sensor left");
   CHECK_FALSE(state["problems"][0]["remedy"].get<std::string>().empty());
   snapshot.is_here = false;
@@ -203,13 +204,13 @@ TEST_CASE("switched off and degraded are two levels", "[gateway][page]") {
   snapshot.status.mode_since_s = 90.0;
   snapshot.status.compensating_s = 60.0;
   snapshot.status.reasons = static_cast<std::uint32_t>(Reason::outside_domain);
-  json said = page_state(snapshot, "mill")["verdict"];
-  CHECK(said["level"] == "warning");
-  CHECK(said["since_s"] == std::round(snapshot.wall_s - 60.0));
+  json message = page_state(snapshot, "mill")["verdict"];
+  CHECK(message["level"] == "warning");
+  CHECK(message["since_s"] == std::round(snapshot.wall_s - 60.0));
   snapshot.status.mode = Mode::disabled;
-  said = page_state(snapshot, "mill")["verdict"];
-  CHECK(said["level"] == "off");
-  CHECK(said["since_s"] == std::round(snapshot.wall_s - 90.0));
+  message = page_state(snapshot, "mill")["verdict"];
+  CHECK(message["level"] == "off");
+  CHECK(message["since_s"] == std::round(snapshot.wall_s - 90.0));
 }
 
 TEST_CASE("a change turns the previous state into the new one", "[gateway][page]") {

@@ -119,18 +119,18 @@ TEST_CASE("a model that leaves half or more is reported as unfit for use", "[fam
       return quick + noise_um * gaussian(engine);
     });
     const FamiliesFit fit = fitted(tests, Family::static_few);
-    const std::string said = families_text(tests, fit);
+    const std::string message = families_text(tests, fit);
     const std::string page = families_html(tests, fit);
     const double share =
         fit.chosen_result().left_out_rms_um[0] / fit.results.front().left_out_rms_um[0];
     CAPTURE(noise_um, share);
     CHECK((share >= 0.5) == (noise_um > 1.0));
-    CHECK((said.find("Next: thermocomp diagnose") != std::string::npos) == (share >= 0.5));
+    CHECK((message.find("Next: thermocomp diagnose") != std::string::npos) == (share >= 0.5));
     CHECK((page.find("not fit for use. Next: thermocomp diagnose") != std::string::npos) ==
           (share >= 0.5));
     std::array<char, 20> printed_share{};  // of the RMS, not of its square
     std::snprintf(printed_share.data(), printed_share.size(), " %.1f %%\n", 100.0 * share);
-    CHECK(said.find(printed_share.data()) != std::string::npos);
+    CHECK(message.find(printed_share.data()) != std::string::npos);
   }
 }
 
@@ -170,18 +170,18 @@ TEST_CASE("a model judged within one run has a warning", "[families]") {
   const MeasuredTests tests = machine_tests(
       1, [](double quick, double slow, double, double) { return 5.0 * quick - 3.0 * slow; });
   const FamiliesFit fit = fitted(tests);
-  const std::string said = families_text(tests, fit);
-  CHECK(said.find("judged within one run: not valid for other days") != std::string::npos);
-  CHECK(said.find("Next: a run of another day") != std::string::npos);
-  CHECK(said.find("on another day (each half of this run by a model of the other)") !=
+  const std::string message = families_text(tests, fit);
+  CHECK(message.find("judged within one run: not valid for other days") != std::string::npos);
+  CHECK(message.find("Next: a run of another day") != std::string::npos);
+  CHECK(message.find("on another day (each half of this run by a model of the other)") !=
         std::string::npos);
 }
 
 TEST_CASE("fit prints one expected error per output, and its basis", "[families]") {
   const auto follows = [](double quick, double slow, double, double) { return 5.0 * quick - slow; };
   const MeasuredTests two = machine_tests(2, follows);
-  const std::string said = families_text(two, fitted(two));
-  CHECK(said.find("um RMS on a third run (each run by a model of the other alone)") !=
+  const std::string message = families_text(two, fitted(two));
+  CHECK(message.find("um RMS on a third run (each run by a model of the other alone)") !=
         std::string::npos);
   const MeasuredTests three = machine_tests(3, follows);
   CHECK(families_text(three, fitted(three)).find("um RMS on another run (runs left out)") !=
@@ -496,12 +496,13 @@ TEST_CASE("the run with most of the error is named with its difference", "[famil
     options.outputs = {"z_um"};
     options.signals = true;
     const MeasuredTests tests = measured_tests(files, options);
-    const std::string said = families_text(tests, fitted(tests, Family::static_few));
-    CAPTURE(said);
-    CHECK((said.find("z_um: run3 decides: left out, static_few leaves ") != std::string::npos) ==
+    const std::string message = families_text(tests, fitted(tests, Family::static_few));
+    CAPTURE(message);
+    CHECK((message.find("z_um: run3 decides: left out, static_few leaves ") != std::string::npos) ==
           one_differs);
-    CHECK((said.find("of the others; it starts at spindle_rpm = 10000, the others at 0 to 3500") !=
-           std::string::npos) == one_differs);
+    CHECK(
+        (message.find("of the others; it starts at spindle_rpm = 10000, the others at 0 to 3500") !=
+         std::string::npos) == one_differs);
   }
 }
 

@@ -39,7 +39,7 @@ struct Peer {
     fd = accept(door, nullptr, nullptr);
     REQUIRE(fd >= 0);
   }
-  void say(const std::string& text) const {
+  void send(const std::string& text) const {
     REQUIRE(::send(fd, text.data(), text.size(), MSG_NOSIGNAL) ==
             static_cast<ssize_t>(text.size()));
   }
@@ -63,9 +63,9 @@ TEST_CASE("only complete lines are sent and received", "[linuxcnc]") {
   peer.take();
   CHECK(link.send("hello\n"));
   CHECK_FALSE(link.receive());
-  peer.say("fir");
+  peer.send("fir");
   CHECK_FALSE(link.receive());
-  peer.say("st\nsecond\nthi");
+  peer.send("st\nsecond\nthi");
   CHECK(link.receive() == "first");
   CHECK(link.receive() == "second");
   CHECK_FALSE(link.receive());
@@ -85,7 +85,7 @@ TEST_CASE("no listener, an invalid path, and a peer that closes are reported", "
   DaemonLink link(peer.path);
   REQUIRE(link.connect());
   peer.take();
-  peer.say("last\n");
+  peer.send("last\n");
   peer.hang_up();
   CHECK(link.receive() == "last");
   CHECK_FALSE(link.receive());
@@ -102,7 +102,7 @@ TEST_CASE("a line without an end ends the connection", "[linuxcnc]") {
   peer.take();
   const std::string piece(32768, 'x');
   for (int i = 0; i < 20 && link.connected(); ++i) {
-    peer.say(piece);
+    peer.send(piece);
     CHECK_FALSE(link.receive());
   }
   CHECK_FALSE(link.connected());

@@ -136,7 +136,7 @@ heat_W = 10
 
 TEST_CASE("problems of heat and load cases are named", "[placement][bad_input]") {
   struct Case {
-    std::string text, told;
+    std::string text, reported;
   };
   const std::string good = column + cooled + heater + cases;
   REQUIRE(problems_of(good).empty());
@@ -162,10 +162,10 @@ TEST_CASE("problems of heat and load cases are named", "[placement][bad_input]")
        "there is no group \"skin\""},
       {good + "[placement]\non_the_surface = true\n", "unknown key"},
   };
-  for (const auto& [text, told] : listed) {
+  for (const auto& [text, reported] : listed) {
     const std::string problems = problems_of(text);
-    CAPTURE(told, problems);
-    CHECK(problems.find(told) != std::string::npos);
+    CAPTURE(reported, problems);
+    CHECK(problems.find(reported) != std::string::npos);
     CHECK(problems.find("machine.toml") != std::string::npos);
   }
 }

@@ -126,9 +126,9 @@ TEST_CASE("placements beat the mean of the block in the fields that they were ma
   CHECK(one_in_each_block(problem, comparison.method("greedy").sensors));
   CHECK(one_in_each_block(problem, comparison.method("qr_pivoting").sensors));
   CHECK(comparison.method("qr_reconstruction").used.rms_um < 1e-6);  // four fields, four sensors
-  const std::string said = recommendation_text(problem, comparison);
-  CHECK(said.find("(not the daemon's model)") != std::string::npos);
-  CHECK(said.find(remaining_text(problem, comparison)) != std::string::npos);
+  const std::string message = recommendation_text(problem, comparison);
+  CHECK(message.find("(not the daemon's model)") != std::string::npos);
+  CHECK(message.find(remaining_text(problem, comparison)) != std::string::npos);
   CHECK(comparison.greedy.steps.back().error_um ==
         Approx(comparison.method("greedy").used.rms_um).epsilon(1e-6));
 }

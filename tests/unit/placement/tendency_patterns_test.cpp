@@ -92,7 +92,7 @@ TEST_CASE("in a derived pattern each block stops at its own bound", "[placement]
 
 TEST_CASE("problems of a pattern are named with line and value", "[placement][bad_input]") {
   struct Case {
-    std::string text, told;
+    std::string text, reported;
   };
   const std::string head = "[[placement.pattern]]\nname = \"some\"\n";
   const std::vector<Case> listed{
@@ -108,13 +108,13 @@ TEST_CASE("problems of a pattern are named with line and value", "[placement][ba
       {head + "blocks = [\"left_low_degC\"]\npercent = [5]\n", "unknown key"},
       {upper_left + upper_left, "placement.pattern[upper left].name"},
   };
-  for (const auto& [text, told] : listed) {
-    CAPTURE(told);
+  for (const auto& [text, reported] : listed) {
+    CAPTURE(reported);
     try {
       static_cast<void>(structure::parse_structure(column + text, "machine.toml"));
       FAIL("nothing was wrong");
     } catch (const std::exception& error) {
-      CHECK_THAT(error.what(), Catch::Contains(told) && Catch::StartsWith("machine.toml:"));
+      CHECK_THAT(error.what(), Catch::Contains(reported) && Catch::StartsWith("machine.toml:"));
     }
   }
 }

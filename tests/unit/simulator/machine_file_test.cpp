@@ -293,10 +293,10 @@ TEST_CASE("problems of a body, or of a machine with one, are named") {
   };
   CHECK(problems_of_machine(machine_text(""), body_text).empty());
   struct Case {
-    std::string machine, body, told;
+    std::string machine, body, reported;
   };
   const std::string lump = "[[node]]\nname = \"bed\"\ncapacity_J_per_K = 1.0\n";
-  for (const auto& [machine, body, told] : std::vector<Case>{
+  for (const auto& [machine, body, reported] : std::vector<Case>{
            {machine_text(lump), body_text, "has no lumps"},
            {without(machine_text(""), "node = \"nose\"", "node = \"nase\""), body_text, "nase"},
            {without(machine_text(""), "z_um", "y_um"), body_text, "the body has no such output"},
@@ -305,7 +305,7 @@ TEST_CASE("problems of a body, or of a machine with one, are named") {
            {machine_text(""), without(body_text, "[1.0, 2.0]", "[1.0]"), "as many numbers"},
            {machine_text(""), without(body_text, "20.0", "nan"), "finite"},
            {machine_text(""), without(body_text, "\"z_um\"", "\"z_mm\""), "must end in _um"}}) {
-    CAPTURE(told);
-    CHECK(problems_of_machine(machine, body).find(told) != std::string::npos);
+    CAPTURE(reported);
+    CHECK(problems_of_machine(machine, body).find(reported) != std::string::npos);
   }
 }

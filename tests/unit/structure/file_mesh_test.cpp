@@ -177,10 +177,10 @@ TEST_CASE("an .inp file gives nodes, elements, sets and surfaces", "[structure][
 TEST_CASE("errors in an .inp file are reported with their line", "[structure][files]") {
   struct Case {
     std::string text;
-    std::string told;
+    std::string message;
   };
   const std::string nodes = "*NODE\n1, 0, 0, 0\n2, 1, 0, 0\n3, 0, 1, 0\n4, 0, 0, 1\n";
-  for (const auto& [text, told] : std::vector<Case>{
+  for (const auto& [text, message] : std::vector<Case>{
            {"*NODE\n1, 0, nan, 0\n", ":2: \"nan\" must be a finite number"},
            {"*NODE\n1, 0, 0\n", ":2: a node must be"},
            {nodes + "4, 0, 0, 0\n", ":6: node 4 is there twice"},
@@ -196,7 +196,7 @@ TEST_CASE("errors in an .inp file are reported with their line", "[structure][fi
     const TemporaryFile file("bad.inp", text);
     const std::string what = refusal([&] { static_cast<void>(read_inp(file.path())); });
     INFO(text << what);
-    CHECK(what.find(told) != std::string::npos);
+    CHECK(what.find(message) != std::string::npos);
   }
 }
 

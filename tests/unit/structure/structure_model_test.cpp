@@ -199,7 +199,7 @@ TEST_CASE("problems of a structure are named with their place", "[structure][bad
   CHECK(problems_in(with("")).empty());
   struct Case {
     std::string text;
-    std::string told;
+    std::string message;
   };
   const std::string support = "[[support]]\non = ";
   const std::vector<Case> listed{
@@ -238,12 +238,12 @@ TEST_CASE("problems of a structure are named with their place", "[structure][bad
            foot + all_warm + top,
        "no.msh: no such file"},
   };
-  for (const auto& [text, told] : listed) {
+  for (const auto& [text, message] : listed) {
     const auto lines = problems_in(text);
     std::string all;
     for (const std::string& line : lines) all += line + "\n";
     INFO(text.substr(material.size() + column.size()) << "\ntold:\n" << all);
-    CHECK(mentions(lines, told));
+    CHECK(mentions(lines, message));
     CHECK(all.find("machine.toml") == 0);
   }
 }

@@ -81,7 +81,7 @@ class SerialAdapter:
     def send(self, line):
         os.write(self.device, line + b"\r")
 
-    def tell_state(self, letter):
+    def report_state(self, letter):
         """a: active, w: warning, p: passive, b: bus-off, with matching counters."""
         counters = {"a": "000000", "w": "100000", "p": "130000", "b": "000256"}[letter]
         with self.sending:

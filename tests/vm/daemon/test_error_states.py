@@ -41,7 +41,7 @@ def adapter(tmp_path_factory):
 def test_warning_and_passive_are_told_and_change_nothing(adapter):
     rig = adapter.rig
     for letter, state in (("w", "warning"), ("p", "passive"), ("w", "warning"), ("a", "active")):
-        adapter.tell_state(letter)
+        adapter.report_state(letter)
         eventually(lambda: rig.bus("body")["state"] == state, state + " is told")
         status = rig.daemon.status()
         assert status["mode"] == "compensating" and rig.bus("body")["connected"]
@@ -51,7 +51,7 @@ def test_warning_and_passive_are_told_and_change_nothing(adapter):
 
 
 def bus_off(adapter):
-    adapter.tell_state("b")
+    adapter.report_state("b")
     eventually(lambda: adapter.rig.bus("body")["state"] == "bus_off", "bus-off is told")
     eventually(lambda: adapter.rig.daemon.status()["controller"]["state"] == "bus_off",
                "by the controller's link too")

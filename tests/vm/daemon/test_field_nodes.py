@@ -200,7 +200,7 @@ class Nodes:
         buses = self.daemon.status()["buses"]
         return next(each for each in buses if each["name"] == bus)["units"][0]
 
-    def says(self, bus, text):
+    def expect_text(self, bus, text):
         eventually(lambda: text in self.unit(bus)["last_error"],
                    f"{bus} says {text}, not {self.unit(bus)['last_error']}")
 
@@ -224,7 +224,7 @@ def test_a_rebooted_node_is_set_up_again(nodes):
     before = nodes.unit("modules")["requests"]
     nodes.switch_off("canopen")
     nodes.become(CANOPEN, "no_answer", "a node that is off has no temperature")
-    nodes.says("modules", "no ")  # heartbeat, or answer to a request
+    nodes.expect_text("modules", "no ")  # heartbeat, or answer to a request
     nodes.switch_on("canopen", canopen_machine())
     nodes.become(CANOPEN, "none", "it is read again")
     assert nodes.unit("modules")["requests"] > before
@@ -233,7 +233,7 @@ def test_a_rebooted_node_is_set_up_again(nodes):
 def test_a_second_node_of_the_same_number_is_noticed(nodes):
     double = nodes.start(canopen_machine())
     nodes.become(CANOPEN, "device_error", "whose temperature it is cannot be told")
-    nodes.says("modules", "two nodes answer as node 5")
+    nodes.expect_text("modules", "two nodes answer as node 5")
     nodes.stop(double)
     nodes.become(CANOPEN, "none", "one of them is gone")
 
@@ -267,7 +267,7 @@ def test_frames_of_python_can(nodes):
         bus.send(can.Message(arbitration_id=0x18EEFF80, is_extended_id=True,
                              data=list(OTHER_NAME.to_bytes(8, "little"))))
         nodes.become(J1939, "no_answer", "somebody else claims the address")
-        nodes.says("vehicle", f"address 128 was claimed by 0x{OTHER_NAME:016X}")
+        nodes.expect_text("vehicle", f"address 128 was claimed by 0x{OTHER_NAME:016X}")
         bus.send(can.Message(arbitration_id=0x18EAFFFE, is_extended_id=True,
                              data=[0x00, 0xEE, 0x00]))
         nodes.become(J1939, "none", "the module defends it")

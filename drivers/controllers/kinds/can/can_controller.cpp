@@ -244,7 +244,7 @@ void CanController::run() {
   const bool sends_sets = std::any_of(config_.axes.begin(), config_.axes.end(),
                                       [](const CanAxis& axis) { return axis.travel.has_value(); });
   if (sends_sets)
-    quiet_until_ = next_send_ + from_seconds(CanTravel::forgotten_after_s(config_.period_s));
+    no_sending_before_ = next_send_ + from_seconds(CanTravel::forgotten_after_s(config_.period_s));
   while (!stopping_.load()) {
     if (!socket_.is_open()) {
       open_or_pause();
@@ -285,7 +285,7 @@ void CanController::receive() {
     const std::scoped_lock lock(health_mutex_);
     health_.reads += frames.size();
   }
-  tell_error();
+  report_error();
   if (!gate_.in_sync()) return;
   if (gate_.explains(state_.applied_um))
     publish(true, monotonic_now());
@@ -375,21 +375,21 @@ void CanController::supervise(nanoseconds now) {
     if (gate_.in_sync()) lose();
     await_all();
     silent_ = false;
-    return tell_error();
+    return report_error();
   }
   await_what_is_older(now - from_seconds(config_.silent_after_s));
   const bool all_seen = all_frames_seen() && all_sets_seen();
   if (gate_.in_sync() && !all_seen) {
     lose();
     silent_ = true;
-    tell_error();
-  } else if (!gate_.in_sync() && all_seen && now >= quiet_until_) {
+    report_error();
+  } else if (!gate_.in_sync() && all_seen && now >= no_sending_before_) {
     synchronise();
   }
 }
 
 /// The error of the interface takes precedence over missing frames.
-void CanController::tell_error() {
+void CanController::report_error() {
   const std::scoped_lock lock(health_mutex_);
   health_.last_error = socket_.error();
   if (health_.last_error.empty()) health_.last_error = health_.write.error;
@@ -416,7 +416,7 @@ void CanController::synchronise() {
   next_send_ = now + gate_.next_pause();
   publish(true, now);
   silent_ = false;
-  tell_error();
+  report_error();
   const std::scoped_lock lock(health_mutex_);
   health_.connected = true;
 }
@@ -431,10 +431,10 @@ void CanController::hold_what_is_applied(bool link_is_new) {
       if (!link_is_new && !std::isnan(held_um)) continue;
       const double slack_um =
           WriteGate::unexplained_um + 2.0 * sent_resolution_um(config_.axes[axis], node);
-      const bool believed = std::isnan(held_um) || std::isnan(applied_um) ||
-                            (applied_um >= std::min(0.0, held_um) - slack_um &&
-                             applied_um <= std::max(0.0, held_um) + slack_um);
-      held_um = believed ? applied_um : not_a_number;
+      const bool is_plausible = std::isnan(held_um) || std::isnan(applied_um) ||
+                                (applied_um >= std::min(0.0, held_um) - slack_um &&
+                                 applied_um <= std::max(0.0, held_um) + slack_um);
+      held_um = is_plausible ? applied_um : not_a_number;
     }
   }
 }

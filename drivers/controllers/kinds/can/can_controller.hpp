@@ -84,7 +84,7 @@ class CanController final : public ControllerLink {
   void await_what_is_older(nanoseconds than) noexcept;
   void supervise(nanoseconds now);
   void note_bus_state();
-  void tell_error();
+  void report_error();
   void synchronise();
   void hold_what_is_applied(bool link_is_new);
   void number_sets();
@@ -105,7 +105,7 @@ class CanController final : public ControllerLink {
   std::vector<ShownSet> shown_sets_;
   std::vector<std::uint64_t> set_numbers_;  ///< one per axis: of the set sent last
   bool numbered_{false};                    ///< numbering has begun
-  nanoseconds quiet_until_{};               ///< nothing is sent before
+  nanoseconds no_sending_before_{};         ///< nothing is sent before
   CanSocket socket_;
   WriteGate gate_;
   std::uint64_t heartbeat_{0};

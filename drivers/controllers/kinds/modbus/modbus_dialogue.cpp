@@ -274,9 +274,9 @@ bool ModbusDialogue::read_written() {
       }
       if (!exchange.ok()) words.clear();
     }
-    std::vector<double> stands = written_[axis]->decode(words);
-    if (piezos_[axis]) stands = {resting_um(*config_.axes[axis].piezo, stands.front())};
-    std::copy(stands.begin(), stands.end(),
+    std::vector<double> written_um = written_[axis]->decode(words);
+    if (piezos_[axis]) written_um = {resting_um(*config_.axes[axis].piezo, written_um.front())};
+    std::copy(written_um.begin(), written_um.end(),
               state_.applied_um.begin() + static_cast<std::ptrdiff_t>(first_[axis]));
   }
   written_asked_ = 0;

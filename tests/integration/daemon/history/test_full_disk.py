@@ -115,8 +115,8 @@ def test_a_full_disk_stops_the_history_and_nothing_else(machine, disk, lab):
 def test_a_switch_that_cannot_be_saved_is_not_called_done(machine, disk):
     daemon = machine.start()
     fill_until_noticed(disk, daemon)
-    status, _, said = daemon.cli("disable")
-    assert status == 2 and "not saved" in said, said
+    status, _, output = daemon.cli("disable")
+    assert status == 2 and "not saved" in output, output
     daemon.wait_for_mode("disabled")  # it was carried out nevertheless
     disk.make_room()
     assert daemon.cli("disable")[0] == 0
@@ -148,8 +148,8 @@ def test_a_daemon_killed_and_started_on_a_full_disk_compensates_and_the_gap_is_t
     assert before <= chunks(daemon.history)
     assert_replays_exactly(daemon.history, lab.folder / "out.csv")
     run = lab.folder / "run.csv"
-    status, _, said = run_tool("export", daemon.history, "-o", run)
-    assert status == 0 and "1 gap" in said, said
+    status, _, output = run_tool("export", daemon.history, "-o", run)
+    assert status == 0 and "1 gap" in output, output
     told = [line for line in run.read_text().splitlines() if line.startswith("# nothing")]
     assert len(told) == 1 and "nothing is recorded from" in told[0], told
     times = read_columns(run)["time_s"]

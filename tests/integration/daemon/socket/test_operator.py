@@ -175,9 +175,9 @@ def test_only_a_latched_axis_is_released(machine, lab):
     daemon.wait_for_offset(6.0, 0.05)
     machine.controller.show_more_um(20.0)
     eventually(lambda: "mismatch_latched" in daemon.status()["reasons"], "latched")
-    told = daemon.axis()["mismatch"]
-    assert abs(told["read_um"] - told["sent_um"] - 20.0) < 0.1
-    assert "another writer" in told["likely"]  # began while the offset was constant
+    reported = daemon.axis()["mismatch"]
+    assert abs(reported["read_um"] - reported["sent_um"] - 20.0) < 0.1
+    assert "another writer" in reported["likely"]  # began while the offset was constant
     machine.controller.show_more_um(500.0)  # beyond any possible offset
     eventually(lambda: daemon.axis()["applied"] > 400.0, "shown")
     status, out, _ = daemon.cli("release", "z")
@@ -187,7 +187,7 @@ def test_only_a_latched_axis_is_released(machine, lab):
     assert abs(float(values[1]) - float(values[2]) - 500.0) < 1.0, out
     machine.controller.show_more_um(0.0)
     # A release while the other value is still read back is dropped.
-    eventually(lambda: abs(daemon.axis()["applied"] - told["sent_um"]) < 0.1, "shown as sent")
+    eventually(lambda: abs(daemon.axis()["applied"] - reported["sent_um"]) < 0.1, "shown as sent")
     assert daemon.cli("release", "z")[0] == 0
     eventually(lambda: daemon.axis()["driven"] and daemon.axis()["mismatch"] is None, "driven again")
     machine.warm_by(3.0)

@@ -123,9 +123,9 @@ def test_an_attack_starves_nobody(lab, attack, monkeypatch):
     answers = []
     while time.monotonic() < until - 0.2:
         begun = time.monotonic()
-        status, _, said = daemon.cli("status")
+        status, _, output = daemon.cli("status")
         answers.append(time.monotonic() - begun)
-        assert status in (0, 1), said
+        assert status in (0, 1), output
         time.sleep(0.1)
     times_fed = manager.fed - fed_before
     attacker.join()

@@ -1,4 +1,4 @@
-#include "model_promises.hpp"
+#include "model_properties.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -28,31 +28,31 @@ bool same(const std::vector<std::vector<double>>& a, const std::vector<std::vect
 }  // namespace
 
 void check_same(const ThermalModel& a, const ThermalModel& b) {
-  FUZZ_PROMISE(a.inputs == b.inputs);
-  FUZZ_PROMISE(a.outputs == b.outputs);
-  FUZZ_PROMISE(same(a.reference_degC, b.reference_degC));
-  FUZZ_PROMISE(same(a.matrix_um_per_K, b.matrix_um_per_K));
-  FUZZ_PROMISE(same(a.covariance_K2, b.covariance_K2));
-  FUZZ_PROMISE(same(a.covariance_growth.noise_K, b.covariance_growth.noise_K));
-  FUZZ_PROMISE(same(a.covariance_growth.drift_time_s, b.covariance_growth.drift_time_s));
-  FUZZ_PROMISE(same(a.covariance_growth.scatter_time_s, b.covariance_growth.scatter_time_s));
-  FUZZ_PROMISE(same(a.covariance_growth.drift_factor, b.covariance_growth.drift_factor));
-  FUZZ_PROMISE(same(a.covariance_growth.scatter_factor, b.covariance_growth.scatter_factor));
-  FUZZ_PROMISE(a.made_from == b.made_from);
-  FUZZ_PROMISE(a.guideways.size() == b.guideways.size());
+  FUZZ_REQUIRE(a.inputs == b.inputs);
+  FUZZ_REQUIRE(a.outputs == b.outputs);
+  FUZZ_REQUIRE(same(a.reference_degC, b.reference_degC));
+  FUZZ_REQUIRE(same(a.matrix_um_per_K, b.matrix_um_per_K));
+  FUZZ_REQUIRE(same(a.covariance_K2, b.covariance_K2));
+  FUZZ_REQUIRE(same(a.covariance_growth.noise_K, b.covariance_growth.noise_K));
+  FUZZ_REQUIRE(same(a.covariance_growth.drift_time_s, b.covariance_growth.drift_time_s));
+  FUZZ_REQUIRE(same(a.covariance_growth.scatter_time_s, b.covariance_growth.scatter_time_s));
+  FUZZ_REQUIRE(same(a.covariance_growth.drift_factor, b.covariance_growth.drift_factor));
+  FUZZ_REQUIRE(same(a.covariance_growth.scatter_factor, b.covariance_growth.scatter_factor));
+  FUZZ_REQUIRE(a.made_from == b.made_from);
+  FUZZ_REQUIRE(a.guideways.size() == b.guideways.size());
   for (std::size_t i = 0; i < a.guideways.size(); ++i) {
-    FUZZ_PROMISE(a.guideways[i].name == b.guideways[i].name);
-    FUZZ_PROMISE(a.guideways[i].axis == b.guideways[i].axis);
-    FUZZ_PROMISE(same(a.guideways[i].positions_mm, b.guideways[i].positions_mm));
-    FUZZ_PROMISE(a.guideways[i].rows_um_per_K == b.guideways[i].rows_um_per_K);
+    FUZZ_REQUIRE(a.guideways[i].name == b.guideways[i].name);
+    FUZZ_REQUIRE(a.guideways[i].axis == b.guideways[i].axis);
+    FUZZ_REQUIRE(same(a.guideways[i].positions_mm, b.guideways[i].positions_mm));
+    FUZZ_REQUIRE(a.guideways[i].rows_um_per_K == b.guideways[i].rows_um_per_K);
   }
-  FUZZ_PROMISE(a.terms.size() == b.terms.size());
+  FUZZ_REQUIRE(a.terms.size() == b.terms.size());
   for (std::size_t i = 0; i < a.terms.size(); ++i) {
-    FUZZ_PROMISE(a.terms[i].kind == b.terms[i].kind);
-    FUZZ_PROMISE(a.terms[i].subject == b.terms[i].subject);
-    FUZZ_PROMISE(a.terms[i].shared == b.terms[i].shared);
-    FUZZ_PROMISE(a.terms[i].per_output == b.terms[i].per_output);
-    FUZZ_PROMISE(a.terms[i].bank == b.terms[i].bank);
+    FUZZ_REQUIRE(a.terms[i].kind == b.terms[i].kind);
+    FUZZ_REQUIRE(a.terms[i].subject == b.terms[i].subject);
+    FUZZ_REQUIRE(a.terms[i].shared == b.terms[i].shared);
+    FUZZ_REQUIRE(a.terms[i].per_output == b.terms[i].per_output);
+    FUZZ_REQUIRE(a.terms[i].bank == b.terms[i].bank);
   }
 }
 
@@ -72,7 +72,7 @@ void check_steps(const ThermalModel& model) {
     if (domain) domain->step(now, temps, reference, signals);
     now += std::chrono::milliseconds(10);
   }
-  FUZZ_PROMISE(displacement.plan_terms(displacement).size() == model.terms.size());
+  FUZZ_REQUIRE(displacement.plan_terms(displacement).size() == model.terms.size());
 }
 
 }  // namespace thermocomp::fuzz

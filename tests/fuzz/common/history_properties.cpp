@@ -1,4 +1,4 @@
-#include "history_promises.hpp"
+#include "history_properties.hpp"
 
 #include <cstdio>
 #include <sstream>
@@ -19,15 +19,15 @@ bool is_done(const std::filesystem::path& file, Use use) {
   } catch (const HistoryError& error) {
     const std::string text = error.what();
     if (text.find(file.string()) == std::string::npos) std::fprintf(stderr, "%s\n", text.c_str());
-    FUZZ_PROMISE(text.find(file.string()) != std::string::npos);
+    FUZZ_REQUIRE(text.find(file.string()) != std::string::npos);
   } catch (const ConfigurationError& error) {
-    FUZZ_PROMISE(!error.problems().empty());
+    FUZZ_REQUIRE(!error.problems().empty());
   }
   return false;
 }
 
 void check_run_file(const std::string& text) {
-  FUZZ_PROMISE(text.find('\x1b') == std::string::npos);
+  FUZZ_REQUIRE(text.find('\x1b') == std::string::npos);
   try {
     static_cast<void>(parse_run(text, "run.csv"));
   } catch (const ConfigurationError& error) {
