@@ -110,8 +110,9 @@ run_tests() {
     runner=(run_as_sanitizers_need)
     collect_sanitizer_reports
   fi
-  # Two places per CPU: a test that computes takes both (cmake/ThermocompTargets.cmake).
-  "${runner[@]}" ctest --preset "$preset" --no-tests=error -j "$((2 * $(nproc)))" \
+  # Three places per CPU: a test that waits for devices takes one, one that computes two
+  # (cmake/ThermocompTargets.cmake).
+  "${runner[@]}" ctest --preset "$preset" --no-tests=error -j "$((3 * $(nproc)))" \
     "$@" --output-junit "$folder/results_$part.xml" || status=$?
   if ((status != 0)); then
     status=0

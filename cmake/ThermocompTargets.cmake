@@ -157,9 +157,9 @@ function(thermocomp_program name)
   thermocomp_use_precompiled(${name} thermocomp_precompiled_std)
 endfunction()
 
-# What a test takes of the places that ./test.sh gives ctest, two a CPU (property PROCESSORS): one
-# that computes a CPU's, one that mostly waits for devices and times half as much - but with
-# sanitizers it computes as well.
+# What a test takes of the places that ./test.sh gives ctest, three per CPU (property PROCESSORS): one
+# that computes takes two, one that mostly waits for devices and times takes one - but with sanitizers
+# it computes as well.
 set(THERMOCOMP_COMPUTES 2)
 set(THERMOCOMP_COMPUTES_ON_TWO 4)
 set(THERMOCOMP_WAITS 1)
