@@ -119,8 +119,7 @@ void refine(StructureSpec& spec, std::size_t ties) {
 
 StructureSpec spec_of(const std::vector<FiniteTie>& ties) {
   std::string text = read_text_file(THERMOCOMP_GATE_STRUCTURE);
-  replace(text, "from_mm = [80, 24, 243.75]   # 150 mm^2, its middle 250 mm above the ground\n",
-          "");
+  replace(text, "from_mm = [80, 24, 243.75]", "");
   replace(text, "to_mm = [480, 36, 256.25]\n", box_of(ties.front()));
   for (std::size_t i = 1; i < ties.size(); ++i)
     text += text_of_tie("tie_" + std::to_string(i + 1), ties[i]);
