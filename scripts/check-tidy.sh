@@ -10,7 +10,7 @@ source scripts/common.sh
 # Clang cannot read GCC's precompiled headers; without them each file must include all that it uses.
 build=build/tidy
 mkdir -p "$build"
-sed -e 's/ -Winvalid-pch//; s/ -fpch-preprocess//; s/ -include [^ ]*cmake_pch\.hxx//' \
+sed -e 's/ -Winvalid-pch//; s/ -fpch-preprocess//; s/ --param [^ ]*//; s/ -include [^ ]*cmake_pch\.hxx//' \
   build/release/compile_commands.json >"$build/compile_commands.json"
 
 folders=("$@")
