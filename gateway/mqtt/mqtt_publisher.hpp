@@ -21,7 +21,7 @@ class MqttPublisher {
   MqttPublisher(const MqttPublisher&) = delete;
   MqttPublisher& operator=(const MqttPublisher&) = delete;
 
-  /// None of these blocks.
+  /// These functions do not block.
   void show(const SnapshotPointer& snapshot);
   void show_alarms(const std::vector<Alarm>& active, const AlarmChange* changed, double wall_s);
   void add_figures(GatewayFigures& figures) const;

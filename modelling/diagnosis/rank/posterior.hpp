@@ -51,8 +51,7 @@ enum class Round { first, later };
 ///
 ///   - A(score) and A(witness), A(x) = sign(x) ln(1 + |x| / 20), since rows are correlated,
 ///   - the reduction of left-out rows: ln of their RMS before over after, divided by the root of
-///   the
-///     number of outputs, and the share of the RMS, of the output that gains most,
+///     the number of outputs, and the share of the RMS, of the output that gains most,
 ///   - the number of free parameters, and whether it acts in one run only,
 ///
 /// and Hypothesis::log_prior.
@@ -60,7 +59,7 @@ enum class Round { first, later };
 /// The weights maximise the probability of the true causes of simulated, physical and measured
 /// campaigns; one answer in a hundred may be an outlier (research/calibrate_posterior.py).
 [[nodiscard]] double utility(const Explanation& explanation);
-/// Utilities that differ by less are alike.
+/// Two utilities that differ by less count as equal.
 inline constexpr double as_much = 1.0;
 
 /// Sets each probability: the probability that there is any effect, from the figures of the
