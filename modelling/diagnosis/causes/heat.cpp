@@ -10,8 +10,8 @@ namespace {
 
 constexpr CauseParameter tau{"tau_s", "s", 120.0, 6 * 3600.0, "time constant"};
 constexpr CauseParameter power{"power", "1", 1.0, 2.0, "power of the signal"};
-/// ln of the prior probability of the form with the room. Set with seeds 22 and 77 of physical_campaign.py
-/// and seed 910000, level 3, of simulated_campaign.py.
+/// ln of the prior probability of the form with the room. Set with seeds 22 and 77 of
+/// physical_campaign.py and seed 910000, level 3, of simulated_campaign.py.
 constexpr double log_prior_of_room = -1.0;
 
 /// Two forms: the heat only, and the heat with the room, whose temperature warms the same body.
