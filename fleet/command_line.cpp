@@ -15,7 +15,8 @@ void declare_fleet_command_line(CLI::App& app, std::string& store, cli::Action& 
   app.set_version_flag("--version", THERMOCOMP_VERSION);
   app.require_subcommand(1);
   app.failure_message(cli::command_error_text);
-  app.footer("Exit status: 0 success, 1 no, 2 bad use, bad input, or a store that is not reached.");
+  app.footer(
+      "Exit status: 0 success, 1 no, 2 usage error, bad input, or a store that is not reached.");
   store = "dbname=thermocomp_fleet";
   app.add_option(
          "--store", store,

@@ -27,7 +27,7 @@ void add_structure(CLI::App& app, std::function<int()>& action) {
   structure::add_structure_command(app, action);
   placement::add_place_command(app, action);
 #else
-  constexpr int exit_bad_use = 2;
+  constexpr int exit_error = 2;
   for (const char* name : {"structure", "place"}) {
     CLI::App* sub = app.add_subcommand(name, "not in this build");
     sub->prefix_command();
@@ -35,14 +35,14 @@ void add_structure(CLI::App& app, std::function<int()>& action) {
       action = [name] {
         std::fprintf(stderr, "thermocomp: built without '%s', which needs CHOLMOD and Gmsh\n",
                      name);
-        return exit_bad_use;
+        return exit_error;
       };
     });
   }
 #endif
 }
 
-/// All text that these commands take is the name of a file or folder, which completion should know.
+/// Every text argument of these commands is a file or folder name, which completion needs to know.
 void name_files(CLI::App& app) {
   for (CLI::App* command : app.get_subcommands([](CLI::App*) { return true; })) {
     for (CLI::Option* option : command->get_options()) {
@@ -55,11 +55,11 @@ void name_files(CLI::App& app) {
 
 void declare_modelling_command_line(CLI::App& app, std::function<int()>& action) {
   app.name("thermocomp-modelling");
-  app.description("What leads to a model, and what a model gets wrong");
+  app.description("Models: test plans, structures, sensor placement, fit, inspection, diagnosis");
   app.require_subcommand(1);
   app.failure_message(cli::command_error_text);
   // Each command shows this one too, unless it has its own.
-  app.footer("Exit status: 0 success, 2 bad use or bad input.");
+  app.footer("Exit status: 0 success, 2 usage error or bad input.");
   diagnosis::add_diagnose_command(app, action);
   inspection::add_inspect_command(app, action);
   add_structure(app, action);

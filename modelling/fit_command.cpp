@@ -38,7 +38,7 @@ struct Options {
   bool free_choice{false};
   bool lags{false};
   double threshold{-1.0};
-  double sensor_error_K{-1.0};  ///< negative: left out
+  double sensor_error_K{-1.0};  ///< negative: not given
   std::string family;
   std::string like;
   std::vector<std::string> diameters;
@@ -47,9 +47,9 @@ struct Options {
   bool json{false};
   std::string prior;
   double drift_percent{5.0};
-  double years{-1.0};  ///< negative: left out
+  double years{-1.0};  ///< negative: not given
 
-  /// Whether anything was asked for that only an equation of few sensors has.
+  /// An option that only applies to few-sensor equations was given.
   [[nodiscard]] bool few_asked_for() const {
     return terms_given || free_choice || lags || threshold >= 0 || sensor_error_K >= 0;
   }
@@ -74,7 +74,7 @@ void read_terms(const std::string& text, FitOptions& fit) {
   throw std::runtime_error("--terms " + text + ": must be a number or a range, like 3..5, in 1..8");
 }
 
-/// "dia_um=x": of the diameter half goes to the axis; "dia_um=-x": the negative half.
+/// "dia_um=x": axis x corrects half of the diameter; "dia_um=-x": the negative half.
 std::vector<DiameterSpec> read_diameters(const Options& options) {
   std::vector<DiameterSpec> diameters;
   for (const std::string& text : options.diameters) {
@@ -86,7 +86,7 @@ std::vector<DiameterSpec> read_diameters(const Options& options) {
     if (diameter.axis.empty() ||
         std::find(outputs.begin(), outputs.end(), diameter.output) == outputs.end())
       throw std::runtime_error("--diameter " + text + ": must be OUTPUT=AXIS, one of --outputs");
-    std::fprintf(stderr, "%s: a diameter; axis %s takes out %s\n", diameter.output.c_str(),
+    std::fprintf(stderr, "%s: is a diameter; axis %s corrects %s\n", diameter.output.c_str(),
                  diameter.axis.c_str(), half_of(diameter).c_str());
     diameters.push_back(std::move(diameter));
   }
@@ -94,12 +94,14 @@ std::vector<DiameterSpec> read_diameters(const Options& options) {
     if (output.starts_with("dia") &&
         std::none_of(diameters.begin(), diameters.end(),
                      [&](const DiameterSpec& each) { return each.output == output; }))
-      std::fprintf(stderr, "%s: taken as the axis' own displacement; a diameter: --diameter %s=x\n",
-                   output.c_str(), output.c_str());
+      std::fprintf(
+          stderr,
+          "%s: is taken as the axis' own displacement; if it is a diameter, add --diameter %s=x\n",
+          output.c_str(), output.c_str());
   return diameters;
 }
 
-/// In the frame of --like where that was given.
+/// The model with the inputs and outputs of --like, if given.
 std::string model_text(const Options& options, ThermalModel fitted) {
   fitted.diameters = read_diameters(options);
   if (options.like.empty()) return write_model(fitted);
@@ -109,12 +111,12 @@ std::string model_text(const Options& options, ThermalModel fitted) {
   return write_model(model);
 }
 
-/// One equation of few sensors, as JP7689460B2 has it.
+/// A few-sensor equation after JP7689460B2.
 int run_few(const Options& options, const MeasuredTests& tests, const FitOptions& fit_options) {
   const Fit fit = fit_equation(tests, fit_options);
   cli::write_file(options.model, model_text(options, model_of(tests, fit)));
   if (!options.report.empty()) cli::write_file(options.report, fit_html(tests, fit));
-  // A model on the output is not to be mixed with anything.
+  // A model on standard output must not be mixed with other text.
   if (options.model == "-") return 0;
   cli::write_file("-", options.json ? fit_json(tests, fit) : fit_text(tests, fit));
   return 0;
@@ -135,7 +137,7 @@ int run_families(const Options& options, const MeasuredTests& tests,
   return 0;
 }
 
-/// The coefficients of a type, or of last year, as far as the runs do not say otherwise.
+/// Coefficients of a type or of last year's model, updated by the runs.
 int run_prior(const Options& options, const std::vector<RunFile>& runs) {
   const series::Series prior =
       series::load_prior(options.prior, options.drift_percent / 100.0, options.years);
@@ -150,25 +152,26 @@ int run_prior(const Options& options, const std::vector<RunFile>& runs) {
   return 0;
 }
 
-/// JP7689460B2 chooses among places of the machine; that of the room is none.
+/// JP7689460B2 chooses among places on the machine, so the room temperature is excluded.
 void leave_out_room(const std::vector<RunFile>& runs, TestOptions& options) {
   for (const std::string& column : runs.front().columns) {
     if (!is_temperature(column)) continue;
     if (!is_called_like_a_room(column))
       options.places.push_back(column);
     else
-      std::fprintf(stderr, "%s: not chosen from, called like a room (--free, --places)\n",
+      std::fprintf(stderr,
+                   "%s: excluded, its name is that of a room temperature (--free, --places)\n",
                    column.c_str());
   }
 }
 
-/// Readings that `inspect` doubts are fitted to all the same: to mend them is for their owner.
+/// Warns of readings that `inspect` doubts. They are used nevertheless: only the user can decide.
 void note_doubtful_readings(const std::vector<RunFile>& runs, MeasuredTests& tests) {
   for (const inspection::Finding& each : inspection::inspect(runs, doubted_from).findings)
     if (std::find(tests.places.begin(), tests.places.end(), each.column) != tests.places.end())
       tests.notes.push_back(runs[each.run].name + ": " + each.text + " (thermocomp inspect, " +
                             std::to_string(std::lround(100.0 * each.probability)) +
-                            " %); taken as it is");
+                            " %); it is used unchanged");
 }
 
 int run(const Options& options) {
@@ -203,66 +206,68 @@ void add_fit_command(CLI::App& app, std::function<int()>& action) {
   CLI::App* sub = app.add_subcommand("fit", "sensor choice and model from measured runs");
   sub->add_option("RUN.csv", options->runs, "runs, each one test: RUN.csv[@T0:T1]")->required();
   sub->add_option("--columns", options->columns, cli::columns_help);
-  sub->add_option("--outputs", options->tests.outputs, "what is to be predicted: z_um[,...]")
+  sub->add_option("--outputs", options->tests.outputs, "outputs to predict: z_um[,...]")
       ->required()
       ->delimiter(',')
       ->type_name("NAME");
-  sub->add_option("-o", options->model, "model file for the daemon; - is the output")->required();
+  sub->add_option("-o", options->model, "model file for the daemon; - is standard output")
+      ->required();
   sub->add_option(
          "--like", options->like,
-         "a model whose inputs and outputs the new one gets, with 0 where the fit uses none: "
-         "the daemon's, so that its blocks and axes stay; may be the file of -o")
+         "take inputs and outputs from this model, usually the daemon's; inputs that the fit does "
+         "not use get 0; may be the file of -o")
       ->type_name("MODEL.toml");
   sub->add_option("--diameter", options->diameters,
-                  "an output that is a diameter, and the axis that takes out half of it: dia_um=x; "
-                  "dia_um=-x where the diameter grows as the axis moves in its negative direction")
+                  "an output that is a diameter, and the axis that corrects half of it: dia_um=x; "
+                  "dia_um=-x if the diameter grows when the axis moves in its negative direction")
       ->delimiter(',')
       ->type_name("OUTPUT=AXIS");
   sub->add_option("--family", options->family,
-                  "none, static_few, lagged_few, physical or lag_bank; else what leaves least of "
-                  "what is left out")
+                  "none, static_few, lagged_few, physical or lag_bank; default: the one with the "
+                  "smallest error in left-out tests")
       ->check(CLI::IsMember({"none", "static_few", "lagged_few", "physical", "lag_bank"}));
   const CLI::Option* terms =
       sub->add_option("--terms", options->terms,
-                      "few sensors only, how many: a number or a range in 1..8")
+                      "number of sensors of a few-sensor equation: a number or a range in 1..8")
           ->type_name("N..M");
-  sub->add_option("--places", options->tests.places, "temperatures to choose from; else all")
+  sub->add_option("--places", options->tests.places, "temperatures to choose from; default: all")
       ->delimiter(',')
       ->type_name("NAME");
   sub->add_flag("--free", options->free_choice,
-                "any places, not at most two of a group and one of the largest");
+                "choose any places; default: at most two of a group, one of the largest group");
   sub->add_option("--threshold", options->threshold,
-                  "similarity up to which places are of one group; else chosen")
+                  "similarity above which places form one group; default: chosen by the fit")
       ->check(CLI::Range(0.0, 1.0));
-  sub->add_flag("--lags", options->lags, "a lag on a term where a left-out test pays for it");
+  sub->add_flag("--lags", options->lags,
+                "add a lag to a term if it reduces the error in left-out tests");
   sub->add_option("--sensor-error-K", options->sensor_error_K,
-                  "what each reading may be wrong by: large coefficients that balance each other "
-                  "then pay; 0 judges by the tests alone. Left out: 0, with one run 0.1")
+                  "error of each reading, which penalises large coefficients that balance each "
+                  "other; default: 0, with one run 0.1")
       ->check(CLI::Range(0.0, 10.0));
   sub->add_option("--stretches", options->tests.folds_of_one_run,
-                  "into how many tests to cut the run when there is only one")
+                  "number of tests into which a single run is divided")
       ->check(CLI::Range(2, 100));
   CLI::Option* prior =
       sub->add_option(
              "--prior", options->prior,
-             "a series (thermocomp series), or last year's model: its coefficients hold as "
-             "far as the runs do not say otherwise")
+             "a series (thermocomp series) or last year's model, whose coefficients the runs "
+             "update")
           ->type_name("SERIES.toml")
           ->excludes("--family", "--terms", "--places", "--free", "--threshold", "--lags",
                      "--sensor-error-K", "--stretches");
   sub->add_option(
          "--drift-percent", options->drift_percent,
-         "with --years: share of the displacement by which the prior's prediction may have "
-         "moved in a year")
+         "with --years: yearly drift of the prior's prediction, as a share of the displacement")
       ->check(CLI::Range(0.0, 100.0))
       ->needs(prior);
-  sub->add_option("--years", options->years, "age of the prior; else 0 of a series, 1 of a model")
+  sub->add_option("--years", options->years,
+                  "age of the prior; default: 0 for a series, 1 for a model")
       ->check(CLI::Range(0.0, 50.0))
       ->needs(prior);
   CLI::Option* report =
       sub->add_option("--report", options->report, "page with curves and the choice (HTML)");
   prior->excludes(report);
-  sub->add_flag("--json", options->json, "the answer for a program");
+  sub->add_flag("--json", options->json, "print the result as JSON");
   sub->callback([options, terms, &action] {
     options->terms_given = terms->count() > 0;
     action = [options] { return run(*options); };

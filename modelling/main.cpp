@@ -1,4 +1,4 @@
-// thermocomp-modelling: the subcommands of `thermocomp` that need more than a machine has.
+// thermocomp-modelling: the subcommands of `thermocomp` that a machine's controller does not need.
 #include "modelling/command_line.hpp"
 #include "report/command.hpp"
 

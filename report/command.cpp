@@ -24,12 +24,12 @@ int run_program(int argc, char** argv, const char* name,
     try {
       app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
-      return app.exit(error) == 0 ? exit_success : exit_bad_use;
+      return app.exit(error) == 0 ? exit_success : exit_error;
     }
     return action();
   } catch (const ConfigurationError& error) {
     std::fprintf(stderr, "%s\n", error.what());
-    return exit_bad_use;
+    return exit_error;
   } catch (const Failure& failure) {
     std::fprintf(stderr, "%s: %s\n", name, failure.what());
     return failure.status();

@@ -15,8 +15,8 @@ namespace thermocomp::cli {
 
 /// Exit statuses of `thermocomp`, the same for all commands.
 inline constexpr int exit_success = 0;
-inline constexpr int exit_no = 1;       ///< the answer is "no", or a check failed
-inline constexpr int exit_bad_use = 2;  ///< bad use, bad input, or unreachable
+inline constexpr int exit_no = 1;     ///< the answer is "no", or a check failed
+inline constexpr int exit_error = 2;  ///< usage error, bad input, or unreachable
 
 /// Action of the parsed command line; returns the exit status. Set by exactly one subcommand during
 /// parsing, run by main() afterwards.
@@ -30,7 +30,7 @@ struct GlobalOptions {
 /// Ends the command with one line on stderr and this exit status.
 class Failure : public std::runtime_error {
  public:
-  explicit Failure(const std::string& what, int status = exit_bad_use)
+  explicit Failure(const std::string& what, int status = exit_error)
       : std::runtime_error(what), status_(status) {}
   [[nodiscard]] int status() const noexcept { return status_; }
 
@@ -42,10 +42,10 @@ class Failure : public std::runtime_error {
 /// action; writes errors to stderr, with the program's name unless they name a place in a file.
 /// @param declare  declares the command line; its references outlive the call
 /// @param failed   exit status after an error other than ConfigurationError and Failure
-/// @return the exit status; exit_bad_use for a wrong command line or configuration
+/// @return the exit status; exit_error for a wrong command line or configuration
 [[nodiscard]] int run_program(int argc, char** argv, const char* name,
                               const std::function<void(CLI::App&, Action&)>& declare,
-                              int failed = exit_bad_use);
+                              int failed = exit_error);
 
 /// Message for CLI::App::failure_message(). An unknown command: the word and the closest command. A
 /// missing command: the existing ones. Else the text of CLI11.

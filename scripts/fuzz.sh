@@ -6,7 +6,7 @@
 # Default: 10 minutes per target, one target per processor at a time. Inputs with new coverage are kept in
 # build/fuzz/runs/TARGET/corpus for the next run; failing inputs are written to
 # build/fuzz/runs/TARGET/artifacts.
-# Exit status 0: no failure; 1: a failure; 2: bad use or no build; 77: clang is not installed.
+# Exit status 0: no failure; 1: a failure; 2: usage error or no build; 77: clang is not installed.
 set -euo pipefail
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
 source scripts/common.sh

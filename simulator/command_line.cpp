@@ -11,7 +11,7 @@ When all buses are open one line of JSON is printed:
 At the end (duration reached, SIGINT or SIGTERM) the last line is
   error rms at the tool: uncompensated A um, compensated B um
 Every key of the machine file is in the commented example machine.toml.
-Exit status: 0 success, 2 bad use or bad input.)";
+Exit status: 0 success, 2 usage error or bad input.)";
 
 /// CLI::Range accepts "nan".
 CLI::Validator number_between(double low, double high) {

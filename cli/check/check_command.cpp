@@ -333,7 +333,7 @@ int run_check(const CheckOptions& options) {
     constexpr std::size_t shown_max = 100;  // a further line gives the number left out
     std::fprintf(stderr, "%s: %s\n", file.c_str(),
                  count > shown_max ? "more than 100 problems" : counted(count, "problem").c_str());
-    return exit_bad_use;
+    return exit_error;
   }
   return exit_success;
 }

@@ -23,7 +23,7 @@ nlohmann::json ask_daemon(const std::filesystem::path& socket, const std::string
     StatusClient client(socket);
     return client.call(method, params);
   } catch (const RemoteError& error) {
-    throw Failure(error.what(), error.code() == refused ? exit_no : exit_bad_use);
+    throw Failure(error.what(), error.code() == refused ? exit_no : exit_error);
   } catch (const ClientError& error) {
     throw Failure(error.what());
   }

@@ -128,7 +128,7 @@ void add_import_command(CLI::App& app, Action& action) {
   sub->add_option("-o,--output", options->output, "run file; - is standard output")
       ->type_name("FILE")
       ->required();
-  sub->footer("Exit status: 0 success, 2 bad use or bad input.");
+  sub->footer("Exit status: 0 success, 2 usage error or bad input.");
   sub->callback([&action, options] { action = [options] { return run_import(*options); }; });
 }
 

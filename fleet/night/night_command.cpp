@@ -206,7 +206,7 @@ void add_night_command(CLI::App& app, const std::string& store, cli::Action& act
       ->excludes(slurm);
   command->footer(
       "Exit status: 0 nothing departs; 1 a machine departs, or a night has no result (it is tried "
-      "again); 2 bad use, or the store is not reached.");
+      "again); 2 usage error, or the store is not reached.");
   command->callback([&store, &action, options] {
     action = [&store, options] {
       return options->is_slurm ? run_by_slurm(store, *options) : run_here(store, *options);

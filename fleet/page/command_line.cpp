@@ -13,7 +13,7 @@ void declare_page_command_line(CLI::App& app, std::string& file) {
       ->type_name("FILE")
       ->capture_default_str();
   app.footer(
-      "Exit status: 0 stopped on request, 2 bad use, configuration, or a port that is taken.");
+      "Exit status: 0 stopped on request, 2 usage error, configuration, or a port that is taken.");
 }
 
 }  // namespace thermocomp::fleet

@@ -233,7 +233,7 @@ void add_store_commands(CLI::App& app, const std::string& store, cli::Action& ac
       ->required();
   load_command->add_option("--model", loading->model, "the model that was in use")
       ->type_name("FILE");
-  load_command->footer("Exit status: 0 success, 1 rows were refused, 2 bad use or bad input.");
+  load_command->footer("Exit status: 0 success, 1 rows were refused, 2 usage error or bad input.");
   load_command->callback(
       [&store, &action, loading] { action = [&store, loading] { return load(store, *loading); }; });
 
@@ -243,7 +243,7 @@ void add_store_commands(CLI::App& app, const std::string& store, cli::Action& ac
   status_command->footer(
       "Exit status: 0 all is well; 1 a machine departs, a night failed, or an uplink was not heard "
       "for "
-      "a day; 2 bad use, or the store is not reached.");
+      "a day; 2 usage error, or the store is not reached.");
   status_command->callback([&] { action = [&store] { return status(store); }; });
 }
 

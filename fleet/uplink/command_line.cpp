@@ -17,7 +17,7 @@ void declare_uplink_command_line(CLI::App& app, UplinkOptions& options) {
       "be "
       "sent\n"
       "is sent later.\n"
-      "Exit status: 0 stopped on request, 1 with --once: not all was sent, 2 bad use or "
+      "Exit status: 0 stopped on request, 1 with --once: not all was sent, 2 usage error or "
       "configuration.");
 }
 

@@ -232,7 +232,8 @@ bool Constraints::complete(std::vector<int>& row, std::size_t factor, std::size_
   if (factor == row.size()) return true;
   for (int level = 0; level < level_counts_[factor]; ++level) {
     if (++steps > completion_steps_max)
-      throw std::runtime_error("what is forbidden is too entangled to plan around");
+      throw std::runtime_error(
+          "the forbidden combinations are too complex: no plan found within the step limit");
     row[factor] = level;
     if (kept_by(row) && complete(row, factor + 1, steps)) return true;
   }
@@ -249,7 +250,7 @@ PairCount count_pairs(const Design& design, const Constraints& constraints) {
 Design all_pairs(const Constraints& constraints, std::uint64_t seed) {
   const std::vector<int>& counts = constraints.level_counts();
   if (constraints.completed(Row(counts.size(), Constraints::no_level)).empty())
-    throw std::runtime_error("no test is allowed: what is forbidden leaves nothing");
+    throw std::runtime_error("the forbidden combinations exclude every test");
   const PairTable table(constraints);
   Chance chance(seed);
   std::vector<Row> best;

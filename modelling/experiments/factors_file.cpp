@@ -25,7 +25,7 @@ std::vector<std::string> read_levels(const TomlTable& table) {
     table.problem("levels", "must be 2 to " + std::to_string(levels_max) + " levels");
   std::set<std::string> seen;
   for (const std::string& level : levels)
-    if (!seen.insert(level).second) table.problem("levels", level, "is there twice");
+    if (!seen.insert(level).second) table.problem("levels", level, "occurs twice");
   return levels;
 }
 
@@ -75,7 +75,7 @@ std::vector<std::string> read_columns(const TomlTable& table, std::string_view k
   for (const std::string& name : names) {
     if (!is_column_name(name)) table.problem(key, name, column_name_rule);
     if (!fits(name)) table.problem(key, name, rule);
-    if (!seen.insert(name).second) table.problem(key, name, "is there twice");
+    if (!seen.insert(name).second) table.problem(key, name, "occurs twice");
   }
   return names;
 }
@@ -90,7 +90,7 @@ void read_cutting(const TomlTable& table, const std::vector<Factor>& factors, Te
         Cutting::actual);
     return;
   }
-  table.refuse("cutting", "must be left out where a factor is called cutting");
+  table.refuse("cutting", "must be omitted if a factor is named cutting");
   test.cutting_factor = static_cast<std::size_t>(factor - factors.begin());
   for (const std::string& level : factor->levels)
     if (level != "actual" && level != "simulated")
@@ -103,7 +103,7 @@ void read_rough_cuts(const TomlTable& table, const std::vector<Factor>& factors,
   const auto factor = std::find_if(factors.begin(), factors.end(),
                                    [](const Factor& each) { return each.name == "rough_cuts"; });
   if (factor == factors.end()) return;
-  table.refuse("rough_cuts", "must be left out where a factor is called rough_cuts");
+  table.refuse("rough_cuts", "must be omitted if a factor is named rough_cuts");
   test.rough_cuts_factor = static_cast<std::size_t>(factor - factors.begin());
 }
 
@@ -111,7 +111,7 @@ void read_test(const TomlTable& table, TestSpec& test) {
   test.hours = table.number("hours", Range::above(0, 1000), test.hours);
   test.row_every_min = table.number("row_every_min", Range::above(0, 1440), test.row_every_min);
   if (!(test.hours * 60.0 / test.row_every_min <= rows_max))
-    table.problem("row_every_min", "makes more than 100000 rows");
+    table.problem("row_every_min", "must give at most 100000 rows");
   test.temperatures = read_columns(table, "temperatures", is_temperature,
                                    "must be a temperature (*_degC)", {"t1_degC"});
   test.outputs = read_columns(table, "outputs", is_output,
@@ -150,9 +150,9 @@ FactorsSpec read(const TomlDocument& document) {
     spec.forbidden.push_back(read_forbidden(table, spec.factors));
   if (!spec.forbidden.empty() && (spec.method == Method::orthogonal || !spec.array.empty()))
     root.problem("forbidden",
-                 "an orthogonal array cannot leave anything out; method = \"all_pairs\"");
+                 "an orthogonal array cannot exclude combinations; use method = \"all_pairs\"");
   if (spec.method == Method::all_pairs && !spec.array.empty())
-    root.problem("array", "makes no sense with method = \"all_pairs\"");
+    root.problem("array", "must be omitted with method = \"all_pairs\"");
   const TomlTable test = root.table_or_empty("test");
   read_test(test, spec.test);
   read_cutting(test, spec.factors, spec.test);

@@ -46,8 +46,7 @@ int run(const Options& options) {
       char name[32];
       std::snprintf(name, sizeof name, "test_%02zu.csv", test + 1);
       if (std::filesystem::exists(folder / name))
-        throw std::runtime_error((folder / name).string() +
-                                 " is there already; nothing is written");
+        throw std::runtime_error((folder / name).string() + " already exists; nothing was written");
     }
     for (std::size_t test = 0; test < plan.design.rows.size(); ++test) {
       char name[32];
@@ -67,16 +66,16 @@ void add_plan_command(CLI::App& app, std::function<int()>& action) {
   const auto options = std::make_shared<Options>();
   CLI::App* sub = app.add_subcommand("plan", "test plan from factors and levels");
   CLI::Option* const factors = sub->add_option("FACTORS.toml", options->factors,
-                                               "factors, levels, what is forbidden, stops");
+                                               "factors, levels, forbidden combinations, stops");
   sub->add_option(
          "--apart", options->runs,
-         "in its place: the shortest run that tells apart what always moved alike in these")
+         "instead: plan the shortest run that separates columns which moved alike in these runs")
       ->type_name("RUN.csv")
       ->excludes(factors);
   sub->add_option("--columns", options->columns, cli::columns_help);
   sub->add_option("--out", options->folder,
-                  "folder for the sheet, the plan and a run file to fill for each test");
-  sub->add_flag("--json", options->json, "the plan for a program");
+                  "folder for the sheet, the plan and a run file to fill in for each test");
+  sub->add_flag("--json", options->json, "print the plan as JSON");
   sub->callback([options, factors, &action] {
     if (options->runs.empty() && factors->empty())
       throw CLI::RequiredError("FACTORS.toml or --apart");

@@ -30,18 +30,18 @@ std::string clock(double minutes) {
 std::string coverage_text(const TestPlan& plan) {
   std::string text;
   text.append("strength ").append(std::to_string(plan.strength));
-  text.append(plan.strength >= 2 ? ": every two factors hold every combination equally often\n"
-                                 : ": combinations of two factors do not come equally often\n");
-  text.append(plan.levels_balanced ? "every level of a factor comes equally often\n"
-                                   : "levels of a factor do not all come equally often\n");
+  text.append(plan.strength >= 2 ? ": any two factors have each combination equally often\n"
+                                 : ": combinations of two factors do not occur equally often\n");
+  text.append(plan.levels_balanced ? "all levels of a factor occur equally often\n"
+                                   : "levels of a factor do not all occur equally often\n");
   text.append("pairs of levels covered: ").append(std::to_string(plan.pairs.covered));
   text.append(" of ").append(std::to_string(plan.pairs.possible));
   if (plan.pairs.impossible > 0)
-    text.append("; ruled out by what is forbidden: ").append(std::to_string(plan.pairs.impossible));
+    text.append("; excluded as forbidden: ").append(std::to_string(plan.pairs.impossible));
   text.append("\n");
   if (plan.dummy_levels)
     text.append(
-        "a factor has fewer levels than its column: some of its levels come twice as often\n");
+        "a factor has fewer levels than its column: some of its levels occur twice as often\n");
   return text;
 }
 
@@ -149,9 +149,9 @@ std::string test_sheet(const TestPlan& plan) {
   text.append(" tests of ").append(number_text(test_spec.hours)).append(" h.\n\n");
   text.append(coverage_text(plan))
       .append(
-          "\nBefore each test the machine stands until it is cold and "
-          "even. The first row of a run file is taken before anything "
-          "runs: it is the reference.\n");
+          "\nBefore each test, leave the machine at rest until its temperature is uniform. Take "
+          "the "
+          "first row of a run file before anything runs: it is the reference.\n");
   for (std::size_t place = 0; place < plan.order.size(); ++place) {
     const std::size_t test = plan.order[place];
     text.append("\n## ").append(std::to_string(place + 1)).append(". test ");
@@ -168,14 +168,13 @@ std::string test_sheet(const TestPlan& plan) {
     for (const Stop& stop : test_spec.stops) {
       text.append("| ").append(clock(stop.after_h * 60)).append(" | stop for ");
       text.append(number_text(stop.pause_min)).append(" min | |\n| ");
-      text.append(clock(stop.after_h * 60 + stop.pause_min)).append(" | go on | |\n");
+      text.append(clock(stop.after_h * 60 + stop.pause_min)).append(" | continue | |\n");
     }
     text.append("| ").append(clock(test_spec.hours * 60)).append(" | end | |\n");
     text.append("\nEvery ").append(number_text(test_spec.row_every_min));
     text.append(
-        " min, at the end of a machining cycle, the tool back at its origin: all temperatures and "
-        "the displacement, "
-        "into the run file of test ");
+        " min, at the end of a machining cycle with the tool back at its origin, enter all "
+        "temperatures and the displacement into the run file of test ");
     text.append(std::to_string(test + 1)).append(".\n");
   }
   return text;

@@ -154,24 +154,22 @@ Separation separation(const MeasuredTests& tests) {
 std::string separation_text(const Separation& separation) {
   std::string text = printed("%.3g h recorded.\n", separation.recorded_h);
   if (separation.moves.empty() && separation.unmoved.empty())
-    text.append("Nothing that was recorded always moved alike.\n");
+    text.append("No two columns moved alike throughout.\n");
   for (const Move& move : separation.moves) {
     text.append("\n").append(move.column).append(" moved as ").append(listed(move.rest));
     text.append(printed(" did (correlation %.3g).\n  %.3g h: ", move.correlation, move.hours));
     text.append(move.column).append(printed(" up by %.3g", move.swing));
-    text.append(move.is_temperature ? " K and back, as fast as it ever went"
+    text.append(move.is_temperature ? " K and back, at its fastest recorded rate"
                                     : " and down, half of the time each");
-    text.append("; the others rest.\n");
+    text.append("; keep the others constant.\n");
   }
   for (const std::string& signal : separation.unmoved)
     text.append("\n").append(signal).append(
-        " stayed at a level within each run, or went one way once: a run in which it goes up and "
+        " was constant within each run, or changed once: record a run in which it goes up and "
         "down.\n");
   if (!separation.moves.empty())
     text.append(printed("\n%.3g h in all, from a cold machine. ", separation.hours()))
-        .append(
-            "What nothing can move alone need not be told apart: leave one of them out of the "
-            "fit.\n");
+        .append("If a column cannot be moved alone, leave it or the others out of the fit.\n");
   return text;
 }
 

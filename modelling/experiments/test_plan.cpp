@@ -74,7 +74,8 @@ TestPlan make_plan(const FactorsSpec& spec) {
   }
   if (plan.design.rows.empty()) plan.design = all_pairs(constraints, spec.seed);
   for (const auto& row : plan.design.rows)
-    if (!constraints.kept_by(row)) throw std::logic_error("the plan holds what is forbidden");
+    if (!constraints.kept_by(row))
+      throw std::logic_error("the plan contains a forbidden combination");
   plan.strength = strength_of(plan.design);
   plan.levels_balanced = levels_balanced(plan.design);
   plan.pairs = count_pairs(plan.design, constraints);

@@ -71,7 +71,7 @@ void add_inspect_command(CLI::App& app, std::function<int()>& action) {
   sub->add_flag("--all", options->all, "also tell what is less likely than not");
   sub->add_option("--series", options->series,
                   "series file: where the machine of these runs departs from its sisters");
-  sub->footer("Exit status: 0 nothing found, 1 something, 2 bad use or bad input.");
+  sub->footer("Exit status: 0 nothing found, 1 something, 2 usage error or bad input.");
   sub->callback([options, &action] { action = [options] { return run(*options); }; });
 }
 

@@ -234,7 +234,7 @@ std::string remaining_text(const PlacementProblem& problem, const Comparison& co
   const ErrorFigures left = figures(problem, comparison.best(problem));
   return line("They leave %.2f um RMS (%.2f um at most) of %.2f um, over the load cases that",
               left.rms_um, left.peak_um, figures(problem, comparison.uncompensated).rms_um) +
-         (problem.left_out.empty() ? " they were chosen for." : " took no part in the choice.");
+         (problem.left_out.empty() ? " they were chosen for." : " were not used for the choice.");
 }
 
 std::string recommendation_text(const PlacementProblem& problem, const Comparison& comparison) {
@@ -247,7 +247,7 @@ std::string recommendation_text(const PlacementProblem& problem, const Compariso
     text += result.name == rebuilt_field ? " (not the daemon's model);" : ";";
   }
   text.back() = '.';
-  return text + "\n`thermocomp place --all` tells how each went.\n";
+  return text + "\n`thermocomp place --all` shows every method's steps.\n";
 }
 
 std::string comparison_text(const PlacementProblem& problem, const Comparison& comparison) {
@@ -267,7 +267,7 @@ std::string comparison_text(const PlacementProblem& problem, const Comparison& c
   for (const GreedyStep& step : comparison.greedy.steps) {
     text += line(" %s %.3f um;", step.block.c_str(), step.error_um);
   }
-  text += "\n\nerror of the estimated displacement [um], RMS and greatest, over the load cases";
+  text += "\n\nerror of the estimated displacement [um], RMS and maximum, over the load cases";
   text += line("\n%-24s %10s %10s", "", "used", "");
   if (left_out) text += line(" %12s", "left out");
   text.append("\n").append(table_row(comparison.uncompensated, left_out));

@@ -30,7 +30,7 @@ void write_pictures(const Options& options, const structure::StructureSpec& spec
                     const PlacementProblem& problem, const Comparison& comparison) {
   const MethodResult& best = comparison.best(problem);
   structure::SurfacePicture picture(spec, structure);
-  picture.set_title("Places of the sensors, " + spec.file.stem().string(),
+  picture.set_title("Sensor positions, " + spec.file.stem().string(),
                     remaining_text(problem, comparison));
   picture.leave_out_sensors();
   for (std::size_t b = 0; b < best.sensors.size(); ++b)
@@ -81,18 +81,18 @@ void add_place_command(CLI::App& app, std::function<int()>& action) {
   sub->add_option("STRUCTURE.toml", options->structure,
                   "parts, supports, blocks, outputs, heat and load cases")
       ->required();
-  sub->add_flag("--json", options->json, "everything, for a program");
-  sub->add_flag("--all", options->all, "every method, and how the patterns went");
+  sub->add_flag("--json", options->json, "print everything as JSON");
+  sub->add_flag("--all", options->all, "print every method and the steps of the patterns");
   sub->add_option("--page", options->page,
-                  "the load cases and the sensors in three dimensions, for a browser (HTML)");
-  sub->add_option("--vtu", options->vtu, "the same for ParaView");
+                  "write load cases and sensors in three dimensions, for a browser (HTML)");
+  sub->add_option("--vtu", options->vtu, "write load cases and sensors for ParaView");
   const std::map<std::string, Start> starts{
       {"mean", Start::mean}, {"median", Start::median}, {"centroid", Start::centroid}};
   sub->add_option("--start", options->tendency.start,
-                  "with which block temperatures the patterns begin: mean, median or centroid")
+                  "initial block temperatures of the patterns: mean, median or centroid")
       ->transform(CLI::CheckedTransformer(starts).description("mean|median|centroid"));
   sub->add_option("--threshold-um", options->tendency.threshold_um,
-                  "RMS error at which the patterns end")
+                  "RMS error at which the patterns stop")
       ->check(CLI::Range(0.0, 1e6));
   sub->callback([options, &action] { action = [options] { return run(*options); }; });
 }

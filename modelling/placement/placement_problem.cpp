@@ -105,8 +105,8 @@ void add_blocks(const StructureSpec& spec, const Structure& structure, Placement
     block.from_support_m = length(mean_of(points_m) - support_m);
     if (!block.candidates.empty()) continue;
     problems.push_back({spec.file.string(), 0, "block", block.name,
-                        "has no node on the free surface where a sensor could stand; "
-                        "placement.on_surface = false takes any node"});
+                        "has no node on the free surface for a sensor; "
+                        "placement.on_surface = false allows any node"});
   }
   if (!problems.empty()) throw ConfigurationError(std::move(problems));
 }

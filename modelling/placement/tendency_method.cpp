@@ -184,10 +184,10 @@ TendencyRun run_tendencies(const PlacementProblem& problem, const Field& field, 
       break;
     }
     if (static_cast<int>(run.rounds.size()) >= options.rounds_max) {
-      run.ended = "the greatest number of rounds";
+      run.ended = "the maximum number of rounds is reached";
       break;
     }
-    run.ended = "no pattern makes it better inside what the blocks' sensors can read";
+    run.ended = "no pattern reduces the error within the range of possible readings";
     int rank = 0;
     for (const Candidate& candidate :
          candidates_of(problem, patterns, bounds, run.blocks_K, needed_um, way)) {

@@ -191,7 +191,7 @@ OutputSeries output_series(const std::vector<Statistics>& machines, const std::s
   OutputSeries series;
   series.noise_time_s = noise_s2 / time_s;
   series.displacement_um = std::sqrt(yy / time_s);
-  if (!(series.displacement_um > 0)) throw std::runtime_error(output + ": never moves");
+  if (!(series.displacement_um > 0)) throw std::runtime_error(output + ": is constant");
   const auto columns = static_cast<double>(size.size());
   Assumed assumed;
   assumed.mean_sd = Eigen::VectorXd::Constant(size.size(), series.displacement_um);
@@ -275,8 +275,8 @@ ThermalModel bank_of_machine(const Columns& columns, const std::vector<std::stri
 Series series_of(const std::vector<Statistics>& machines, std::optional<double> scatter) {
   if (machines.size() < 2 && !scatter)
     throw std::runtime_error(
-        "one machine only: nothing shows how machines of the type differ. Name a second one, or "
-        "state it: --scatter 0.15");
+        "one machine does not show how machines of the type differ; add a second machine or give "
+        "--scatter 0.15");
   Series series;
   series.columns = columns_of_all(machines);
   series.moment = moment_of(machines, series.columns);
@@ -285,11 +285,11 @@ Series series_of(const std::vector<Statistics>& machines, std::optional<double> 
   for (const Statistics& machine : machines) {
     if (std::find(series.machines.begin(), series.machines.end(), machine.machine) !=
         series.machines.end())
-      throw std::runtime_error(machine.machine + ": two machines of this name");
+      throw std::runtime_error(machine.machine + ": two machines have this name");
     series.machines.push_back(machine.machine);
     series.hours += machine.time_s / 3600.0;
     if (!(machine.xx.diagonal().maxCoeff() > 0))
-      throw std::runtime_error(machine.machine + ": none of its temperatures and signals moves");
+      throw std::runtime_error(machine.machine + ": none of its temperatures and signals changes");
     seen.push_back(seen_by(machine.columns, series.columns, series.moment));
   }
   for (const std::string& output : machines.front().outputs)
@@ -410,7 +410,7 @@ bool departs(const Comparison& comparison) {
 Series series_of_model(const ThermalModel& model, const std::string& file, double drift,
                        double years) {
   if (!model.made_from)
-    throw std::runtime_error(file + ": has no [made_from], so nothing says how far it is right");
+    throw std::runtime_error(file + ": has no [made_from], so its error is unknown");
   Series series;
   series.machines = {file};
   series.hours = model.made_from->hours;
@@ -418,7 +418,7 @@ Series series_of_model(const ThermalModel& model, const std::string& file, doubl
   for (const TermSpec& term : model.terms) {
     if (!term.is_bank())
       throw std::runtime_error(file + ": the term " + term.kind +
-                               " is no column of a bank: fit --family lag_bank, or a series");
+                               " is not a bank; use fit --family lag_bank or a series");
     if (series.columns.taus_s.size() > 1 && series.columns.taus_s != term.bank.taus_s)
       throw std::runtime_error(file + ": its banks have different time constants");
     series.columns.taus_s = term.bank.taus_s;
@@ -455,7 +455,7 @@ Series series_of_model(const ThermalModel& model, const std::string& file, doubl
     const std::string& name = model.outputs[o];
     const auto stated = made_from.outputs.find(name);
     if (stated == made_from.outputs.end())
-      throw std::runtime_error(file + ": [made_from] says nothing of " + name);
+      throw std::runtime_error(file + ": [made_from] has no output " + name);
     OutputSeries& output = series.outputs[name];
     output.mean = Eigen::VectorXd::Zero(series.columns.size());
     for (std::size_t i = 0; i < model.inputs.size(); ++i)

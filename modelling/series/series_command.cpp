@@ -62,8 +62,8 @@ std::string text_of(const Series& series) {
   for (const auto& [name, output] : series.outputs) {
     const double scatter_um = std::sqrt((output.covariance * series.moment).trace());
     text += name + printed(
-                       ": moves %.3g um; a machine differs from the mean by %.3g um; left: "
-                       "%.3g um\n",
+                       ": displacement %.3g um RMS, difference of a machine from the mean %.3g um, "
+                       "residual %.3g um\n",
                        output.displacement_um, scatter_um, output.remainder_um);
   }
   return text;
@@ -96,35 +96,37 @@ int run(const Options& options) {
 
 void add_series_command(CLI::App& app, std::function<int()>& action) {
   const auto options = std::make_shared<Options>();
-  CLI::App* sub = app.add_subcommand("series", "what machines of one type have in common");
+  CLI::App* sub =
+      app.add_subcommand("series", "compute the mean model and scatter of machines of one type");
   sub->add_option("FILE", options->files,
-                  "one a machine: a run RUN.csv[@T0:T1], a folder of runs, or statistics that "
-                  "--machine wrote")
+                  "one argument per machine: a run RUN.csv[@T0:T1], a folder of runs, or "
+                  "statistics written by --machine")
       ->required();
   sub->add_option("-o", options->result, "series file, for fit --prior and inspect --series")
       ->required();
   sub->add_option("--columns", options->columns, cli::columns_help);
-  sub->add_option("--outputs", options->outputs, "displacements; else all: z_um[,...]")
+  sub->add_option("--outputs", options->outputs, "displacements z_um[,...]; default: all")
       ->delimiter(',')
       ->type_name("NAME");
   CLI::Option* machine =
       sub->add_option("--machine", options->machine,
-                      "all files are runs of this one machine: write its statistics instead of a "
-                      "series; they do not hold the runs, and can be sent")
+                      "write statistics of this machine, of which all files are runs, instead of a "
+                      "series; they do not reveal the runs")
           ->type_name("NAME");
   CLI::Option* prior =
       sub->add_option("--prior", options->prior,
-                      "with --machine: write the series that has only this machine, known from its "
-                      "runs and this series: its next runs are then compared with its own past")
+                      "with --machine: write a series of this machine alone, from its runs and "
+                      "this series, to compare its next runs with its own past")
           ->type_name("SERIES.toml")
           ->needs(machine);
   sub->add_option("--drift-percent", options->drift_percent,
-                  "with --prior: share of the displacement by which the machine may move by itself")
+                  "with --prior: expected change of the machine itself, as a share of the "
+                  "displacement")
       ->check(CLI::Range(0.0, 100.0))
       ->needs(prior);
   sub->add_option("--scatter", options->scatter,
-                  "share of the displacement by which predictions of sisters differ, assumed as if "
-                  "two machines had shown it; left out: 0.15, and one machine is refused")
+                  "assumed difference between machines, as a share of the displacement, with the "
+                  "weight of two machines; default: 0.15, and one machine is refused")
       ->check(CLI::Range(0.01, 10.0));
   sub->callback([options, &action] { action = [options] { return run(*options); }; });
 }

@@ -95,7 +95,7 @@ Columns read_columns(const TomlTable& root) {
     if (!is_temperature(name) && !is_operating(name))
       root.problem("subjects", name, "must be a temperature or an operating signal");
     if (signals && is_temperature(name))
-      root.problem("subjects", name, "temperatures must stand before signals");
+      root.problem("subjects", name, "temperatures must come before signals");
     signals = signals || !is_temperature(name);
     if (!(low[i] <= high[i]) || !(rise_low[i] <= rise_high[i]))
       root.problem("high", "must not be below low");
@@ -135,7 +135,7 @@ bool is_covariance(const Eigen::MatrixXd& matrix) {
 
 std::string write_statistics(const Statistics& statistics) {
   std::string text =
-      "# What the runs of one machine say, for thermocomp series: integrals over time.\n"
+      "# Statistics of one machine's runs, for thermocomp series: integrals over time.\n"
       "format = 1\nkind = \"statistics\"\n";
   add(text, "machine", toml_string(statistics.machine));
   add(text, "runs", toml_list(statistics.runs, toml_string));
@@ -181,8 +181,8 @@ Statistics load_statistics(const std::filesystem::path& file) {
 
 std::string write_series(const Series& series) {
   std::string text =
-      "# What machines of one type have in common, and how they scatter: prior of\n"
-      "# thermocomp fit --prior, sisters of thermocomp inspect --series.\n"
+      "# Mean coefficients of machines of one type and their scatter, for\n"
+      "# thermocomp fit --prior and thermocomp inspect --series.\n"
       "format = 1\nkind = \"series\"\n";
   add(text, "machines", toml_list(series.machines, toml_string));
   if (!series.past_of.empty()) add(text, "past_of", toml_string(series.past_of));

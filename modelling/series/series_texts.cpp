@@ -33,8 +33,8 @@ std::string adapted_text(const Series& series, const Statistics& machine, const 
     const MadeFrom::Output& stated = adapted.model.made_from->outputs.at(name);
     const double learned = learned_of(series.outputs.at(name), series.moment, b);
     text += name + printed(
-                       ": %.0f %% of what the prior left open is settled; error expected of "
-                       "further rows: %.3g um, without a model %.3g um\n",
+                       ": the runs remove %.0f %% of the prior variance; expected error in new "
+                       "rows %.3g um, without a model %.3g um\n",
                        100.0 * learned, stated.left_out_rms_um, stated.no_model_rms_um);
     all["outputs"][name] = {{"settled", learned},
                             {"expected_rms_um", stated.left_out_rms_um},
@@ -50,16 +50,16 @@ std::string comparison_text(const std::vector<Comparison>& comparisons) {
     text +=
         "\n" + each.output +
         printed(
-            ": among its sisters at %.3g times the usual distance (%.0f directions); one "
-            "sister in %.3g is as far%s\n",
+            ": differs from its sisters by %.3g times the usual distance (%.0f directions); one "
+            "sister in %.3g differs as much%s\n",
             std::sqrt(departure.distance2 / std::max(departure.freedom, 1.0)), departure.freedom,
             1.0 / std::max(departure.probability, 1e-9), departs(each) ? ": it departs" : "");
     for (std::size_t i = 0; i < std::min(parts_named, departure.parts.size()); ++i)
       if (departs(each))
-        text += printed("  %-24s explains %.0f %%, does %.3g um otherwise\n",
+        text += printed("  %-24s explains %.0f %%, effect differs by %.3g um\n",
                         departure.parts[i].name.c_str(), 100.0 * departure.parts[i].share,
                         departure.parts[i].effect_um);
-    text += printed("  left: %.3g um, of the sisters %.3g um (median)\n", each.remainder_um,
+    text += printed("  residual: %.3g um, of the sisters %.3g um (median)\n", each.remainder_um,
                     each.median_um);
   }
   return text;

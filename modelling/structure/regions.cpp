@@ -74,7 +74,7 @@ std::vector<Index> RegionFinder::nodes_in(const Region& region) {
   for (Index node = 0; node < chosen.size(); ++node) {
     if (chosen[node] && inside(region, node)) nodes.push_back(node);
   }
-  if (nodes.empty()) problem(region.origin, "no node of the mesh is there");
+  if (nodes.empty()) problem(region.origin, "the region contains no node of the mesh");
   return nodes;
 }
 
@@ -96,7 +96,8 @@ std::vector<Face> RegionFinder::faces_in(const Region& region) {
     return !std::all_of(nodes.begin(), nodes.end(),
                         [&](Index node) { return chosen[node] && inside(region, node); });
   });
-  if (candidates.empty()) problem(region.origin, "no face of the mesh's surface is there");
+  if (candidates.empty())
+    problem(region.origin, "the region contains no face of the mesh's surface");
   return candidates;
 }
 
@@ -105,8 +106,8 @@ namespace {
 constexpr double weight_least = 1e-12;
 
 void refuse_joint_without_contact(RegionFinder& finder, const JointSpec& joint) {
-  finder.problem(joint.from.origin, "the faces of joint " + joint.name +
-                                        " are nowhere nearer to each other than gap_mm");
+  finder.problem(joint.from.origin,
+                 "the faces of joint " + joint.name + " are further apart than gap_mm everywhere");
 }
 
 }  // namespace

@@ -89,7 +89,8 @@ void add_run(const RunFile& run, const ThermalModel& model, const Structure& str
   });
   if (inputs.rows.size() < 2)
     throw ConfigurationError(
-        {{run.name, 0, "", "", "must have two rows, of those selected, with every block"}});
+        {{run.name, 0, "", "",
+          "must have at least two selected rows with readings of every block"}});
   for (const std::size_t moment : moments(0, inputs.rows.size() - 1)) {
     const std::size_t row = inputs.rows[moment];
     std::vector<double> rise_K(structure.mesh.nodes_m.size(), 0.0);
@@ -107,8 +108,8 @@ void add_run(const RunFile& run, const ThermalModel& model, const Structure& str
     picture.add_state({name, name, time_s, "", {}, {}, {}}, rise_K, displacement_m);
   }
   picture.set_title(
-      name + ": what warming did to the machine",
-      "The run is shown without compensation, since its first row, by the temperatures "
+      name + ": thermal displacement",
+      "Displacement without compensation since the run's first row, computed from the temperatures "
       "of the model's blocks.");
 }
 
@@ -138,13 +139,13 @@ std::string body_text(const Options& options, const Structure& structure, const 
 
 int run(const Options& options) {
   if (!options.run.empty() && options.page.empty())
-    throw std::runtime_error("--run needs --page, which shows it");
+    throw std::runtime_error("--run requires --page");
   const cli::ProgressLines progress;
   const StructureSpec spec = load_structure(options.structure);
   const Structure structure =
       build_structure(spec, [&](std::string_view what) { progress.say(what); });
   progress.say("stiffness of " + std::to_string(structure.mesh.nodes_m.size()) +
-               " nodes, assembled and made ready to solve");
+               " nodes, assembly and factorisation");
   const Statics statics(structure.mesh, structure.material_of_part, structure.reduction,
                         structure.springs, options.solver);
   progress.say(std::to_string(structure.rows.size()) + " rows, one solve each");
@@ -157,7 +158,7 @@ int run(const Options& options) {
     if (!options.picture.empty()) cli::write_file(options.picture, svg_picture(structure, shapes));
   }
   if (!options.plant.empty()) {
-    progress.say("a small state space for the simulator");
+    progress.say("reduction to a state-space model for the simulator");
     const HeatModel heat = build_heat_model(spec, structure);
     cli::write_file(
         options.plant,
@@ -179,29 +180,32 @@ void add_structure_command(CLI::App& app, std::function<int()>& action) {
   const auto options = std::make_shared<Options>();
   CLI::App* sub =
       app.add_subcommand("structure", "block matrix of a structure, by finite elements");
-  sub->add_option("STRUCTURE.toml", options->structure, "parts, supports, blocks and outputs")
+  sub->add_option("STRUCTURE.toml", options->structure,
+                  "structure file: parts, supports, blocks and outputs")
       ->required();
-  sub->add_option("-o,--output", options->model, "the model file to write (- for stdout)")
+  sub->add_option("-o,--output", options->model, "model file to write; - is standard output")
       ->required();
-  sub->add_option("--vtu", options->vtu, "mesh, blocks and deformed shapes, for ParaView");
-  sub->add_option("--picture", options->picture, "the same as a picture (SVG)");
-  sub->add_option("--page", options->page,
-                  "the same in three dimensions, for a browser and the gateway (HTML)");
+  sub->add_option("--vtu", options->vtu, "write mesh, blocks and deformed shapes for ParaView");
+  sub->add_option("--picture", options->picture,
+                  "write blocks and deformed shapes as a picture (SVG)");
+  sub->add_option(
+      "--page", options->page,
+      "write blocks and deformed shapes in three dimensions, for a browser and the gateway (HTML)");
   sub->add_option(
       "--run", options->run,
-      "RUN.csv[@T0:T1] with the blocks' temperatures (thermocomp export): its course is on "
-      "the page too");
+      "RUN.csv[@T0:T1] with the blocks' temperatures (thermocomp export), added to the page");
   sub->add_option(
       "--plant", options->plant,
-      "the machine's body for thermocomp-sim: a reduced model of heat and displacement");
-  sub->add_flag("--plant-parts", options->plant_parts,
-                "into the same file: each film, joint and part, for thermocomp diagnose --thermal");
+      "write the machine's body for thermocomp-sim: a reduced model of heat and displacement");
+  sub->add_flag(
+      "--plant-parts", options->plant_parts,
+      "add each film, joint and part to the file of --plant, for thermocomp diagnose --thermal");
   sub->add_flag("--all", options->all,
-                "print the rows along the guideways, nodes, singular values and memory too");
+                "also print the rows along the guideways, nodes, singular values and memory");
   const std::map<std::string, Backend> backends{{"cholmod", Backend::cholmod},
                                                 {"petsc", Backend::petsc}};
   sub->add_option("--solver", options->solver.backend,
-                  "cholmod (default): one factorisation; petsc: for meshes past this memory")
+                  "cholmod (default): direct, in memory; petsc: iterative, for larger meshes")
       ->transform(CLI::CheckedTransformer(backends).description("cholmod|petsc"));
   sub->add_option("--ranks", options->solver.ranks, "MPI ranks of petsc")
       ->check(CLI::Range(1, 256))

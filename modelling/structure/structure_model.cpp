@@ -79,7 +79,7 @@ class Builder {
       progress_("mesh of part " + part.name);
       if (!part.boxes.empty()) {
         if (add_boxes(mesh_, i, part.boxes, part.size_m, part.shape) == 0) {
-          problem(part.origin, "the boxes leave nothing of the part");
+          problem(part.origin, "no material is left: the boxes cut away the whole part");
         }
         continue;
       }
@@ -166,9 +166,9 @@ class Builder {
           ++count[block];
         }
         if (count[block] == 0 && !nodes.empty()) {
-          finder_->problem(
-              spec_.blocks[block].on.origin,
-              "block " + spec_.blocks[block].name + " has no nodes: earlier blocks have them all");
+          finder_->problem(spec_.blocks[block].on.origin,
+                           "block " + spec_.blocks[block].name +
+                               " has no nodes: they all belong to earlier blocks");
         }
       }
     }
@@ -178,10 +178,9 @@ class Builder {
     if (left == 0 || finder_->has_problems()) return;
     const auto first = static_cast<Index>(
         std::distance(blocks.begin(), std::find(blocks.begin(), blocks.end(), no_part)));
-    finder_->problem({0, "block", ""}, std::to_string(left) +
-                                           " nodes are in no block, the first at " +
-                                           place_text(mesh_.nodes_m[first]) +
-                                           "; a block with rest = true takes them");
+    finder_->problem({0, "block", ""},
+                     std::to_string(left) + " nodes are in no block, the first at " +
+                         place_text(mesh_.nodes_m[first]) + "; add a block with rest = true");
   }
 
   [[nodiscard]] std::vector<Index> every_node() const {

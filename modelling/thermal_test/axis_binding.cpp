@@ -70,7 +70,7 @@ AxisBinding parsed(const RunFile& run, const std::string& value) {
   if (!run.find(binding.column)) {
     const std::size_t slash = binding.column.rfind('/');
     if (slash == std::string::npos)
-      refuse(run, value, "is no column of the file; " + displacement_columns(run));
+      refuse(run, value, "is not a column of the file; " + displacement_columns(run));
     const auto distance_mm = distance_of(std::string_view(binding.column).substr(slash + 1));
     if (!distance_mm) refuse(run, value, std::string(form_rule));
     binding.distance_mm = *distance_mm;
@@ -142,15 +142,14 @@ std::vector<AxisBinding> bind_axes(const RunFile& run, const TestOptions& option
     const auto same =
         std::count_if(bindings.begin(), bindings.end(),
                       [&](const AxisBinding& other) { return other.axis == bindings.back().axis; });
-    if (same > 1) refuse(run, value, "names an axis that another --axis has named");
+    if (same > 1) refuse(run, value, "repeats the axis of another --axis");
   }
   if (options.axes.empty()) bindings = by_names(run, options);
   if (bindings.empty())
     refuse(run, "(missing)",
-           "no column that is called like an axis (x_um ... c_urad) has two values in the rows "
-           "selected; " +
+           "no column named like an axis (x_um ... c_urad) has two values in the selected rows; " +
                displacement_columns(run) +
-               ": say which is which, --axis z=COLUMN; into a history they come by thermocomp "
+               ": assign columns with --axis z=COLUMN; a history gets values by thermocomp "
                "measured AXIS UM");
   return bindings;
 }

@@ -78,7 +78,7 @@ class PartReader {
         std::optional<double>& place = word == "warm" ? pair.warm : pair.cold;
         if (place)
           refuse(table_.lines[row], name, std::string(field),
-                 "the feature has a value of this repeat and state already");
+                 "the feature already has a value for this repeat and state");
         place = *number;
       }
     }
@@ -150,9 +150,10 @@ PartFigures part_figures(const std::string& path) {
     }
     if (measured.empty()) continue;
     if (axis.repeats < 2)
-      throw ConfigurationError({Problem{path, 0, axes[i], "1 repeat",
-                                        "every feature is needed cold and warm at least twice, or "
-                                        "nothing tells how sure it is"}});
+      throw ConfigurationError(
+          {Problem{path, 0, axes[i], "1 repeat",
+                   "every feature must be measured cold and warm at least twice, "
+                   "for an interval"}});
     axis.repeat_sd_um = std::sqrt(squares / freedom);
     double sum = 0.0;
     double widest = 0.0;
@@ -205,19 +206,19 @@ const PartAxis* find(const PartFigures& figures, const std::string& axis) {
 std::vector<std::string> instructions(const PartSheet& sheet) {
   return {
       "The part: " + std::to_string(sheet.features) +
-          " features of one kind (bores, pads, spheres) spread over the working volume. Either an "
-          "artefact that stays clamped and is probed, or a part on which each feature has a cold "
-          "and a warm one side by side, cut by this machine: rough cuts, one finishing cut, then "
+          " features of one kind (bores, pads, spheres) spread over the working volume. Use either "
+          "an artefact that stays clamped and is probed, or a part with a cold and a warm copy of "
+          "each feature side by side, cut by this machine (rough cuts, one finishing cut) and "
           "measured at 20 degC.",
-      ("Cold: the machine has stood still for a night. Probe or finish every feature once, in the "
-       "order of the rows."),
-      "Warm: the shop's own load for " + figure_text(sheet.hours) +
-          " h, then the same at once, in the same order.",
-      "A repeat is a whole day: cold and warm once. " + std::to_string(sheet.repeats) +
-          " repeats, with the part clamped anew only between them.",
-      "One sheet with the compensation switched off (thermocomp disable), one with it on.",
-      ("Values are deviations from the nominal size or place in um, with their sign. What is not "
-       "measured stays empty.")};
+      ("Cold: after a night at rest, probe or finish every feature once, in the order of the "
+       "rows."),
+      "Warm: after " + figure_text(sheet.hours) +
+          " h of the shop's usual load, immediately do the same in the same order.",
+      "One repeat, cold and warm, takes a day. Do " + std::to_string(sheet.repeats) +
+          " repeats; clamp the part anew only between them.",
+      "Fill in one sheet with the compensation off (thermocomp disable), one with it on.",
+      ("Values are deviations from the nominal size or place in um, with their sign. Leave missing "
+       "values empty.")};
 }
 
 /// Draws each feature's shift as a line between its bounds, without and with compensation.
@@ -328,7 +329,7 @@ std::string tolerance_sentence(const PartFigures& figures, const char* which, do
                      " compensation: " + name_of(tolerance) + ". Farthest: " + most.feature +
                      " in " + most.axis + ", " + figure_words(most.shift_um, "um") + ".";
   if (tolerance == Tolerance::undecided)
-    text += " An interval reaches beyond the tolerance: more repeats make it narrower.";
+    text += " An interval crosses the tolerance; more repeats narrow it.";
   return text;
 }
 
@@ -345,7 +346,7 @@ std::vector<std::string> part_sentences(const PartTest& test) {
         axis.axis + ": heat moves the features by " + figure_words(axis.rms_um, "um") + " RMS";
     if (compensated != nullptr)
       text += ", with compensation by " + figure_words(compensated->rms_um, "um") + ": " +
-              percent_words(ratio_of(compensated->rms_um, axis.rms_um)) + " remain";
+              percent_words(ratio_of(compensated->rms_um, axis.rms_um)) + " remains";
     sentences.push_back(text + ".");
   }
   return sentences;
@@ -353,7 +354,7 @@ std::vector<std::string> part_sentences(const PartTest& test) {
 
 std::string part_html(const PartTest& test) {
   const auto& [before, after, tolerance_um] = test;
-  std::string html = html_begin("Test part: how far heat moves its features");
+  std::string html = html_begin("Test part: thermal shift of its features");
   html += html_list(part_sentences(test));
   html += html_figure(
       picture(test), std::string("Shift of each feature from cold to warm with its 95 % interval") +
@@ -373,14 +374,16 @@ std::string part_html(const PartTest& test) {
   }
   html += html_table(rows) + html_heading("Signed") + signature_table();
   std::vector<std::string> method{
-      "A shift is the mean over the repeats of the deviation warm less the deviation cold, so that "
-      "the feature's own error, its clamping and the probe's calibration go out.",
-      "In brackets: 95 % by Student's t from the scatter of the repeats, with as many degrees of "
-      "freedom as there are repeats less one, since the features of one repeat share its warmth."};
+      "A shift is the mean over the repeats of the warm minus the cold deviation. The feature's "
+      "own error, its clamping and the probe's calibration cancel.",
+      "Brackets contain the 95 % interval by Student's t from the scatter of the repeats. The "
+      "degrees of freedom are the repeats minus one, since the features of one repeat share its "
+      "thermal state."};
   if (tolerance_um)
     method.emplace_back(
-        "The tolerance is kept where every interval is within it, exceeded where one lies outside "
-        "as a whole; else these repeats do not decide.");
+        "The tolerance is kept if every interval is within it, exceeded if one is entirely "
+        "outside, "
+        "else undecided.");
   for (const PartFigures* figures : {&before, after ? &*after : nullptr})
     if (figures != nullptr) {
       std::string scatter = figures->file + ": the standard deviation of one repeat is";

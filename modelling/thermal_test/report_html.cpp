@@ -46,7 +46,7 @@ std::string cell_of(std::string words) {
 
 std::string settled_word(const AxisFigures& axis) {
   if (!axis.last_by_first.is_there()) return "ran under 2 h";
-  if (!axis.settled) return "cannot be told";
+  if (!axis.settled) return "undecided";
   return *axis.settled ? "yes" : "no";
 }
 
@@ -152,7 +152,7 @@ std::string figure_cell(const Figure& figure) {
 std::string axes_table(const TestFigures& figures, TestKind kind) {
   std::vector<std::vector<std::string>> rows;
   if (kind == TestKind::environment)
-    rows.push_back({"axis", "whole test", "hour with most"});
+    rows.push_back({"axis", "whole test", "largest hour"});
   else
     rows.push_back(
         {"range of", "first 60 min", "until the end", "cooling", "last by first hour", "settled"});
@@ -196,9 +196,8 @@ std::string one_test(const TestData& data, const TestFigures& figures, const std
   for (const AxisFigures& axis : figures.axes)
     sentences.push_back(axis_sentence(axis, figures.phases));
   if (figures.combined_until_end.is_there())
-    sentences.push_back("Taken together, the tool was " +
-                        figure_words(figures.combined_until_end, "um") +
-                        " apart at the two moments that are farthest from each other.");
+    sentences.push_back("The largest distance between two places of the tool, over all axes, was " +
+                        figure_words(figures.combined_until_end, "um") + ".");
   html += html_list(sentences);
   html += html_figure(TestPicture(data, figures).svg(),
                       figures.phases.runs
@@ -211,10 +210,8 @@ std::string one_test(const TestData& data, const TestFigures& figures, const std
     has_room = has_room || temperature.is_room;
   html += temperatures_table(figures);
   if (!has_room)
-    html += html_paragraph(
-        "No column was named as the temperature of the room, which belongs "
-        "into such a record.",
-        "small");
+    html += html_paragraph("The record should have a column for the room temperature (--room).",
+                           "small");
   return html;
 }
 
@@ -224,8 +221,8 @@ std::string ratios_part(const TestAnswer& answer) {
   const bool runs = answer.before.phases.runs;
   std::vector<std::vector<std::string>> rows{
       {runs ? "range until the end of running" : "range of the whole test", "before", "after",
-       "after as a share of before"}};
-  if (runs) rows.front().push_back("the same of the first 60 min");
+       "after / before"}};
+  if (runs) rows.front().push_back("likewise for the first 60 min");
   const auto share = [](const Figure& ratio) {
     return ratio.is_there() ? cell_of(percent_words(ratio)) : std::string("-");
   };
@@ -241,18 +238,18 @@ std::string ratios_part(const TestAnswer& answer) {
 
 std::string method_part(const TestAnswer& answer) {
   std::vector<std::string> lines{
-      "A range is the largest less the smallest displacement in its stretch of time, from the last "
-      "value before anything ran. It is a figure after ISO 230-3: of the environment's test the "
-      "range of the whole record, of spindle and axis the ranges over the first hour and until the "
-      "end. Cooling, the combined drift, the hour with most and whether it settled are added here. "
-      "The text of the standard decides where this page and it differ.",
-      "Settled: the range of the last hour of running is under 15 % of that of the first.",
-      "In brackets stands what the figure would be in 99 of 100 cases without the noise of the "
-      "probe. The noise is known from second differences of neighbouring values and from what "
-      "smoothing leaves; it was drawn 1000 times, in blocks as long as the window. Noise makes a "
-      "range larger, never smaller, so the lower bound lies further away. Errors of the probe that "
-      "last longer than minutes (its own warming, its holder) are in no bracket.",
-      "Of ratios the errors of both sides count as independent."};
+      "A range is the largest minus the smallest displacement in a period, starting with the last "
+      "value before anything ran. Figures after ISO 230-3 are the range of the whole record in a "
+      "test of the environment, and the ranges over the first hour and until the end in tests of "
+      "spindle and axis. Cooling, combined drift, largest hour and settling are additions. If this "
+      "page and the standard differ, the standard applies.",
+      "Settled: the range of the last hour of running is below 15 % of that of the first.",
+      "Brackets contain the 99 % interval of the figure without the noise of the probe. The noise "
+      "is estimated from second differences of neighbouring values and from the residuals of "
+      "smoothing; it was drawn 1000 times, in blocks as long as the window. Noise only increases a "
+      "range, so the lower bound is further away. The interval does not include errors of the "
+      "probe that last longer than minutes (its own warming, its holder).",
+      "The interval of a ratio assumes independent errors of both ranges."};
   for (const TestFigures* figures :
        {&answer.before_figures, answer.after_figures ? &*answer.after_figures : nullptr}) {
     if (figures == nullptr) continue;
@@ -261,7 +258,7 @@ std::string method_part(const TestAnswer& answer) {
       const AxisFigures& axis = figures->axes[i];
       text += (i > 0 ? ", " : "") + axis.name + " " + figure_text(axis.noise) + " " +
               unit_words(axis.unit);
-      if (!axis.smoothed) text += " (too few values to smooth; real change may count as noise)";
+      if (!axis.smoothed) text += " (too few values to smooth; may include real changes)";
     }
     lines.push_back(text + ".");
   }
@@ -279,7 +276,7 @@ std::string percent_words(const Figure& ratio) {
   const std::string words = percent(ratio.value) + " %";
   // An interval from a fraction of the value to far above it gives no information.
   const bool is_wide = !(ratio.high <= 1.5);
-  if (is_wide && !(ratio.low > 0.2 * ratio.value)) return words + " (noise alone may have made it)";
+  if (is_wide && !(ratio.low > 0.2 * ratio.value)) return words + " (may be noise alone)";
   if (std::isfinite(ratio.high))
     return words + " (" + percent(ratio.low) + " to " + percent(ratio.high) + ")";
   return words + " (at least " + percent(ratio.low) + ")";
@@ -306,10 +303,10 @@ std::string axis_sentence(const AxisFigures& axis, const TestPhases& phases) {
   text += figure_words(axis.until_end, axis.unit) + " until the end of " +
           duration_words(phases.running_to_s - phases.running_from_s) + " of running";
   if (!axis.last_by_first.is_there())
-    return text + "; under two hours do not tell whether it had settled.";
+    return text + "; settling needs two hours of running to be judged.";
   const std::string share =
       "the last hour moved it by " + percent_words(axis.last_by_first) + " of the first";
-  if (!axis.settled) return text + "; whether it had settled cannot be told: " + share + ".";
+  if (!axis.settled) return text + "; settling is undecided: " + share + ".";
   return text + (*axis.settled ? "; it had settled: " : "; it had not settled: ") + share + ".";
 }
 

@@ -61,7 +61,7 @@ TestAxis axis_of(const RunFile& run, const AxisBinding& binding, const TestOptio
     axis.noise = -1.0;
   }
   if (axis.measured.value.size() < 2)
-    refuse(run, binding.column, "(missing)", "has fewer than two values in the rows selected");
+    refuse(run, binding.column, "(missing)", "has fewer than two values in the selected rows");
   return axis;
 }
 
@@ -90,7 +90,7 @@ std::optional<std::string> column_of_unit(const RunFile& run, std::string_view s
     if (unit_of(column).suffix != suffix) continue;
     if (!found.empty())
       refuse(run, "--running", std::string(found).append(" or ").append(column),
-             "both may say when it ran: say which, --running " + found);
+             "both could define when it ran: choose one, --running " + found);
     found = column;
   }
   if (found.empty()) return std::nullopt;
@@ -132,10 +132,10 @@ void phases_from_times(const RunFile& run, const std::string& running, TestPhase
   if (!(phases.from_s <= phases.running_from_s && phases.running_from_s < phases.running_to_s &&
         phases.running_to_s <= phases.to_s))
     refuse(run, "--running", running,
-           "must lie in the record, which is " + std::to_string(phases.from_s) + ":" +
+           "must be within the record, which is " + std::to_string(phases.from_s) + ":" +
                std::to_string(phases.to_s));
   phases.description = "It ran from " + hours_text(phases.running_from_s) + " to " +
-                       hours_text(phases.running_to_s) + ", as --running says";
+                       hours_text(phases.running_to_s) + " (--running)";
 }
 
 void phases_from_column(const RunFile& run, const std::string& column, TestPhases& phases) {
@@ -144,15 +144,16 @@ void phases_from_column(const RunFile& run, const std::string& column, TestPhase
   std::size_t first = run.selected_begin;
   while (first < run.selected_end && !active[first]) ++first;
   if (first == run.selected_end)
-    refuse(run, column, "(0)", "never runs in the rows selected: name another, --running COLUMN");
+    refuse(run, column, "(0)",
+           "is always 0 in the selected rows: choose another, --running COLUMN");
   std::size_t last = run.selected_end - 1;
   while (!active[last]) --last;
   phases.running_from_s = time_s[first > run.selected_begin ? first - 1 : first];
   phases.running_to_s = time_s[last];
   if (!(phases.running_to_s > phases.running_from_s))
-    refuse(run, column, "(one row)", "says that it ran for one row alone");
+    refuse(run, column, "(one row)", "is nonzero in one row only");
   phases.description = "It ran from " + hours_text(phases.running_from_s) + " to " +
-                       hours_text(phases.running_to_s) + ", as " + column + " says";
+                       hours_text(phases.running_to_s) + " (" + column + ")";
 }
 
 /// Column that shows when it ran; empty: given by times.
@@ -168,7 +169,7 @@ std::string running_column(const RunFile& run, const TestOptions& options) {
   if (!column)
     refuse(run, "--running", "(missing)",
            std::string("no column in ") + (spindle ? "rpm" : "mm/min or mm") +
-               " says when it ran: say it, --running COLUMN or --running T0:T1 in seconds");
+               " shows when it ran: give --running COLUMN or --running T0:T1 in seconds");
   return *column;
 }
 
@@ -239,7 +240,7 @@ TestData test_data(const RunFile& given, const TestOptions& options) {
   data.temperatures = temperatures_of(run, options.room);
   if (options.kind == TestKind::environment) {
     if (!options.running.empty())
-      refuse(run, "--running", options.running, "nothing runs in the test of the environment");
+      refuse(run, "--running", options.running, "must be omitted in a test of the environment");
     if (const auto speed = run.find("spindle_rpm")) read_speed(run, "spindle_rpm", data);
     return data;
   }

@@ -42,21 +42,21 @@ void add_notes(TestAnswer& answer) {
   if (std::abs(before_s - after_s) > same_length_share * std::max(before_s, after_s))
     answer.notes.emplace_back(
         answer.kind == TestKind::environment
-            ? "The two records are not of the same length; ranges grow with it, so the ratio "
-              "says little."
+            ? "The two records differ in length; ranges grow with length, so the ratio is not "
+              "reliable."
             : "The two tests did not run for the same time; both were compared until the shorter "
               "one ended.");
   const double speed_before = mean_speed(answer.before);
   const double speed_after = mean_speed(*answer.after);
   if (std::abs(speed_before - speed_after) > same_length_share * speed_before)
     answer.notes.emplace_back(
-        "The mean speeds of the two tests differ by more than 5 %: what they show is not the same "
-        "load.");
+        "The mean speeds of the two tests differ by more than 5 %, so their loads are not "
+        "comparable.");
   const double room_before = room_range_K(answer.before_figures);
   const double room_after = room_range_K(*answer.after_figures);
   if (std::abs(room_before - room_after) > room_difference_K)
     answer.notes.emplace_back(
-        "The room changed by more than 1 K more in one test than in the other.");
+        "The room temperature changed by over 1 K more in one test than in the other.");
 }
 
 }  // namespace

@@ -62,34 +62,33 @@ std::vector<std::string> what_to_do(const SheetOptions& options) {
   std::vector<std::string> lines;
   if (options.kind == TestKind::axis) {
     char first[200];
-    std::snprintf(
-        first, sizeof first,
-        "Axis %c moves between two ends of its travel, with probes at either (positions 1 "
-        "and 2) and a test sphere or a block in the spindle. Spindle at rest.",
-        options.moving - 'a' + 'A');
+    std::snprintf(first, sizeof first,
+                  "Axis %c moves between both ends of its travel, with probes at each (positions 1 "
+                  "and 2) and a test sphere or block in the spindle. The spindle is at rest.",
+                  options.moving - 'a' + 'A');
     lines.emplace_back(first);
     lines.emplace_back(
-        "Between two readings the axis goes to and fro between them at the feed of "
+        "Between two readings the axis moves back and forth between them at the feed of "
         "its row; at a reading it stops at 1, then at 2.");
   } else {
     lines.emplace_back(
-        "A test bar in the spindle, five probes on the table: X1 and Y1 at its free "
+        "Put a test bar into the spindle and five probes on the table: X1 and Y1 at its free "
         "end, X2 and Y2 nearer to the spindle, Z on its face. Note the distance "
         "between the pairs.");
     lines.emplace_back(options.kind == TestKind::spindle
-                           ? "The speed of a row holds from its time on. Stop for a reading only "
-                             "where the probes cannot read a turning bar."
-                           : "Drives on, spindle and axes at rest, doors as they are in use.");
+                           ? "The speed of a row applies from its time on. Stop for a reading only "
+                             "if the probes cannot read a rotating bar."
+                           : "Drives are on, spindle and axes at rest, doors as in normal use.");
   }
   lines.emplace_back(
-      "Machine switched on, at rest and even before the first row; same place of "
-      "all axes each time.");
+      "Before the first row the machine is on, at rest and at a uniform temperature; every "
+      "reading is taken at the same place of all axes.");
   lines.emplace_back(
-      "Before and after: once with the compensation switched off (thermocomp "
-      "disable), once with it on, each from the cold, at the same speeds.");
+      "Run the test once with the compensation off (thermocomp disable) and once with it "
+      "on, each from the cold, at the same speeds.");
   lines.emplace_back(
-      "Record room, spindle and bed; further temperatures are further columns "
-      "ending with _degC. What is not measured stays empty.");
+      "Record room, spindle and bed; add a column ending with _degC for each further "
+      "temperature. Leave missing values empty.");
   return lines;
 }
 
@@ -109,7 +108,7 @@ std::string step_words(const SheetStep& step, const SheetOptions& options) {
 std::vector<double> minutes_of(const SheetOptions& options, const std::vector<SheetStep>& steps) {
   const double end_min = steps.back().to_min;
   if (!(options.every_min > 0.0) || end_min / options.every_min > rows_max)
-    refuse("--every-min", short_number(options.every_min), "makes more than 2000 rows");
+    refuse("--every-min", short_number(options.every_min), "must give at most 2000 rows");
   std::vector<double> minutes;
   for (double minute = 0.0; minute <= end_min + 1e-9; minute += options.every_min)
     minutes.push_back(minute);
@@ -165,8 +164,8 @@ std::string sheet_html(const SheetOptions& options) {
   const std::vector<SheetStep> steps = sheet_steps(options);
   std::string html = html_begin("Test of thermal behaviour: " + to_string(options.kind));
   html += html_paragraph(
-      "A plan after ISO 230-3. The standard decides where it and this sheet "
-      "differ; speeds and times may be what buyer and maker agree on.");
+      "A plan after ISO 230-3; if both differ, the standard applies. Buyer and "
+      "maker may agree on speeds and times.");
   html += html_table(
       {{"machine", "number", "date", "by", "compensation on or off"}, {"\u00a0", "", "", "", ""}});
   html += html_heading("What to do") + html_list(what_to_do(options));
@@ -174,7 +173,7 @@ std::string sheet_html(const SheetOptions& options) {
   for (const SheetStep& step : steps)
     plan.push_back(
         {short_number(step.from_min), short_number(step.to_min), step_words(step, options)});
-  html += html_heading("What runs when") + html_table(plan);
+  html += html_heading("Schedule") + html_table(plan);
   std::vector<std::vector<std::string>> rows{columns_of(options)};
   const bool has_speed = options.kind != TestKind::environment;
   for (const double minute : minutes_of(options, steps)) {
@@ -184,8 +183,9 @@ std::string sheet_html(const SheetOptions& options) {
     rows.push_back(cells);
   }
   html += html_heading("Readings") + html_table(rows);
-  html += html_paragraph("Typed into a file with these columns: " + options_of_report(options),
-                         "small");
+  html += html_paragraph(
+      "Enter the readings into a file with these columns, then: " + options_of_report(options),
+      "small");
   return html + html_end();
 }
 

@@ -29,7 +29,7 @@ constexpr const char* part = "part";
 CLI::Option* add_kind(CLI::App& sub, std::string& kind) {
   return sub
       .add_option("--test", kind,
-                  "what warms the machine: environment (only its surroundings), spindle, axis; or "
+                  "heat source: environment (only its surroundings), spindle, axis; or "
                   "part: features of a test part, cold and warm")
       ->check(CLI::IsMember({"environment", "spindle", "axis", part}))
       ->type_name("TEST")
@@ -66,8 +66,7 @@ int run_part_report(const ReportOptions& options) {
 
 int run_report(ReportOptions options) {
   if (options.kind == part) return run_part_report(options);
-  if (options.tolerance_um)
-    throw cli::Failure("--tolerance-um: only with --test part, whose features it is of");
+  if (options.tolerance_um) throw cli::Failure("--tolerance-um: only with --test part");
   options.test.kind = kinds.at(options.kind);
   cli::RunLoader loader(options.columns);
   TestData before = test_data(cli::load_record(options.before, loader), options.test);
@@ -98,7 +97,7 @@ struct PlanOptions {
 int run_plan(PlanOptions options) {
   const bool page = options.output.ends_with(".html");
   if (!page && !options.output.ends_with(".csv") && options.output != "-")
-    throw cli::Failure(options.output + ": must end with .csv or .html, which says what is made");
+    throw cli::Failure(options.output + ": must end with .csv or .html");
   if (options.kind == part) {
     if (options.hours > 0.0) options.part.hours = options.hours;
     cli::write_file(options.output, part_sheet(options.part, page));
@@ -118,41 +117,41 @@ int run_plan(PlanOptions options) {
 void add_report(CLI::App& group, std::function<int()>& action) {
   const auto options = std::make_shared<ReportOptions>();
   CLI::App* sub = group.add_subcommand(
-      "report", "the figures of one test, or of one before and one after, as a page");
+      "report", "a page with the figures of one test, or of two before and after");
   sub->add_option("BEFORE", options->before,
-                  "RUN.csv[@T0:T1], or a history with probed values, [@T0:T1] too")
+                  "RUN.csv[@T0:T1], or a history[@T0:T1] with probed values")
       ->type_name("FILE")
       ->required();
-  sub->add_option("AFTER", options->after, "the same test of the compensated machine")
-      ->type_name("FILE");
+  sub->add_option("AFTER", options->after, "the same test with compensation")->type_name("FILE");
   add_kind(*sub, options->kind);
   sub->add_option("--axis", options->test.axes,
-                  "which column an axis is: z=ch5_um; a tilt from two probes and their distance: "
-                  "a=ch3_um-ch4_um/150mm; left out: columns called x_um ... c_urad, x1_um, x2_um")
+                  "column of an axis: z=ch5_um; tilt from two probes and their distance: "
+                  "a=ch3_um-ch4_um/150mm; default: columns named x_um ... c_urad, x1_um, x2_um")
       ->type_name("AXIS=COLUMN");
   sub->add_option("--distance-mm", options->test.distance_mm,
-                  "between the probes x1 and x2, y1 and y2: gives the tilts B and A")
+                  "distance between the probes x1 and x2, y1 and y2, for the tilts B and A")
       ->check(CLI::PositiveNumber)
       ->type_name("MM");
   sub->add_option("--running", options->test.running,
-                  "column that is not 0 while it runs, or T0:T1 in seconds; left out: the column "
+                  "column that is not 0 while it runs, or T0:T1 in seconds; default: the column "
                   "in rpm (spindle), in mm/min or mm (axis)")
       ->type_name("COLUMN");
   sub->add_option("--room", options->test.room, "column of the room's temperature")
       ->type_name("COLUMN");
-  sub->add_option("--noise-um", options->test.noise_um,
-                  "standard deviation of one value of the probe; left out: from the values")
+  sub->add_option(
+         "--noise-um", options->test.noise_um,
+         "standard deviation of one value of the probe; default: estimated from the values")
       ->check(CLI::NonNegativeNumber)
       ->type_name("UM");
   sub->add_option("--tolerance-um", options->tolerance_um,
-                  "with --test part: how far heat may shift a feature; a verdict is given")
+                  "with --test part: allowed shift of a feature, for a verdict")
       ->check(CLI::PositiveNumber)
       ->type_name("UM");
   sub->add_option("--columns", options->columns, cli::columns_help)->type_name("FILE");
-  sub->add_option("-o,--output", options->output, "page (HTML); - is standard output")
+  sub->add_option("-o,--output", options->output, "page to write (HTML); - is standard output")
       ->type_name("FILE")
       ->required();
-  sub->add_option("--json", options->json, "the figures as JSON; - is standard output")
+  sub->add_option("--json", options->json, "file for the figures as JSON; - is standard output")
       ->type_name("FILE");
   sub->callback([options, &action] { action = [options] { return run_report(*options); }; });
 }
@@ -160,23 +159,25 @@ void add_report(CLI::App& group, std::function<int()>& action) {
 void add_plan(CLI::App& group, std::function<int()>& action) {
   const auto options = std::make_shared<PlanOptions>();
   CLI::App* sub = group.add_subcommand(
-      "plan", "a sheet of a test: what to do, and a row for each reading, to be filled in");
+      "plan", "a test sheet: instructions, and a row to fill in for each reading");
   add_kind(*sub, options->kind);
   sub->add_option("--hours", options->hours,
-                  "of running, default 4 (part: 2); of the whole environment's test, default 24")
+                  "duration of running, default 4 (part: 2); environment: of the test, default 24")
       ->check(CLI::PositiveNumber)
       ->type_name("H");
-  sub->add_option("--cooling-hours", options->sheet.cooling_h, "recorded after running, default 2")
+  sub->add_option("--cooling-hours", options->sheet.cooling_h,
+                  "duration of the record after running, default 2")
       ->check(CLI::NonNegativeNumber)
       ->type_name("H");
   sub->add_option("--every-min", options->sheet.every_min,
                   "minutes between two readings, default 5 (environment: 15)")
       ->check(CLI::PositiveNumber)
       ->type_name("MIN");
-  sub->add_option("--features", options->part.features, "of the part, default 6")
+  sub->add_option("--features", options->part.features, "number of features of the part, default 6")
       ->check(CLI::Range(1, 100))
       ->type_name("N");
-  sub->add_option("--repeats", options->part.repeats, "of cold and warm with the part, default 3")
+  sub->add_option("--repeats", options->part.repeats,
+                  "number of cold and warm repeats with the part, default 3")
       ->check(CLI::Range(2, 100))
       ->type_name("N");
   sub->add_option("--rpm-max", options->sheet.rpm_max, "largest speed of the spindle")
@@ -186,14 +187,14 @@ void add_plan(CLI::App& group, std::function<int()>& action) {
                   "constant (75 % of the largest) or steps (half an hour each)")
       ->check(CLI::IsMember({"constant", "steps"}))
       ->type_name("HOW");
-  sub->add_option("--feed", options->sheet.feed_mm_per_min, "at which the axis moves")
+  sub->add_option("--feed", options->sheet.feed_mm_per_min, "feed at which the axis moves")
       ->check(CLI::PositiveNumber)
       ->type_name("MM_PER_MIN");
   sub->add_option("--moving", options->moving, "the axis that moves, default x")
       ->check(CLI::IsMember({"x", "y", "z"}))
       ->type_name("AXIS");
   sub->add_option("-o,--output", options->output,
-                  "SHEET.csv to type into, or SHEET.html for paper; - is standard output (CSV)")
+                  "SHEET.csv to fill in, or SHEET.html to print; - is standard output (CSV)")
       ->type_name("FILE")
       ->required();
   sub->callback([options, &action] { action = [options] { return run_plan(*options); }; });
@@ -203,7 +204,7 @@ void add_plan(CLI::App& group, std::function<int()>& action) {
 
 void add_thermal_test_command(CLI::App& app, std::function<int()>& action) {
   CLI::App* group = app.add_subcommand(
-      "thermal-test", "tests of thermal behaviour after ISO 230-3: a plan, and what one showed");
+      "thermal-test", "tests of thermal behaviour after ISO 230-3: plan and report");
   group->require_subcommand(1);
   add_report(*group, action);
   add_plan(*group, action);

@@ -6,7 +6,7 @@ code. docs/robustness.md lists the attacks and the required behaviour.
     attack.py --list
 
 Prints the seed, one line per finished try, and a table of the attacks. Exit status: 0 nothing was
-broken, 1 something was, 2 bad use.
+broken, 1 something was, 2 usage error.
 """
 
 import argparse

@@ -1,6 +1,6 @@
 #!/bin/bash
 # expect_stopped.sh MESSAGE PROGRAM ARGUMENT...: passes if the program ends with a status other than 0 and 2
-# (bad use) and prints MESSAGE, an extended regular expression.
+# (usage error) and prints MESSAGE, an extended regular expression.
 set -uo pipefail
 # Keep the report on stderr, out of the tests' report files.
 unset ASAN_OPTIONS UBSAN_OPTIONS LSAN_OPTIONS TSAN_OPTIONS

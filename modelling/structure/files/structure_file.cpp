@@ -47,7 +47,7 @@ class Reader {
     const auto values = table.numbers("stiffness_N_per_um", Range::between(0.0, 1e9));
     if (values.size() != 3) {
       if (table.has("stiffness_N_per_um")) {
-        table.problem("stiffness_N_per_um", "must be three numbers: along x, y, z");
+        table.problem("stiffness_N_per_um", "must be three numbers: along x, y and z");
       }
       return {};
     }
@@ -69,7 +69,8 @@ class Reader {
     const double size = length(direction);
     if (size > 0.0) return (1.0 / size) * direction;
     if (table.has(key)) {
-      table.problem(key, "must be \"x\", \"y\", \"z\" (with - for the other way) or a vector");
+      table.problem(key,
+                    "must be \"x\", \"y\", \"z\" (with - for the opposite direction) or a vector");
     }
     return {1, 0, 0};
   }
@@ -145,7 +146,7 @@ class Reader {
     const Range size_range = Range::above(0, far_mm);
     std::vector<double> size_mm{1.0, 1.0, 1.0};
     if (table.has("size_mm")) size_mm = table.numbers("size_mm", size_range);
-    if (size_mm.size() != 3) table.problem("size_mm", "must be three numbers: along x, y, z");
+    if (size_mm.size() != 3) table.problem("size_mm", "must be three numbers: along x, y and z");
     if (!table.has("size_mm")) static_cast<void>(table.numbers("size_mm", size_range));
     size_mm.resize(3, 1.0);
     for (std::size_t d = 0; d < 3; ++d) part.size_m[d] = size_mm[d] * mm;
@@ -218,7 +219,7 @@ class Reader {
     add_block_name(table, "name", block.name);
     block.rest = table.flag("rest", false);
     if (block.rest) {
-      table.refuse("on", "a block of the rest takes what the others leave");
+      table.refuse("on", "a block with rest = true has all nodes that no other block has");
       block.on.origin = origin_of(table, "rest", "true");
     } else {
       block.on = read_region(table, "on", spec_.parts);
@@ -242,7 +243,8 @@ class Reader {
     const std::vector<std::string> names = table.texts("names");
     if (table.has("names") && names.size() != count) {
       table.problem("names", std::to_string(names.size()) + " names",
-                    "must be " + std::to_string(count) + ": one a block, along x first, then y, z");
+                    "must be " + std::to_string(count) +
+                        ": one per block, in the order of x, then y, then z");
       return;
     }
     for (std::size_t i = 0; i < names.size(); ++i) {

@@ -241,7 +241,7 @@ class InpReader {
     if (fields.size() < 4) fail("a node must be: number, x, y, z");
     const Index number = index(fields[0]);
     if (!node_of_.try_emplace(number, static_cast<Index>(mesh_.nodes.size())).second) {
-      fail("node " + fields[0] + " is there twice");
+      fail("node " + fields[0] + " is defined twice");
     }
     mesh_.nodes.push_back({coordinate(fields[1]), coordinate(fields[2]), coordinate(fields[3])});
     if (!set_.empty()) node_sets_[set_].push_back(number);
@@ -270,7 +270,7 @@ class InpReader {
       volume.nodes.push_back(found->second);
     }
     if (!volume_of_.try_emplace(pending_[0], static_cast<Index>(mesh_.volumes.size())).second) {
-      fail("element " + std::to_string(pending_[0]) + " is there twice");
+      fail("element " + std::to_string(pending_[0]) + " is defined twice");
     }
     if (!set_.empty()) element_sets_[set_].push_back(pending_[0]);
     mesh_.volumes.push_back(std::move(volume));

@@ -27,7 +27,7 @@ const void* loaded_from(const fs::path& folder, const Module& module) {
     const char* reason = ::dlerror();
     std::string why = "cannot be loaded from ";
     why.append(folder.string()).append(": ");
-    fail(module, why.append(reason != nullptr ? reason : "it holds nothing"));
+    fail(module, why.append(reason != nullptr ? reason : "it has no functions"));
   }
   return functions;
 }

@@ -32,7 +32,7 @@ void leave_processors_to_others() {
         "the model is too large to be factorised on this computer; use a coarser mesh");
   }
   if (status == CHOLMOD_NOT_POSDEF) {
-    throw FactorisationError("the matrix is singular: something is not held, or hardly");
+    throw FactorisationError("the matrix is singular: a part is not held, or too weakly");
   }
   throw FactorisationError("CHOLMOD failed with status " + std::to_string(status));
 }

@@ -248,7 +248,7 @@ std::vector<std::string> free_motions(const Mesh& mesh, const Reduction& reducti
     const auto body = static_cast<Index>(strongest / rigid_motions);
     const auto which = static_cast<std::size_t>(strongest % rigid_motions);
     std::string line = "part " + part_of_body(mesh, motions, body);
-    lines.push_back(line.append(" is not held against ").append(names[which]));
+    lines.push_back(line.append(" is not restrained against ").append(names[which]));
   }
   std::sort(lines.begin(), lines.end());
   lines.erase(std::unique(lines.begin(), lines.end()), lines.end());

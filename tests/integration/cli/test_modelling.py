@@ -35,7 +35,7 @@ def test_where_a_command_is_missing_those_that_there_are_are_named():
 def test_help_tells_the_exit_statuses_of_this_command():
     for command in (["thermal-test", "plan"], ["thermal-test", "report"], ["plan"], ["fit"]):
         said = run(*command, "--help").stdout
-        assert "Exit status: 0 success, 2 bad use or bad input.\n" in said, (command, said)
+        assert "Exit status: 0 success, 2 usage error or bad input.\n" in said, (command, said)
     assert "Exit status: 0 nothing found, 1 something, 2" in run("inspect", "--help").stdout
 
 
@@ -71,7 +71,7 @@ def test_plan_writes_a_sheet_and_a_run_file_for_each_test(tmp_path):
     files = sorted(path.name for path in (tmp_path / "tests").iterdir())
     assert files == ["plan.csv", "sheet.md"] + [f"test_{i:02}.csv" for i in range(1, 10)]
     again = run("plan", EXAMPLES / "factors.toml", "--out", tmp_path / "tests")
-    assert again.returncode == 2 and "nothing is written" in again.stderr
+    assert again.returncode == 2 and "nothing was written" in again.stderr
 
 
 def test_plan_apart_proposes_to_move_one_of_two_places_that_moved_alike(tmp_path):
@@ -101,7 +101,7 @@ def test_the_place_of_the_room_stays_out_of_the_choice_by_itself(tmp_path):
     few = ("fit", *files, "--outputs", "z_um", "--terms", "1..2", "-o", tmp_path / "model.toml", "--json")
     answer = run(*few)
     assert answer.returncode == 0, answer.stderr
-    assert "room_degC: not chosen from, called like a room" in answer.stderr
+    assert "room_degC: excluded, its name is that of a room" in answer.stderr
     assert "room_degC" not in json.loads(answer.stdout)["inputs"]
     assert "room_degC" in json.loads(run(*few, "--free").stdout)["inputs"]
 

@@ -106,7 +106,7 @@ def test_beside_its_own_past_a_machine_departs_where_sisters_would_not(series, t
 def test_what_cannot_be_used_is_refused_with_file_and_rule(series, tmp_path):
     one = write_run(tmp_path / "one.csv", 1, 5.0)
     lone = run("series", one, "-o", tmp_path / "s.toml")
-    assert lone.returncode == 2 and "one machine only" in lone.stderr
+    assert lone.returncode == 2 and "one machine does not show" in lone.stderr
     assert not (tmp_path / "s.toml").exists()
     fit = ("fit", one, "--prior", series, "-o", tmp_path / "m.toml", "--outputs")
     one.write_text(one.read_text().replace("z_um", "y_um"))

@@ -94,7 +94,7 @@ TEST_CASE("no test contains a forbidden combination, and all other pairs occur",
 
 TEST_CASE("constraints that allow no test are refused", "[plan]") {
   const Constraints nothing({2, 2}, {{{0, 0}}, {{0, 1}}});
-  CHECK_THROWS_WITH(all_pairs(nothing, 1), Catch::Contains("no test is allowed"));
+  CHECK_THROWS_WITH(all_pairs(nothing, 1), Catch::Contains("exclude every test"));
 }
 
 TEST_CASE("four factors of three levels give L9, with a fifth an array or all pairs", "[plan]") {
@@ -162,7 +162,7 @@ TEST_CASE("as a factor, cutting is stated for each test", "[plan]") {
     CHECK((of_test.find("Simulated cutting") != std::string::npos) != cuts);
   }
   CHECK_THROWS_WITH(parse_factors(text + "[test]\ncutting = \"actual\"\n", "f"),
-                    Catch::Contains("must be left out where a factor is called cutting"));
+                    Catch::Contains("must be omitted if a factor is named cutting"));
   const std::string dry =
       std::string(two_factors)
           .append("[[factor]]\nname = \"cutting\"\nlevels = [\"actual\", \"dry\"]\n");
@@ -192,7 +192,7 @@ pause_min = 30
     FAIL("accepted");
   } catch (const ConfigurationError& error) {
     const std::string all = error.what();
-    for (const char* part : {"L4, L8", "unknown", "is there twice", "is used twice", "2 to 30",
+    for (const char* part : {"L4, L8", "unknown", "occurs twice", "is used twice", "2 to 30",
                              "name of a factor", "end within the test"})
       CHECK_THAT(all, Catch::Contains(part));
   }

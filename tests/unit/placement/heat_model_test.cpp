@@ -156,7 +156,7 @@ TEST_CASE("problems of heat and load cases are named", "[placement][bad_input]")
       {replaced("step_s = 120", "step_s = 7200"), "1 to 100000 steps"},
       {replaced("heat_W = 40", "heat_W = inf"), "finite"},
       {replaced("x_mm = [0, 0], z_mm = [200, 400]", "x_mm = [1, 2]"),
-       "no face of the mesh's surface is there"},
+       "the region contains no face of the mesh's surface"},
       {replaced("signal = \"heater_on\"", "signal = \"heater_degC\""), "operating signal"},
       {good + "[[convection]]\non = { group = \"skin\" }\ncoefficient_W_per_m2_K = 1\n",
        "there is no group \"skin\""},

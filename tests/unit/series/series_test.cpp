@@ -115,7 +115,7 @@ TEST_CASE("machines that do not fit together are refused by name", "[series]") {
   const RunFile run = run_of(9, 5.0, -2.0);
   SECTION("one machine only") {
     machines.resize(1);
-    CHECK_THROWS_WITH(series_of(machines, std::nullopt), Contains("one machine only"));
+    CHECK_THROWS_WITH(series_of(machines, std::nullopt), Contains("one machine does not show"));
     CHECK_NOTHROW(series_of(machines, 0.15));
   }
   SECTION("another output") {
@@ -209,7 +209,7 @@ TEST_CASE("the more last year's model may have drifted, the more the rows overri
   ThermalModel other = last_year;
   other.terms.push_back({"thermal_lag", "a_degC", {{"tau_s", 900.0}}, {}});
   CHECK_THROWS_WITH(series_of_model(other, "old.toml", 0.05, 1.0),
-                    Contains("the term thermal_lag is no column of a bank"));
+                    Contains("the term thermal_lag is not a bank"));
 }
 
 }  // namespace

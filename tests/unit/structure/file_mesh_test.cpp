@@ -183,7 +183,7 @@ TEST_CASE("errors in an .inp file are reported with their line", "[structure][fi
   for (const auto& [text, message] : std::vector<Case>{
            {"*NODE\n1, 0, nan, 0\n", ":2: \"nan\" must be a finite number"},
            {"*NODE\n1, 0, 0\n", ":2: a node must be"},
-           {nodes + "4, 0, 0, 0\n", ":6: node 4 is there twice"},
+           {nodes + "4, 0, 0, 0\n", ":6: node 4 is defined twice"},
            {nodes + "*ELEMENT, TYPE=S4\n", ":6: elements of type \"S4\""},
            {nodes + "*ELEMENT, TYPE=C3D4\n1, 1, 2, 3, 9\n", ":7: element 1: there is no node 9"},
            {nodes + "*ELEMENT, TYPE=C3D4\n1, 1, 2, 3\n", ": element 1 has 3 nodes, not 4"},

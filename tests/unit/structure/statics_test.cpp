@@ -388,7 +388,7 @@ TEST_CASE("an unsupported body is named, with its free motion", "[structure][sta
   }
   slides.finish();
   CHECK(free_motions(mesh, slides, {}) ==
-        std::vector<std::string>{"part table is not held against moving along x"});
+        std::vector<std::string>{"part table is not restrained against moving along x"});
 }
 
 TEST_CASE("hexahedra and tetrahedra agree, better on finer meshes", "[structure][statics]") {

@@ -204,14 +204,14 @@ TEST_CASE("problems of a structure are named with their place", "[structure][bad
   const std::string support = "[[support]]\non = ";
   const std::vector<Case> listed{
       {with(support + "{ group = \"base\" }\n"), "there is no group \"base\" in the mesh"},
-      {with(support + "{ z_mm = [500, 600] }\n"), "no node of the mesh is there"},
+      {with(support + "{ z_mm = [500, 600] }\n"), "the region contains no node of the mesh"},
       {with(support + "{ part = \"colum\" }\n"), "did you mean \"column\"?"},
       {with(support + "{ z_mm = [2, 1] }\n"), "must be a range"},
       {with(support + "{ z_mm = [nan, 1] }\n"), "must be a finite number"},
       {with("[[spring]]\non = { z_mm = [10, 20] }\nstiffness_N_per_um = [1, 1, 1]\n"),
-       "no face of the mesh's surface is there"},
+       "the region contains no face of the mesh's surface"},
       {with("[[block]]\nname = \"t2_degC\"\non = { x_mm = [900, 901] }\n"),
-       "no node of the mesh is there"},
+       "the region contains no node of the mesh"},
       {with("[[block]]\nname = \"t1_degC\"\non = { x_mm = [0, 1] }\n"), "is used twice"},
       {with("[[block]]\nname = \"t2\"\non = { x_mm = [0, 1] }\n"), "must be a temperature"},
       {with("[[block]]\nname = \"t2_degC\"\nrest = true\n"), "has no nodes"},
@@ -225,8 +225,8 @@ TEST_CASE("problems of a structure are named with their place", "[structure][bad
        "or a vector"},
       {with("[[joint]]\nname = \"j\"\nfrom = { part = \"column\", z_mm = [0, 0] }\n"
             "to = { part = \"column\", z_mm = [400, 400] }\n"),
-       "nowhere nearer"},
-      {material + column + all_warm + top, "part column is not held against moving along x"},
+       "further apart than gap_mm everywhere"},
+      {material + column + all_warm + top, "part column is not restrained against moving along x"},
       {material + column + foot + top, "there must be a [[block]] or a [[division]]"},
       {material + column + foot + top + "[[block]]\nname = \"a_degC\"\non = { z_mm = [0, 99] }\n",
        "nodes are in no block"},

@@ -86,7 +86,7 @@ TEST_CASE("an invalid sheet is reported with line, column and rule", "[part]") {
   };
   says(head + cold + "1,hot,P1,,2\n", ":3: state = hot: must be cold or warm");
   says(head + cold + cold,
-       ":3: z_um = 1: the feature has a value of this repeat and state already");
+       ":3: z_um = 1: the feature already has a value for this repeat and state");
   says(head + cold + "1,warm,P1,,two\n", ":3: z_um = two: must be a number");
   says(head + cold + "1,warm,P1,,2\n", "at least twice");
   says(head + cold + "2,warm,P1,,2\n", "no feature has a value both cold and warm in one repeat");
@@ -96,7 +96,7 @@ TEST_CASE("an invalid sheet is reported with line, column and rule", "[part]") {
 
 TEST_CASE("the report reads the plan's sheet", "[part]") {
   std::string text = part_sheet({2, 2, 1.5}, false);
-  CHECK_THAT(text, Contains("own load for 1.50 h") && Contains("finishing cut"));
+  CHECK_THAT(text, Contains("1.50 h of the shop's usual load") && Contains("finishing cut"));
   double value = 0.0;
   for (std::size_t at = text.find(",,,\n"); at != std::string::npos; at = text.find(",,,\n", at))
     text.replace(at, 3, ",,," + std::to_string(value += 1.0));
