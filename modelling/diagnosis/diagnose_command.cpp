@@ -25,8 +25,6 @@
 namespace thermocomp::diagnosis {
 namespace {
 
-constexpr double probability_reported_min = 0.001;
-
 struct Options {
   std::string model;
   std::string thermal;
@@ -103,15 +101,6 @@ void print(const Diagnosis& diagnosis) {
                 figures.extended_test_rms_um, 100 * figures.unexplained_fraction);
 }
 
-void print_weighed(const Diagnosis& diagnosis) {
-  for (const Candidate& each : diagnosis.weighed)
-    if (each.probability >= probability_reported_min)
-      std::printf("weighed: %s of %s%s%s: probability %.3f, ln L %.0f, left-out rows %.0f %%\n",
-                  each.cause.c_str(), each.subject.c_str(), each.run ? " in " : "",
-                  each.run ? each.run->c_str() : "", each.probability, each.score,
-                  100 * each.share_of_remainder);
-}
-
 constexpr const char* searching = "searching what the model gets wrong";
 
 Diagnosis thermal_diagnosis_of(const Options& options, const std::vector<RunFile>& train,
@@ -137,7 +126,7 @@ Diagnosis diagnosis_with_body(const Options& options, const std::vector<RunFile>
   std::string note = "Rise of the temperature since the start of each test run.";
   if (diagnosis.findings.empty()) note += " Nothing was found wrong.";
   for (const NamedFinding& finding : diagnosis.findings)
-    note += " Found: " + title_of(finding) + ".";
+    note += " Found: " + title_of(finding.cause, finding.subject) + ".";
   std::filesystem::create_directories(options.folder);
   cli::write_file((std::filesystem::path(options.folder) / "body.html").string(),
                   body.page(std::filesystem::path(options.thermal).stem().string(), note));
@@ -200,7 +189,6 @@ int run(const Options& options) {
   if (!options.json.empty())
     cli::write_file(options.json, diagnosis_json(diagnosis, options.weighed));
   if (options.json != "-") print(diagnosis);
-  if (options.json != "-" && options.weighed) print_weighed(diagnosis);
   return 0;
 }
 
@@ -227,7 +215,8 @@ void add_diagnose_command(CLI::App& app, std::function<int()>& action) {
   command->add_option("--out", options->folder,
                       "folder for the report and the extended model or corrected machine");
   command->add_option("--json", options->json, "file for the answer as JSON; - is the output");
-  command->add_flag("--weighed", options->weighed, "also tell what came into question");
+  command->add_flag("--weighed", options->weighed,
+                    "the JSON has every hypothesis that was weighed");
   command->callback([options, &action] { action = [options] { return run(*options); }; });
 }
 

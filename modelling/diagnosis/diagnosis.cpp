@@ -71,7 +71,6 @@ std::vector<Candidate> candidates_of(const std::vector<Explanation>& weighed,
     const Hypothesis& of = *each.hypothesis;
     Candidate candidate{of.cause, of.subject, {}, each.probability, share_of_remainder(each)};
     if (of.run) candidate.run = train.runs[*of.run].name;
-    candidate.score = each.score;
     std::vector<std::string> outputs;
     for (std::size_t output = 0; output < each.gains.size(); ++output)
       if (each.gains[output].size() > 0) outputs.push_back(train.model.outputs[output]);
@@ -162,9 +161,8 @@ Diagnosis diagnose(const ThermalModel& model, std::vector<RunFile> train,
       measured_data(model, test, test_names, columns, Purpose::comparison);
   train.clear();
   test.clear();
-  const StackedRows rows = stacked_rows(train_data);
-  const std::vector<Hypothesis> all = hypotheses(train_data, rows);
-  const SearchResult result = search(train_data, rows, all, Rules{}, nullptr, progress);
+  const std::vector<Hypothesis> all = hypotheses(train_data);
+  const SearchResult result = search(train_data, all, progress);
 
   Diagnosis diagnosis;
   diagnosis.verdict = verdict_of(result);

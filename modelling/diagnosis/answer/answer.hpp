@@ -52,7 +52,6 @@ struct Candidate {
   /// Alone in the model, on test rows, which decide nothing; empty where no term carries it.
   std::map<std::string, TestGain> test{};
   std::string would_decide{};  ///< the experiment that tells it from the likeliest other one
-  double score{0.0};           ///< ln L over that of nothing
   /// What the probability comes from (rank/posterior.hpp), by name.
   std::vector<std::pair<const char*, double>> figures{};
 };

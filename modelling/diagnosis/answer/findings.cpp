@@ -150,13 +150,13 @@ struct BlockSquares {
 std::vector<BlockSquares> squares_by_block(const Residuals& before, const Residuals& after) {
   std::vector<BlockSquares> blocks;
   Eigen::Index rows = 0;
-  for (const Column& run : before.by_run) rows += run.size();
+  for (const Column& run : before) rows += run.size();
   const Eigen::Index length = std::max<Eigen::Index>(1, rows / test_blocks);
-  for (std::size_t i = 0; i < before.by_run.size(); ++i) {
-    for (Eigen::Index row = 0; row < before.by_run[i].size(); ++row) {
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    for (Eigen::Index row = 0; row < before[i].size(); ++row) {
       if (row % length == 0) blocks.emplace_back();
-      const double a = before.by_run[i][row];
-      const double b = after.by_run[i][row];
+      const double a = before[i][row];
+      const double b = after[i][row];
       if (!std::isfinite(a) || !std::isfinite(b)) continue;
       blocks.back().before += a * a;
       blocks.back().after += b * b;
@@ -168,7 +168,7 @@ std::vector<BlockSquares> squares_by_block(const Residuals& before, const Residu
 /// The finite values of all runs.
 Column present(const Residuals& residuals) {
   std::vector<double> values;
-  for (const Column& run : residuals.by_run)
+  for (const Column& run : residuals)
     std::copy_if(run.begin(), run.end(), std::back_inserter(values),
                  [](double value) { return std::isfinite(value); });
   return Eigen::Map<const Column>(values.data(), std::ssize(values));
@@ -185,7 +185,7 @@ std::vector<Residuals> residuals(const MeasuredData& data) {
   std::vector<Residuals> all(data.model.outputs.size());
   for (const MeasuredRun& run : data.runs)
     for (std::size_t output = 0; output < all.size(); ++output)
-      all[output].by_run.emplace_back(
+      all[output].emplace_back(
           (run.measured_um[output] - run.model_um[output]).tail(run.rows() - run.begin));
   return all;
 }
@@ -207,7 +207,7 @@ std::vector<Residuals> residuals(const Extended& extended, const MeasuredData& d
           predicted = shifted(run.time_s, predicted, correction.shift_s);
       }
       if (start < run.rows()) predicted.array() -= double(predicted[start]);
-      all[output].by_run.emplace_back((measured - predicted).tail(run.rows() - run.begin));
+      all[output].emplace_back((measured - predicted).tail(run.rows() - run.begin));
     }
   }
   return all;

@@ -38,9 +38,8 @@ struct Extended {
   std::vector<Correction> corrections;
 };
 
-struct Residuals {
-  std::vector<Column> by_run;  ///< over the selected rows; NaN where nothing was measured
-};
+/// Of each run, over its selected rows; NaN where nothing was measured.
+using Residuals = std::vector<Column>;
 
 /// measured - model of every output over the selected rows of every run, both from the run's first
 /// row on: the data's own model, or another.

@@ -34,8 +34,7 @@ bool varies(const MeasuredData& data, std::size_t signal) {
 /// The recorded inputs as a bank wants them, without an output.
 MeasuredTests inputs_of(const MeasuredData& data, Eigen::Index apart) {
   MeasuredTests tests;
-  tests.places = data.model.inputs;
-  tests.places.insert(tests.places.end(), data.others.begin(), data.others.end());
+  tests.places = data.temperatures;
   std::vector<std::size_t> moving;
   for (std::size_t i = 0; i < data.signals.size(); ++i) {
     if (!varies(data, i)) continue;
@@ -49,9 +48,8 @@ MeasuredTests inputs_of(const MeasuredData& data, Eigen::Index apart) {
     test.begin = (run.begin + apart - 1) / apart;
     const Eigen::Index rows = test.time_s.size();
     test.places_K.resize(rows, std::ssize(tests.places));
-    Eigen::Index column = 0;
-    for (const auto* places : {&run.inputs_K, &run.others_K})
-      for (const Column& place : *places) test.places_K.col(column++) = thinned(place, apart);
+    for (Eigen::Index place = 0; place < test.places_K.cols(); ++place)
+      test.places_K.col(place) = thinned(run.temps_K[static_cast<std::size_t>(place)], apart);
     test.signals.resize(rows, std::ssize(moving));
     for (std::size_t i = 0; i < moving.size(); ++i)
       test.signals.col(static_cast<Eigen::Index>(i)) = thinned(run.signals[moving[i]], apart);
@@ -78,7 +76,7 @@ void set_output(MeasuredTests& tests, const MeasuredData& data, const Residuals&
                 Eigen::Index apart) {
   for (std::size_t run = 0; run < tests.runs.size(); ++run) {
     Column whole = Column::Constant(data.runs[run].rows(), not_a_number);
-    whole.tail(left.by_run[run].size()) = left.by_run[run];
+    whole.tail(left[run].size()) = left[run];
     tests.runs[run].outputs_um = thinned(whole, apart);
   }
 }

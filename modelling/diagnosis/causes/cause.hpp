@@ -126,8 +126,6 @@ struct Cause {
 
 /// In the order in which they are tried.
 [[nodiscard]] const std::vector<Cause>& all_causes();
-/// Null: there is none.
-[[nodiscard]] const Cause* find_cause(std::string_view name);
 /// @pre there is one
 [[nodiscard]] const Cause& cause_named(std::string_view name);
 

@@ -1,6 +1,7 @@
 /// What is wrong with a reading.
 #include <algorithm>
 
+#include "config/runs/model_inputs.hpp"
 #include "modelling/diagnosis/causes/cause.hpp"
 #include "modelling/diagnosis/data/measured_runs.hpp"
 
@@ -29,7 +30,7 @@ Hypothesis of_reading_fault(const Material& material, const Subject& subject,
   Hypothesis of{material.name_of(subject),
                 Form::shared_gain,
                 {{fault.onset, material.onsets_s(subject.run, fault.first, last_onset, fault.onsets,
-                                                 run.inputs_K[subject.index])}},
+                                                 run.temps_K[subject.index])}},
                 {fault.gain}};
   of.run = subject.run;
   of.sensor = subject.index;
@@ -165,17 +166,18 @@ double kept(double lost) {
 /// from the onset on. Without a column of the room, its first value stands for it.
 Panel loose_errors_K(const MeasuredData& data, const MeasuredRun& run, std::size_t input,
                      const std::vector<double>& onsets_s) {
-  const Column& reading_degC = run.inputs_degC[input];
-  const Column* const room = room_degC(data, run);
-  Column lost_K = double(reading_degC[0]) - reading_degC.array();
-  if (room != nullptr) lost_K = *room - reading_degC;
-  return lost_K.asDiagonal() * since(run.time_s, onsets_s);
+  const auto temps_degC = [&run](std::size_t place) -> Column {
+    return run.temps_K[place].array() + run.reference_degC[place];
+  };
+  const Column reading_degC = temps_degC(input);
+  const std::optional<std::size_t> room = room_among(data);
+  const Column room_degC = room ? temps_degC(*room) : Column::Constant(run.rows(), reading_degC[0]);
+  return (room_degC - reading_degC).asDiagonal() * since(run.time_s, onsets_s);
 }
 
 std::vector<Hypothesis> sensor_loose_hypotheses(const Material& material, const Subject& subject) {
   if (subject.kind != SubjectKind::input_in_run) return {};
-  const MeasuredData& data = material.data();
-  if (room_among(data.model.inputs) == material.name_of(subject)) return {};
+  if (is_called_like_a_room(material.name_of(subject))) return {};
   Hypothesis loose =
       of_reading_fault(material, subject, {"at_s", "gain", 0.03, 40, loose_errors_K});
   loose.bounds = [](std::size_t) { return Interval{lost_min, lost_max}; };
@@ -218,7 +220,7 @@ Hypothesis exchanged(const Material& material, std::size_t input, std::size_t ot
   Hypothesis swap{data.model.inputs[input] + "|" + data.model.inputs[other], Form::no_gain};
   swap.columns = [&material, &data, input, other](const Shapes&, std::size_t output) {
     return material.stacked([&](const MeasuredRun& run) -> Panel {
-      const Panel more_K = run.denoised_inputs_K[other] - run.denoised_inputs_K[input];
+      const Panel more_K = run.denoised_K[other] - run.denoised_K[input];
       return answer_to_errors(data, run, output, input, more_K) +
              answer_to_errors(data, run, output, other, -more_K);
     });

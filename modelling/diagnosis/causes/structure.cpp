@@ -209,18 +209,18 @@ constexpr double starts_apart_K = 1.0;
 /// Gains are fitted about here, where a run begins.
 constexpr double usual_degC = 20.0;
 
-bool starts_differ(const MeasuredData& data, const std::string& place) {
+bool starts_differ(const MeasuredData& data, std::size_t place) {
   std::vector<double> starts_degC;
-  for (const MeasuredRun& run : data.runs) starts_degC.push_back(data.reference_degC(run, place));
+  for (const MeasuredRun& run : data.runs) starts_degC.push_back(run.reference_degC[place]);
   const auto [least, most] = std::minmax_element(starts_degC.begin(), starts_degC.end());
   return starts_degC.size() >= starts_min && *most - *least >= starts_apart_K;
 }
 
 /// @param now  the place's rise, where that of now counts; empty: that at the start
-Hypothesis by_start(const Material& material, const Subject& subject, const std::string& place,
+Hypothesis by_start(const Material& material, const Subject& subject, std::size_t place,
                     const ColumnOf& now) {
   const bool is_signal = subject.kind == SubjectKind::signal;
-  Hypothesis by{material.name_of(subject) + "|" + place,
+  Hypothesis by{material.name_of(subject) + "|" + material.data().temperatures[place],
                 Form::own_gains,
                 {{std::string(start_tau.name), {0.0}, false, true},
                  {std::string(at_start.name), {1.0}, false, true}},
@@ -237,7 +237,7 @@ Hypothesis by_start(const Material& material, const Subject& subject, const std:
                                                                              std::size_t) {
     return material.stacked([&](const MeasuredRun& run) {
       const Panel late = lagged(run.time_s, values(run), firsts_of(shapes));
-      const double start_degC = material.data().reference_degC(run, place) - usual_degC;
+      const double start_degC = run.reference_degC[place] - usual_degC;
       Panel all(run.rows(), 2 * std::ssize(shapes));
       for (Eigen::Index i = 0; i < std::ssize(shapes); ++i) {
         Column above_K = Column::Constant(run.rows(), start_degC);
@@ -256,15 +256,12 @@ std::vector<Hypothesis> start_dependence_hypotheses(const Material& material,
                                                     const Subject& subject) {
   if (subject.kind != SubjectKind::input && subject.kind != SubjectKind::signal) return {};
   const MeasuredData& data = material.data();
-  const std::string& first =
-      subject.kind == SubjectKind::input ? material.name_of(subject) : data.model.inputs.front();
+  const std::size_t first = subject.kind == SubjectKind::input ? subject.index : 0;
   std::vector<Hypothesis> all;
   if (starts_differ(data, first)) all.push_back(by_start(material, subject, first, {}));
-  const std::optional<Subject> of_room = material.room();
-  if (!of_room) return all;
-  const std::string& room = material.name_of(*of_room);
-  if (room != first && starts_differ(data, room))
-    all.push_back(by_start(material, subject, room, material.values_of(*of_room)));
+  const std::optional<Subject> room = material.room();
+  if (room && room->index != first && starts_differ(data, room->index))
+    all.push_back(by_start(material, subject, room->index, material.values_of(*room)));
   return all;
 }
 
@@ -305,7 +302,7 @@ std::vector<Hypothesis> slow_sensor_hypotheses(const Material& material, const S
       Panel missed_K(run.rows(), std::ssize(shapes));
       for (std::size_t i = 0; i < shapes.size(); ++i)
         missed_K.col(static_cast<Eigen::Index>(i)) =
-            shapes[i][0] * slope(run.time_s, run.inputs_K[input], slope_smoothing * shapes[i][0]);
+            shapes[i][0] * slope(run.time_s, run.temps_K[input], slope_smoothing * shapes[i][0]);
       return answer_to_errors(material.data(), run, output, input, missed_K);
     });
   };
@@ -354,7 +351,7 @@ Cause slow_sensor() {
 std::vector<Hypothesis> play_of_input(const Material& material, const Subject& subject) {
   const double range_K =
       material.range([input = subject.index](const MeasuredRun& run) -> const Column& {
-        return run.inputs_K[input];
+        return run.temps_K[input];
       });
   Hypothesis play{material.name_of(subject),
                   Form::no_gain,
@@ -362,7 +359,7 @@ std::vector<Hypothesis> play_of_input(const Material& material, const Subject& s
   play.columns = [&material, input = subject.index](const Shapes& shapes, std::size_t output) {
     return material.stacked([&](const MeasuredRun& run) {
       return answer_to_errors(material.data(), run, output, input,
-                              played_less_values(run.denoised_inputs_K[input], firsts_of(shapes)));
+                              played_less_values(run.denoised_K[input], firsts_of(shapes)));
     });
   };
   return {std::move(play)};

@@ -99,7 +99,7 @@ Panel answer_to_errors(const MeasuredData& data, const MeasuredRun& run, std::si
   const Column right_um = model_over(part, run, data)[output];
   MeasuredRun wrong = run;
   for (Eigen::Index i = 0; i < errors_K.cols(); ++i) {
-    wrong.inputs_K[input] = run.inputs_K[input] + errors_K.col(i);
+    wrong.temps_K[input] = run.temps_K[input] + errors_K.col(i);
     errors_K.col(i) = model_over(part, wrong, data)[output] - right_um;
   }
   return errors_K;

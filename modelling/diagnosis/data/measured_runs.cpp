@@ -39,10 +39,6 @@ Column taken(const std::vector<double>& values, const std::vector<std::size_t>& 
   return column;
 }
 
-Column rise_of(const Column& temps_degC, double reference_degC) {
-  return temps_degC.array() - reference_degC;
-}
-
 void take_displacements(const RunFile& file, const std::vector<std::size_t>& rows,
                         const MeasuredData& data, MeasuredRun& run) {
   run.model_um = model_over(data.model, run, data);
@@ -75,27 +71,16 @@ MeasuredRun measured_run(const RunFile& file, const std::string& name, const Mea
   if (run.begin == static_cast<Eigen::Index>(rows.size()))
     refuse("selection", "must have a row in which no input of the model is missing");
   run.time_s = taken(file.time_s(), rows);
-  for (std::size_t i = 0; i < data.model.inputs.size(); ++i) {
-    Column temps_degC = taken(*inputs.temperatures[i], rows);
-    run.inputs_K.push_back(rise_of(temps_degC, inputs.reference_degC[i]));
-    run.inputs_reference_degC.push_back(inputs.reference_degC[i]);
-    if (purpose == Purpose::search) run.inputs_degC.push_back(std::move(temps_degC));
-  }
-  for (const std::string& other : data.others) {
-    const std::vector<double>& column = file.column(other);
-    Column temps_degC = taken(column, rows);
-    run.others_reference_degC.push_back(first_value(column).value_or(0.0));
-    run.others_K.push_back(rise_of(temps_degC, run.others_reference_degC.back()));
-    if (purpose == Purpose::search) run.others_degC.push_back(std::move(temps_degC));
+  for (std::size_t i = 0; i < data.temperatures.size(); ++i) {
+    const std::vector<double>& temps_degC = file.column(data.temperatures[i]);
+    run.reference_degC.push_back(i < data.model.inputs.size()
+                                     ? inputs.reference_degC[i]
+                                     : first_value(temps_degC).value_or(0.0));
+    run.temps_K.push_back(taken(temps_degC, rows).array() - run.reference_degC[i]);
+    if (purpose == Purpose::search) run.denoised_K.push_back(denoised(run.time_s, run.temps_K[i]));
   }
   for (const std::string& signal : data.signals)
     run.signals.push_back(taken(file.column(signal), rows));
-  if (purpose == Purpose::search) {
-    for (const Column& rise_K : run.inputs_K)
-      run.denoised_inputs_K.push_back(denoised(run.time_s, rise_K));
-    for (const Column& rise_K : run.others_K)
-      run.denoised_others_K.push_back(denoised(run.time_s, rise_K));
-  }
   take_displacements(file, rows, data, run);
   const bool any = std::any_of(run.measured_um.begin(), run.measured_um.end(),
                                [](const auto& um) { return um.array().isFinite().any(); });
@@ -103,18 +88,15 @@ MeasuredRun measured_run(const RunFile& file, const std::string& name, const Mea
   return run;
 }
 
-/// Null: there is none of this name.
-const Column* find_column(const std::vector<std::string>& names, const std::vector<Column>& columns,
-                          const std::string& name) {
-  const auto at = std::find(names.begin(), names.end(), name);
-  return at == names.end() ? nullptr : &columns[static_cast<std::size_t>(at - names.begin())];
+std::size_t place_among(const std::vector<std::string>& names, const std::string& name) {
+  return static_cast<std::size_t>(std::find(names.begin(), names.end(), name) - names.begin());
 }
 
 }  // namespace
 
 SharedColumns shared_columns(const ThermalModel& model, const std::vector<RunFile>& runs,
                              const std::vector<RunFile>& further) {
-  SharedColumns columns;
+  SharedColumns columns{model.inputs, {}};
   std::vector<std::string> always = model.temperature_columns();
   for (const std::string& name : model.signal_columns()) always.push_back(name);
   for (const std::string& name : runs.front().columns) {
@@ -125,28 +107,31 @@ SharedColumns shared_columns(const ThermalModel& model, const std::vector<RunFil
     const bool everywhere = std::all_of(runs.begin(), runs.end(), has) &&
                             std::all_of(further.begin(), further.end(), has);
     if (!everywhere && !contains(always, name)) continue;
-    (is_temperature(name) ? columns.others : columns.signals).push_back(name);
+    (is_temperature(name) ? columns.temperatures : columns.signals).push_back(name);
   }
   return columns;
 }
 
 std::vector<Column> model_over(const ThermalModel& model, const MeasuredRun& run,
                                const MeasuredData& data) {
+  const auto refuse_missing = [&](std::size_t place, const std::vector<Column>& columns) {
+    if (place >= columns.size())
+      throw ConfigurationError({{run.name, 0, "columns", "(missing)",
+                                 "a run must have every column of the model and its terms"}});
+  };
   std::vector<const Column*> temperatures;
   std::vector<double> reference_degC;
   for (const std::string& name : model.temperature_columns()) {
-    const Column* input = find_column(data.model.inputs, run.inputs_K, name);
-    temperatures.push_back(input != nullptr ? input : find_column(data.others, run.others_K, name));
-    reference_degC.push_back(data.reference_degC(run, name));
+    const std::size_t place = data.place_of(name);
+    refuse_missing(place, run.temps_K);
+    temperatures.push_back(&run.temps_K[place]);
+    reference_degC.push_back(run.reference_degC[place]);
   }
   std::vector<const Column*> signals;
-  for (const std::string& name : model.signal_columns())
-    signals.push_back(find_column(data.signals, run.signals, name));
-  const auto missing = [](const Column* column) { return column == nullptr; };
-  if (std::any_of(temperatures.begin(), temperatures.end(), missing) ||
-      std::any_of(signals.begin(), signals.end(), missing)) {
-    throw ConfigurationError({{run.name, 0, "columns", "(missing)",
-                               "a run must have every column of the model and its terms"}});
+  for (const std::string& name : model.signal_columns()) {
+    const std::size_t place = place_among(data.signals, name);
+    refuse_missing(place, run.signals);
+    signals.push_back(&run.signals[place]);
   }
   DisplacementModel displacement(model);
   // Of the absolute temperatures that the model sees, the rise is all but the reference.
@@ -164,14 +149,17 @@ std::vector<Column> model_over(const ThermalModel& model, const MeasuredRun& run
   return result;
 }
 
-double MeasuredData::reference_degC(const MeasuredRun& run, const std::string& name) const {
-  const auto input = std::find(model.inputs.begin(), model.inputs.end(), name);
-  if (input != model.inputs.end())
-    return run.inputs_reference_degC[static_cast<std::size_t>(input - model.inputs.begin())];
-  const auto other = std::find(others.begin(), others.end(), name);
-  return other == others.end()
-             ? 0.0
-             : run.others_reference_degC[static_cast<std::size_t>(other - others.begin())];
+std::size_t MeasuredData::place_of(const std::string& temperature) const {
+  return place_among(temperatures, temperature);
+}
+
+void MeasuredData::add(MeasuredRun run) {
+  const Eigen::Index begin = rows.time_s.size();
+  const Eigen::Index count = run.rows() - run.begin;
+  rows.runs.push_back({begin, begin + count});
+  rows.time_s.conservativeResize(begin + count);
+  rows.time_s.tail(count) = run.time_s.tail(count);
+  runs.push_back(std::move(run));
 }
 
 Column MeasuredData::coefficient(const MeasuredRun& run, std::size_t output,
@@ -181,45 +169,29 @@ Column MeasuredData::coefficient(const MeasuredRun& run, std::size_t output,
   ThermalModel alone = model;
   alone.terms.clear();
   MeasuredRun unit = run;
-  for (Column& rise_K : unit.inputs_K) rise_K.setZero();
-  unit.inputs_K[input].setOnes();
+  for (Column& rise_K : unit.temps_K) rise_K.setZero();
+  unit.temps_K[input].setOnes();
   return model_over(alone, unit, *this)[output];
 }
 
 MeasuredData measured_data(const ThermalModel& model, const std::vector<RunFile>& runs,
                            const std::vector<std::string>& names, const SharedColumns& columns,
                            Purpose purpose) {
-  MeasuredData data{model, columns.others, columns.signals, {}, {}, coefficient_sd};
-  data.runs.reserve(runs.size());
+  MeasuredData data{model, columns.temperatures, columns.signals, {}, {}, {}, coefficient_sd};
   for (std::size_t i = 0; i < runs.size(); ++i)
-    data.runs.push_back(measured_run(runs[i], names[i], data, purpose));
+    data.add(measured_run(runs[i], names[i], data, purpose));
   return data;
 }
 
-std::string room_among(const std::vector<std::string>& columns) {
-  const auto room = std::find_if(columns.begin(), columns.end(), is_called_like_a_room);
-  return room == columns.end() ? std::string() : *room;
-}
-
-const Column* room_degC(const MeasuredData& data, const MeasuredRun& run) {
-  const Column* const other = find_column(data.others, run.others_degC, room_among(data.others));
-  const std::vector<std::string>& inputs = data.model.inputs;
-  return other != nullptr ? other : find_column(inputs, run.inputs_degC, room_among(inputs));
-}
-
-StackedRows stacked_rows(const MeasuredData& data) {
-  StackedRows rows;
-  Eigen::Index total = 0;
-  for (const MeasuredRun& run : data.runs) {
-    const Eigen::Index count = run.rows() - run.begin;
-    rows.runs.push_back({total, total + count});
-    total += count;
+std::optional<std::size_t> room_among(const MeasuredData& data) {
+  const auto begin = data.temperatures.begin();
+  const auto other = begin + std::ssize(data.model.inputs);
+  auto room = std::find_if(other, data.temperatures.end(), is_called_like_a_room);
+  if (room == data.temperatures.end()) {
+    room = std::find_if(begin, other, is_called_like_a_room);
+    if (room == other) return std::nullopt;
   }
-  rows.time_s.resize(total);
-  for (std::size_t i = 0; i < data.runs.size(); ++i)
-    rows.time_s.segment(rows.runs[i].begin, rows.runs[i].end - rows.runs[i].begin) =
-        data.runs[i].time_s.tail(rows.runs[i].end - rows.runs[i].begin);
-  return rows;
+  return static_cast<std::size_t>(room - begin);
 }
 
 namespace {
@@ -236,13 +208,11 @@ bool alike(const PlaceGroups& groups, const std::string& one, const std::string&
 }  // namespace
 
 PlaceGroups place_groups(const MeasuredData& data) {
-  std::vector<std::string> names = data.model.inputs;
-  names.insert(names.end(), data.others.begin(), data.others.end());
-  Panel rises_K = stacked(data, stacked_rows(data), [&](const MeasuredRun& run) {
+  const std::vector<std::string>& names = data.temperatures;
+  Panel rises_K = stacked(data, [&](const MeasuredRun& run) {
     Panel columns(run.rows(), std::ssize(names));
-    Eigen::Index column = 0;
-    for (const auto* of : {&run.inputs_K, &run.others_K})
-      for (const Column& rise_K : *of) columns.col(column++) = rise_K;
+    for (Eigen::Index i = 0; i < columns.cols(); ++i)
+      columns.col(i) = run.temps_K[static_cast<std::size_t>(i)];
     return columns;
   });
   rises_K.rowwise() -= rises_K.colwise().mean().eval();

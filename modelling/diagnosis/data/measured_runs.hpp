@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,28 +25,29 @@ struct Block {
 struct MeasuredRun {
   std::string name;  ///< the argument as given
   Column time_s;
-  Eigen::Index begin{0};         ///< first selected row
-  std::vector<Column> inputs_K;  ///< rise over the reference, order of the model's inputs
-  std::vector<Column> others_K;  ///< rise of MeasuredData::others
+  Eigen::Index begin{0};        ///< first selected row
+  std::vector<Column> temps_K;  ///< rise over the reference, order of MeasuredData::temperatures
+  std::vector<double> reference_degC;  ///< the same order
+  std::vector<Column>
+      denoised_K;                ///< temps_K without the noise of single values; training runs only
   std::vector<Column> signals;   ///< order of MeasuredData::signals
-  std::vector<double> inputs_reference_degC;
-  std::vector<double> others_reference_degC;
-  // What the search alone needs; of training runs only.
-  std::vector<Column> others_degC;
-  std::vector<Column> inputs_degC;
-  /// inputs_K and others_K without the noise of single values, as far as it can be seen.
-  std::vector<Column> denoised_inputs_K;
-  std::vector<Column> denoised_others_K;
-  std::vector<Column> model_um;     ///< order of the outputs, relative to the output's first row
+  std::vector<Column> model_um;  ///< order of the outputs, relative to the output's first row
   std::vector<Column> measured_um;  ///< the same; NaN: missing
   [[nodiscard]] Eigen::Index rows() const { return time_s.size(); }
 };
 
+/// Rows of all selected runs, one run below the other.
+struct StackedRows {
+  std::vector<Block> runs;  ///< rows of each run
+  Column time_s;
+};
+
 struct MeasuredData {
   ThermalModel model;
-  std::vector<std::string> others;   ///< temperatures that the model does not use
-  std::vector<std::string> signals;  ///< operating signals and positions
+  std::vector<std::string> temperatures;  ///< inputs of the model, then those that it does not use
+  std::vector<std::string> signals;       ///< operating signals and positions
   std::vector<MeasuredRun> runs;
+  StackedRows rows{};
   /// Least noise of a single value of each output, as the steps of its converter make it; empty:
   /// nothing is known.
   std::vector<double> least_noise_um{};
@@ -53,8 +55,10 @@ struct MeasuredData {
   /// deviation, as a share of the coefficient. 0: they are never doubted.
   double coefficient_sd{0.0};
 
-  /// The reference of a temperature in a run. @pre an input or one of the others
-  [[nodiscard]] double reference_degC(const MeasuredRun& run, const std::string& name) const;
+  /// Place of a temperature; the number of temperatures where there is none of this name.
+  [[nodiscard]] std::size_t place_of(const std::string& temperature) const;
+  /// Adds a run and its rows.
+  void add(MeasuredRun run);
   /// The model's coefficient of an input [um/K] in each row: matrix and guideways.
   [[nodiscard]] Column coefficient(const MeasuredRun& run, std::size_t output,
                                    std::size_t input) const;
@@ -62,7 +66,7 @@ struct MeasuredData {
 
 /// Columns that every one of the runs and of the further ones has, in the order of the first run.
 struct SharedColumns {
-  std::vector<std::string> others;
+  std::vector<std::string> temperatures;  ///< after the model's inputs
   std::vector<std::string> signals;
 };
 [[nodiscard]] SharedColumns shared_columns(const ThermalModel& model,
@@ -83,30 +87,20 @@ enum class Purpose { search, comparison };
                                          const std::vector<std::string>& names,
                                          const SharedColumns& columns, Purpose purpose);
 
-/// The first of the columns that is called like a room; empty: there is none.
-[[nodiscard]] std::string room_among(const std::vector<std::string>& columns);
-
-/// The room's temperature in a run: one that the model does not use, else one of its inputs; null:
-/// none is named so.
-[[nodiscard]] const Column* room_degC(const MeasuredData& data, const MeasuredRun& run);
-
-/// A place of the rows of all selected runs, one below the other.
-struct StackedRows {
-  std::vector<Block> runs;  ///< rows of each run
-  Column time_s;
-};
-[[nodiscard]] StackedRows stacked_rows(const MeasuredData& data);
+/// Place of the room's temperature: one that the model does not use, else one of its inputs;
+/// nullopt: none is called so.
+[[nodiscard]] std::optional<std::size_t> room_among(const MeasuredData& data);
 
 /// Columns over the stacked rows.
 /// @param make  of a run: all its rows, a column or shape (rows, m)
 /// @return shape (stacked rows, m)
 template <class Make>
-[[nodiscard]] Panel stacked(const MeasuredData& data, const StackedRows& rows, Make make) {
+[[nodiscard]] Panel stacked(const MeasuredData& data, Make make) {
   Panel all;
   for (std::size_t i = 0; i < data.runs.size(); ++i) {
     const Panel whole = make(data.runs[i]);
-    const Block& block = rows.runs[i];
-    if (all.size() == 0) all.resize(rows.time_s.size(), whole.cols());
+    const Block& block = data.rows.runs[i];
+    if (all.size() == 0) all.resize(data.rows.time_s.size(), whole.cols());
     all.middleRows(block.begin, block.end - block.begin) =
         whole.bottomRows(block.end - block.begin);
   }

@@ -82,8 +82,7 @@ bool moves(const Column& column) {
 
 }  // namespace
 
-Material::Material(const MeasuredData& data, const StackedRows& rows)
-    : data_(data), rows_(rows), step_s_(median_step_s(data)) {
+Material::Material(const MeasuredData& data) : data_(data), step_s_(median_step_s(data)) {
   for (const MeasuredRun& run : data.runs)
     length_s_ = std::max(length_s_, run.time_s[run.rows() - 1] - run.time_s[run.begin]);
   const auto& inputs = data.model.inputs;
@@ -107,9 +106,8 @@ const std::string& Material::name_of(const Subject& subject) const {
   switch (subject.kind) {
     case SubjectKind::input:
     case SubjectKind::input_in_run:
-      return data_.model.inputs[subject.index];
     case SubjectKind::other_temperature:
-      return data_.others[subject.index];
+      return data_.temperatures[subject.index];
     case SubjectKind::signal:
       return data_.signals[subject.index];
     case SubjectKind::output:
@@ -121,23 +119,18 @@ const std::string& Material::name_of(const Subject& subject) const {
 
 ColumnOf Material::values_of(const Subject& subject) const {
   const std::size_t index = subject.index;
-  if (subject.kind == SubjectKind::input)
-    return
-        [index](const MeasuredRun& run) -> const Column& { return run.denoised_inputs_K[index]; };
-  if (subject.kind == SubjectKind::other_temperature)
-    return
-        [index](const MeasuredRun& run) -> const Column& { return run.denoised_others_K[index]; };
-  THERMOCOMP_ENSURE(subject.kind == SubjectKind::signal);
-  return [index](const MeasuredRun& run) -> const Column& { return run.signals[index]; };
+  if (subject.kind == SubjectKind::signal)
+    return [index](const MeasuredRun& run) -> const Column& { return run.signals[index]; };
+  THERMOCOMP_ENSURE(subject.kind == SubjectKind::input ||
+                    subject.kind == SubjectKind::other_temperature);
+  return [index](const MeasuredRun& run) -> const Column& { return run.denoised_K[index]; };
 }
 
 std::optional<Subject> Material::room() const {
-  for (const auto& [kind, names] : {std::pair{SubjectKind::other_temperature, &data_.others},
-                                    std::pair{SubjectKind::input, &data_.model.inputs}})
-    if (const std::string room = room_among(*names); !room.empty())
-      return Subject{kind, static_cast<std::size_t>(std::find(names->begin(), names->end(), room) -
-                                                    names->begin())};
-  return {};
+  const std::optional<std::size_t> room = room_among(data_);
+  if (!room) return {};
+  const bool is_input = *room < data_.model.inputs.size();
+  return Subject{is_input ? SubjectKind::input : SubjectKind::other_temperature, *room};
 }
 
 bool Material::moves_anywhere(const ColumnOf& of) const {
@@ -184,8 +177,8 @@ std::vector<double> Material::onsets_s(std::size_t run, double first, double las
 }
 
 Panel Material::in_run(std::size_t run, const Panel& whole) const {
-  const Block& block = rows_.runs[run];
-  Panel all = Panel::Zero(rows_.time_s.size(), whole.cols());
+  const Block& block = data_.rows.runs[run];
+  Panel all = Panel::Zero(data_.rows.time_s.size(), whole.cols());
   all.middleRows(block.begin, block.end - block.begin) = whole.bottomRows(block.end - block.begin);
   return all;
 }

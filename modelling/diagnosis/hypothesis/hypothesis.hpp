@@ -109,7 +109,7 @@ struct Hypothesis {
 [[nodiscard]] std::vector<double> firsts_of(const Shapes& shapes);
 
 /// Every cause (causes/cause.hpp) with every subject that it can have in these data.
-[[nodiscard]] std::vector<Hypothesis> hypotheses(const MeasuredData& data, const StackedRows& rows);
+[[nodiscard]] std::vector<Hypothesis> hypotheses(const MeasuredData& data);
 
 enum class SubjectKind {
   input,              ///< a temperature of the model
@@ -123,7 +123,7 @@ enum class SubjectKind {
 /// One thing of the data that a cause may act on.
 struct Subject {
   SubjectKind kind{SubjectKind::input};
-  std::size_t index{0};  ///< among the things of its kind
+  std::size_t index{0};  ///< among MeasuredData's temperatures, signals, or the model's outputs
   std::size_t run{0};    ///< of those in one run
 };
 
@@ -133,10 +133,10 @@ using ColumnOf = std::function<const Column&(const MeasuredRun&)>;
 class Material {
  public:
   /// @param data  must outlive it
-  Material(const MeasuredData& data, const StackedRows& rows);
+  explicit Material(const MeasuredData& data);
 
   [[nodiscard]] const MeasuredData& data() const noexcept { return data_; }
-  [[nodiscard]] const StackedRows& rows() const noexcept { return rows_; }
+  [[nodiscard]] const StackedRows& rows() const noexcept { return data_.rows; }
   /// Median step between two rows.
   [[nodiscard]] double step_s() const noexcept { return step_s_; }
   /// Of the longest run.
@@ -171,7 +171,7 @@ class Material {
   /// As stacked() of all runs.
   template <class Make>
   [[nodiscard]] Panel stacked(Make make) const {
-    return diagnosis::stacked(data_, rows_, make);
+    return diagnosis::stacked(data_, make);
   }
 
   /// @param whole  of one run: all its rows
@@ -180,7 +180,6 @@ class Material {
 
  private:
   const MeasuredData& data_;
-  const StackedRows rows_;
   Eigen::MatrixXd settled_;
   Eigen::MatrixXd settled_of_group_;
   double step_s_{1.0};

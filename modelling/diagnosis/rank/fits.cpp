@@ -120,27 +120,24 @@ double price_of_gains(const Hypothesis& hypothesis, Eigen::Index rows) {
 const OutputFit& Readings::of(std::size_t input) {
   std::unique_ptr<OutputFit>& made = made_[input];
   if (made) return *made;
-  OutputRows rows(rows_,
-                  Eigen::Array<bool, Eigen::Dynamic, 1>::Constant(rows_.time_s.size(), true));
+  OutputRows rows(data_.rows,
+                  Eigen::Array<bool, Eigen::Dynamic, 1>::Constant(data_.rows.time_s.size(), true));
   const auto mean = [&](const Column& column) -> Column { return rows.means_of(column); };
-  const auto input_K = [](std::size_t i) {
-    return [i](const MeasuredRun& run) -> const Column& { return run.inputs_K[i]; };
+  const auto rise_K = [](std::size_t i) {
+    return [i](const MeasuredRun& run) -> const Column& { return run.temps_K[i]; };
   };
-  const Column own = mean(stacked(data_, rows_, input_K(input)));
+  const Column own = mean(stacked(data_, rise_K(input)));
   const Column centred_own = centred_in(rows.runs(), own).col(0);
   std::vector<std::pair<double, Panel>> others;  // how closely it goes with the reading
-  const auto add = [&](const auto& of) {
+  for (std::size_t i = 0; i < data_.temperatures.size(); ++i) {
+    if (i == input) continue;
     Panel both(rows.size(), 2);
-    both.col(0) = mean(stacked(data_, rows_, of));
+    both.col(0) = mean(stacked(data_, rise_K(i)));
     both.col(1) = mean(stacked(
-        data_, rows_, [&](const MeasuredRun& run) { return lagged(run.time_s, of(run), 1800.0); }));
+        data_, [&](const MeasuredRun& run) { return lagged(run.time_s, run.temps_K[i], 1800.0); }));
     const Column centred = centred_in(rows.runs(), both.col(0)).col(0);
     others.emplace_back(-std::abs(centred_own.dot(centred)) / (centred.norm() + 1e-12), both);
-  };
-  for (std::size_t i = 0; i < data_.model.inputs.size(); ++i)
-    if (i != input) add(input_K(i));
-  for (std::size_t i = 0; i < data_.others.size(); ++i)
-    add([i](const MeasuredRun& run) -> const Column& { return run.others_K[i]; });
+  }
   std::sort(others.begin(), others.end(),
             [](const auto& a, const auto& b) { return a.first < b.first; });
   if (others.size() > neighbours) others.resize(neighbours);
@@ -149,7 +146,7 @@ const OutputFit& Readings::of(std::size_t input) {
   for (const auto& [closeness, both] : others) common = joined(common, both);
   for (std::size_t i = 0; i < data_.signals.size(); ++i)
     for (const double tau_s : {600.0, 3600.0})
-      common = joined(common, mean(stacked(data_, rows_, [&](const MeasuredRun& run) {
+      common = joined(common, mean(stacked(data_, [&](const MeasuredRun& run) {
                         return lagged(run.time_s, run.signals[i], tau_s);
                       })));
   for (Eigen::Index i = offsets.cols(); i < common.cols(); ++i)
@@ -160,17 +157,16 @@ const OutputFit& Readings::of(std::size_t input) {
   return *made;
 }
 
-Fits::Fits(const MeasuredData& data, const StackedRows& rows, Readings& readings,
-           const std::vector<Explanation>& accepted)
+Fits::Fits(const MeasuredData& data, Readings& readings, const std::vector<Explanation>& accepted)
     : data_(data), readings_(readings), outputs_(data.model.outputs.size()) {
   for (std::size_t output = 0; output < outputs_.size(); ++output) {
-    Column left = stacked(data, rows, [output](const MeasuredRun& run) -> Column {
+    Column left = stacked(data, [output](const MeasuredRun& run) -> Column {
       return run.measured_um[output] - run.model_um[output];
     });
     const Eigen::Array<bool, Eigen::Dynamic, 1> present = left.array().isFinite();
     if (present.count() < values_min) continue;
     left = present.select(left.array(), 0.0);
-    OutputRows of(rows, present);
+    OutputRows of(data.rows, present);
     Panel free = offsets_of(of);
     for (const Explanation& each : accepted) {
       if (each.gains[output].size() == 0) continue;
@@ -183,9 +179,9 @@ Fits::Fits(const MeasuredData& data, const StackedRows& rows, Readings& readings
     // The coefficients may be a little wrong without being a cause of their own.
     Panel coefficients(of.size(), data.coefficient_sd > 0 ? std::ssize(data.model.inputs) : 0);
     for (Eigen::Index i = 0; i < coefficients.cols(); ++i)
-      coefficients.col(i) = of.means_of(stacked(data, rows, [&](const MeasuredRun& run) -> Column {
+      coefficients.col(i) = of.means_of(stacked(data, [&](const MeasuredRun& run) -> Column {
         const auto input = static_cast<std::size_t>(i);
-        return answer_to_errors(data, run, output, input, run.inputs_K[input]);
+        return answer_to_errors(data, run, output, input, run.temps_K[input]);
       }));
     const Column means = of.means_of(left);
     const bool fitted = coefficients.cols() > 0 && fitted_to(means, free, coefficients);

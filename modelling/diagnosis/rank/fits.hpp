@@ -17,14 +17,13 @@ namespace thermocomp::diagnosis {
 /// fault of a reading must be seen here too.
 class Readings {
  public:
-  /// Both must outlive it.
-  Readings(const MeasuredData& data, const StackedRows& rows) : data_(data), rows_(rows) {}
+  /// @param data  must outlive it
+  explicit Readings(const MeasuredData& data) : data_(data) {}
   /// Made when it is asked for first.
   [[nodiscard]] const OutputFit& of(std::size_t input);
 
  private:
   const MeasuredData& data_;
-  const StackedRows& rows_;
   std::map<std::size_t, std::unique_ptr<OutputFit>> made_;
 };
 
@@ -32,8 +31,7 @@ class Fits {
  public:
   /// All must outlive it.
   /// @param accepted  what is found: gains of theirs are fitted anew beside each hypothesis
-  Fits(const MeasuredData& data, const StackedRows& rows, Readings& readings,
-       const std::vector<Explanation>& accepted);
+  Fits(const MeasuredData& data, Readings& readings, const std::vector<Explanation>& accepted);
 
   /// The hypothesis at each of the shapes.
   [[nodiscard]] std::vector<Explanation> trials(const Hypothesis& hypothesis,

@@ -10,6 +10,8 @@
 namespace thermocomp::diagnosis {
 namespace {
 
+constexpr double probability_min = 0.5;
+constexpr std::size_t findings_max = 4;
 constexpr std::size_t refined = 24;
 constexpr std::size_t alternatives_max = 40;
 /// A remainder is structure if it exceeds the noise by this factor and this share of the motion.
@@ -135,23 +137,21 @@ bool set_spread(const Fits& fits, Finding& finding) {
 
 class Search {
  public:
-  Search(const MeasuredData& data, const StackedRows& rows,
-         const std::vector<Hypothesis>& hypotheses, const Rules& rules,
-         const std::function<void(const std::vector<Explanation>&)>& accepted,
-         const std::function<void()>& progress)
+  Search(const MeasuredData& data, const std::vector<Hypothesis>& hypotheses,
+         const std::function<void()>& progress, double motion_share_min,
+         const std::function<void(const std::vector<Explanation>&)>& accepted)
       : data_(data),
-        rows_(rows),
         hypotheses_(hypotheses),
-        rules_(rules),
-        on_accepted_(accepted),
         progress_(progress),
-        readings_(data, rows),
+        motion_share_min_(motion_share_min),
+        on_accepted_(accepted),
+        readings_(data),
         groups_(place_groups(data)) {}
 
   SearchResult run() {
     SearchResult result;
     std::vector<double> left_before;
-    for (std::size_t round = 0; round < rules_.findings_max; ++round) {
+    for (std::size_t round = 0; round < findings_max; ++round) {
       const Fits fits = fits_beside(explanations_of(result.findings));
       if (round == 0) {
         left_before = structure_left(fits);
@@ -185,7 +185,7 @@ class Search {
 
   Fits fits_beside(const std::vector<Explanation>& accepted) {
     if (on_accepted_) on_accepted_(accepted);
-    return Fits(data_, rows_, readings_, accepted);
+    return Fits(data_, readings_, accepted);
   }
 
   /// Variance of each output above that of the noise.
@@ -227,7 +227,7 @@ class Search {
       const Column effect = fits.effect_of(explanation, output);
       const double rms = std::sqrt(effect.squaredNorm() / static_cast<double>(effect.size()));
       if (rms > fits.output(output).noise_beside(effect) &&
-          rms > rules_.motion_share_min * motion_of(data_, output))
+          rms > motion_share_min_ * motion_of(data_, output))
         return true;
     }
     return false;
@@ -259,7 +259,7 @@ class Search {
       result.families = posterior.families;
       result.weighed = all;
     }
-    if (choice.probability < rules_.probability_min || !matters(fits, all[choice.index]) ||
+    if (choice.probability < probability_min || !matters(fits, all[choice.index]) ||
         (round > 0 && !(all[choice.index].score > 0)))
       return false;
     Finding finding{all[choice.index]};
@@ -297,7 +297,7 @@ class Search {
       if (!others.empty()) fits.refine(findings[i].explanation);
       std::vector<Explanation> alone = {findings[i].explanation};
       if (!others.empty() &&
-          (weigh_against_each_other(alone, Round::first).none > 1.0 - rules_.probability_min ||
+          (weigh_against_each_other(alone, Round::first).none > 1.0 - probability_min ||
            !matters(fits, findings[i].explanation))) {
         findings.erase(findings.begin() + static_cast<std::ptrdiff_t>(i));
         i = 0;
@@ -314,22 +314,20 @@ class Search {
   }
 
   const MeasuredData& data_;
-  const StackedRows& rows_;
   const std::vector<Hypothesis>& hypotheses_;
-  const Rules& rules_;
-  const std::function<void(const std::vector<Explanation>&)>& on_accepted_;
   const std::function<void()>& progress_;
+  const double motion_share_min_;
+  const std::function<void(const std::vector<Explanation>&)>& on_accepted_;
   Readings readings_;
   PlaceGroups groups_;
 };
 
 }  // namespace
 
-SearchResult search(const MeasuredData& data, const StackedRows& rows,
-                    const std::vector<Hypothesis>& hypotheses, const Rules& rules,
-                    const std::function<void(const std::vector<Explanation>&)>& accepted,
-                    const std::function<void()>& progress) {
-  return Search(data, rows, hypotheses, rules, accepted, progress).run();
+SearchResult search(const MeasuredData& data, const std::vector<Hypothesis>& hypotheses,
+                    const std::function<void()>& progress, double motion_share_min,
+                    const std::function<void(const std::vector<Explanation>&)>& accepted) {
+  return Search(data, hypotheses, progress, motion_share_min, accepted).run();
 }
 
 }  // namespace thermocomp::diagnosis

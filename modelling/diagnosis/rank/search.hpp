@@ -11,15 +11,6 @@
 
 namespace thermocomp::diagnosis {
 
-/// What counts as a finding.
-struct Rules {
-  double probability_min{0.5};
-  /// Least RMS of what a cause explains, as a share of the measured motion's; never below the noise
-  /// of a single value.
-  double motion_share_min{0.005};
-  std::size_t findings_max{4};
-};
-
 struct SearchResult {
   std::vector<Finding> findings;  ///< in order of gain
   /// Share of an output's remaining variance, noise taken out, that is left.
@@ -33,13 +24,14 @@ struct SearchResult {
   std::vector<Explanation> weighed;          ///< for the first finding, likeliest first
 };
 
-/// @param accepted  called with what is accepted before the columns of any hypothesis are asked for
-/// again
 /// @param progress  called at each hypothesis
+/// @param motion_share_min  least RMS of the effect of a finding, as a share of the RMS of the
+///         measured motion; the noise of a single value is a second lower bound
+/// @param accepted  called with the findings before the columns of any hypothesis are requested
+///         beside them
 [[nodiscard]] SearchResult search(
-    const MeasuredData& data, const StackedRows& rows, const std::vector<Hypothesis>& hypotheses,
-    const Rules& rules,
-    const std::function<void(const std::vector<Explanation>&)>& accepted = nullptr,
-    const std::function<void()>& progress = nullptr);
+    const MeasuredData& data, const std::vector<Hypothesis>& hypotheses,
+    const std::function<void()>& progress = nullptr, double motion_share_min = 0.005,
+    const std::function<void(const std::vector<Explanation>&)>& accepted = nullptr);
 
 }  // namespace thermocomp::diagnosis

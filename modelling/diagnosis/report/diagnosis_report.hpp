@@ -63,8 +63,7 @@ void add_runs(ReportData& report, const Diagnosis& diagnosis, const MeasuredData
                                           const std::string& subject);
 
 /// What was found, in a few words, and where.
-[[nodiscard]] std::string title_of(const NamedFinding& finding);
-[[nodiscard]] std::string title_of(const Alternative& other);
+[[nodiscard]] std::string title_of(const std::string& cause, const std::string& subject);
 /// One or two sentences with the finding's own figures.
 [[nodiscard]] std::string sentence_of(const NamedFinding& finding);
 [[nodiscard]] std::string what_to_do(const NamedFinding& finding);

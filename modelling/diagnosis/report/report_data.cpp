@@ -36,7 +36,8 @@ const char* phase_name(Phase phase) {
 
 std::vector<Phase> phases_of(const MeasuredRun& run, const MeasuredData& data) {
   Column mean_K = Column::Zero(run.rows());
-  for (const Column& input : run.inputs_K) mean_K += input;
+  for (std::size_t input = 0; input < data.model.inputs.size(); ++input)
+    mean_K += run.temps_K[input];
   const Column slope_K_per_s = slope(run.time_s, mean_K, slope_smoothing_s);
   const double steepest = slope_K_per_s.cwiseAbs().maxCoeff();
   std::vector<Phase> phases;
@@ -91,19 +92,20 @@ Whiteness whiteness_of(const Column& time_s, const Column& residual) {
 
 namespace {
 
-/// Places in data.others of the temperatures that a finding names.
-std::vector<std::size_t> named_others(const Diagnosis& diagnosis, const MeasuredData& data) {
-  std::vector<std::size_t> named;
-  for (std::size_t other = 0; other < data.others.size(); ++other) {
-    const std::string& name = data.others[other];
-    if (std::any_of(diagnosis.findings.begin(), diagnosis.findings.end(),
+/// Places of the model's inputs and of the other temperatures that a finding names.
+std::vector<std::size_t> places_shown(const Diagnosis& diagnosis, const MeasuredData& data) {
+  std::vector<std::size_t> shown;
+  for (std::size_t place = 0; place < data.temperatures.size(); ++place) {
+    const std::string& name = data.temperatures[place];
+    if (place < data.model.inputs.size() ||
+        std::any_of(diagnosis.findings.begin(), diagnosis.findings.end(),
                     [&](const NamedFinding& finding) {
                       const SubjectColumns columns = subject_columns(finding.subject);
                       return columns.first == name || columns.second == name;
                     }))
-      named.push_back(other);
+      shown.push_back(place);
   }
-  return named;
+  return shown;
 }
 
 /// Whether the model was made from rows of the run. The folder may have changed since.
@@ -125,9 +127,9 @@ void add_runs(ReportData& report, const Diagnosis& diagnosis, const MeasuredData
               bool test) {
   report.outputs = data.model.outputs;
   report.signals = data.signals;
-  report.inputs = data.model.inputs;
-  const std::vector<std::size_t> others = named_others(diagnosis, data);
-  for (const std::size_t other : others) report.inputs.push_back(data.others[other]);
+  report.inputs.clear();
+  const std::vector<std::size_t> shown = places_shown(diagnosis, data);
+  for (const std::size_t place : shown) report.inputs.push_back(data.temperatures[place]);
   for (std::size_t i = 0; i < data.runs.size(); ++i) {
     const MeasuredRun& run = data.runs[i];
     const Eigen::Index rows = run.rows() - run.begin;
@@ -136,11 +138,10 @@ void add_runs(ReportData& report, const Diagnosis& diagnosis, const MeasuredData
     for (const Column& measured : run.measured_um)
       added.measured_um.emplace_back(measured.tail(rows));
     for (const Column& signal : run.signals) added.signals.emplace_back(signal.tail(rows));
-    for (const Column& input : run.inputs_K) added.inputs_K.emplace_back(input.tail(rows));
-    for (const std::size_t other : others)
-      added.inputs_K.emplace_back(run.others_K[other].tail(rows));
-    for (const Residuals& each : before) added.before_um.push_back(each.by_run[i]);
-    for (const Residuals& each : after) added.after_um.push_back(each.by_run[i]);
+    for (const std::size_t place : shown)
+      added.inputs_K.emplace_back(run.temps_K[place].tail(rows));
+    for (const Residuals& each : before) added.before_um.push_back(each[i]);
+    for (const Residuals& each : after) added.after_um.push_back(each[i]);
     report.runs.push_back(std::move(added));
   }
 }

@@ -149,8 +149,8 @@ std::vector<Advice> next_steps(const Diagnosis& diagnosis) {
   std::vector<Advice> all;
   for (const NamedFinding& finding : diagnosis.findings) {
     const double gain_um = largest_gain_um(finding.test);
-    all.push_back(
-        {gain_um, title_of(finding) + by(diagnosis, gain_um) + ". " + what_to_do(finding)});
+    all.push_back({gain_um, title_of(finding.cause, finding.subject) + by(diagnosis, gain_um) +
+                                ". " + what_to_do(finding)});
   }
   if (diagnosis.remainder && diagnosis.remainder->term.bank.gain_um_per_unit.empty())
     all.push_back({0.0,
@@ -219,8 +219,9 @@ std::string probability_text(const NamedFinding& finding) {
 
 std::string finding_html(const NamedFinding& finding, std::size_t number, const std::string& unit) {
   std::string html = number == 1 ? "<details open>" : "<details>";
-  html += "<summary><h3>" + std::to_string(number) + ". " + xml_text(title_of(finding)) +
-          "</h3></summary>" + html_paragraph(sentence_of(finding) + probability_text(finding));
+  html += "<summary><h3>" + std::to_string(number) + ". " +
+          xml_text(title_of(finding.cause, finding.subject)) + "</h3></summary>" +
+          html_paragraph(sentence_of(finding) + probability_text(finding));
   Table gains{{"error on the test rows", "before", "after", "less by", "95 % interval"}};
   for (const auto& [output, gain] : finding.test)
     gains.push_back(
@@ -230,7 +231,7 @@ std::string finding_html(const NamedFinding& finding, std::size_t number, const 
   std::string more = html_table(gains);
   for (const Alternative& other : finding.alternatives) {
     if (other.relative_support < support_reported_min) continue;
-    more += html_paragraph("It could also be this: " + title_of(other) + " (" +
+    more += html_paragraph("It could also be this: " + title_of(other.cause, other.subject) + " (" +
                            figure(100.0 * other.relative_support) +
                            " % as likely). To tell them apart: " +
                            experiment_between({finding.cause, finding.subject, 1.0}, other));
@@ -254,8 +255,7 @@ std::string candidates_html(const Diagnosis& diagnosis) {
     for (const auto& [output, gain] : each.test)
       gains += (gains.empty() ? "" : ", ") + name_of_column(output) + " " + figure(gain.before_um) +
                " to " + figure(gain.after_um);
-    rows.push_back({title_of(Alternative{each.cause, each.subject, 1.0}),
-                    fixed(100.0 * each.probability, 0) + " %",
+    rows.push_back({title_of(each.cause, each.subject), fixed(100.0 * each.probability, 0) + " %",
                     fixed(100.0 * each.share_of_remainder, 0) + " %", gains.empty() ? "-" : gains,
                     each.would_decide});
   }

@@ -68,8 +68,7 @@ std::string parameter_words(const std::string& cause, const Parameter& parameter
     const bool square = parameter.values.contains("") && parameter.values.at("") > 1.5;
     return square ? "with the square of the signal" : "in proportion to the signal";
   }
-  const Cause* const of = find_cause(cause);
-  const CauseParameter* const known = of == nullptr ? nullptr : find_parameter(*of, parameter.name);
+  const CauseParameter* const known = find_parameter(cause_named(cause), parameter.name);
   const std::string description(known == nullptr ? std::string_view(parameter.name)
                                                  : known->description);
   std::string unit(known == nullptr || known->unit == "1" ? std::string_view() : known->unit);
@@ -99,15 +98,12 @@ std::string parameter_words(const std::string& cause, const Parameter& parameter
 
 namespace {
 
-/// Null: there is no such cause.
-const CauseTexts* texts_of(const NamedFinding& finding) {
-  const Cause* const cause = find_cause(finding.cause);
-  if (cause == nullptr) return nullptr;
-  const bool two_names = finding.subject.find('|') != std::string::npos;
-  if (two_names && cause->texts_in_network) return &*cause->texts_in_network;
-  if (cause->texts_without_unit && unit_of(finding.subject).suffix.empty())
-    return &*cause->texts_without_unit;
-  return &cause->texts;
+const CauseTexts& texts_of(const std::string& cause_name, const std::string& subject) {
+  const Cause& cause = cause_named(cause_name);
+  const bool two_names = subject.find('|') != std::string::npos;
+  if (two_names && cause.texts_in_network) return *cause.texts_in_network;
+  if (cause.texts_without_unit && unit_of(subject).suffix.empty()) return *cause.texts_without_unit;
+  return cause.texts;
 }
 
 /// How the effects of two subjects are told apart: one moves, the other does not.
@@ -122,35 +118,15 @@ std::string one_alone(const std::string& one, const std::string& other) {
          " stays, and read both.";
 }
 
-/// The experiment that the first of them (causes/cause.hpp) asks for.
-Experiment experiment_of(const std::string& cause, const std::string& other) {
-  const auto of = [](const std::string& name) {
-    const Cause* const known = find_cause(name);
-    return known == nullptr ? Experiment::other_duty : known->experiment;
-  };
-  return std::min(of(cause), of(other));
-}
-
 }  // namespace
 
-std::string title_of(const NamedFinding& finding) {
-  const CauseTexts* of = texts_of(finding);
-  std::string text(of == nullptr ? std::string_view(finding.cause) : of->title);
-  return text.append(": ").append(finding.subject);
-}
-
-std::string title_of(const Alternative& other) {
-  NamedFinding finding;
-  finding.cause = other.cause;
-  finding.subject = other.subject;
-  return title_of(finding);
+std::string title_of(const std::string& cause, const std::string& subject) {
+  return std::string(texts_of(cause, subject).title).append(": ").append(subject);
 }
 
 std::string sentence_of(const NamedFinding& finding) {
-  const CauseTexts* of = texts_of(finding);
-  std::string text = finding.subject;
-  text += ": ";
-  text += of == nullptr ? std::string_view(finding.cause) : of->description;
+  std::string text = finding.subject + ": ";
+  text += texts_of(finding.cause, finding.subject).description;
   if (finding.run) text.append(" (in ").append(*finding.run).append(")");
   for (const Parameter& parameter : finding.parameters)
     text.append("; ").append(parameter_words(finding.cause, parameter, finding.subject));
@@ -165,8 +141,7 @@ std::string sentence_of(const NamedFinding& finding) {
 }
 
 std::string what_to_do(const NamedFinding& finding) {
-  const CauseTexts* of = texts_of(finding);
-  std::string usual = of == nullptr ? std::string() : std::string(of->to_do);
+  std::string usual(texts_of(finding.cause, finding.subject).to_do);
   if (!fails_on_test_runs(finding)) return usual;
   return "Do not use it yet: it holds for the training runs and not for the test runs, so the "
          "extended model goes without it. Record more runs. If they confirm it: " +
@@ -174,7 +149,8 @@ std::string what_to_do(const NamedFinding& finding) {
 }
 
 std::string experiment_between(const Alternative& one, const Alternative& other) {
-  const Experiment experiment = experiment_of(one.cause, other.cause);
+  const Experiment experiment =
+      std::min(cause_named(one.cause).experiment, cause_named(other.cause).experiment);
   if (one.cause == other.cause && one.subject != other.subject &&
       experiment != Experiment::of_a_network)
     return one_alone(one.subject, other.subject);

@@ -54,6 +54,7 @@ MeasuredData data_of(const ThermalPlant& plant, const ThermalRuns& runs) {
     data.model.outputs.push_back(sensor.column);
     data.model.inputs.push_back(sensor.column);
   }
+  data.temperatures = data.model.inputs;
   const NetworkSimulation simulation(plant.network);
   for (std::size_t i = 0; i < runs.runs.size(); ++i) {
     const ThermalRun& of = runs.runs[i];
@@ -64,8 +65,8 @@ MeasuredData data_of(const ThermalPlant& plant, const ThermalRuns& runs) {
     run.signals = of.signals;
     run.model_um = simulation.readings_degC(runs, i);
     run.measured_um = of.measured_degC;
-    for (const Column& measured : of.measured_degC) run.inputs_K.push_back(rise_of(measured));
-    data.runs.push_back(std::move(run));
+    for (const Column& measured : of.measured_degC) run.temps_K.push_back(rise_of(measured));
+    data.add(std::move(run));
   }
   for (std::size_t sensor = 0; sensor < plant.network.sensors.size(); ++sensor)
     data.least_noise_um.push_back(step_noise_K(runs, sensor));
@@ -80,7 +81,7 @@ std::vector<Residuals> residuals_of(const HeatNetwork& network, const ThermalRun
     const ThermalRun& run = runs.runs[i];
     const std::vector<Column> simulated = simulation.readings_degC(runs, i);
     for (std::size_t sensor = 0; sensor < all.size(); ++sensor)
-      all[sensor].by_run.emplace_back(
+      all[sensor].emplace_back(
           (run.measured_degC[sensor] - simulated[sensor]).tail(run.rows() - run.begin));
   }
   return all;
@@ -99,14 +100,11 @@ Diagnosis diagnose_thermal(const ThermalPlant& plant, const std::vector<RunFile>
   const ThermalRuns train_runs = thermal_runs(plant, train, train_names, signals);
   const ThermalRuns test_runs = thermal_runs(plant, test, test_names, signals);
   const MeasuredData train_data = data_of(plant, train_runs);
-  const StackedRows rows = stacked_rows(train_data);
-  const auto catalogue = std::make_shared<NetworkHypotheses>(plant, train_runs, rows);
-  Rules rules;
-  rules.motion_share_min = motion_share_min;
+  const auto catalogue = std::make_shared<NetworkHypotheses>(plant, train_runs, train_data.rows);
   const std::vector<Hypothesis> hypotheses = NetworkHypotheses::all(catalogue);
-  const SearchResult result = search(
-      train_data, rows, hypotheses, rules,
-      [&](const std::vector<Explanation>& found) { catalogue->accept(found); }, progress);
+  const SearchResult result =
+      search(train_data, hypotheses, progress, motion_share_min,
+             [&](const std::vector<Explanation>& found) { catalogue->accept(found); });
 
   Diagnosis diagnosis;
   diagnosis.unit = "K";
@@ -150,9 +148,9 @@ std::optional<std::string> corrected_machine(const std::filesystem::path& path,
   if (machine.is_body()) return std::nullopt;
   std::string text = "# Written by thermocomp diagnose: values as the training runs have them.\n";
   for (const NamedFinding& finding : findings) {
-    const Cause* const cause = find_cause(finding.cause);
-    if (cause == nullptr || cause->into_machine == nullptr ||
-        !cause->into_machine(machine, finding.subject, finding.parameters))
+    const Cause& cause = cause_named(finding.cause);
+    if (cause.into_machine == nullptr ||
+        !cause.into_machine(machine, finding.subject, finding.parameters))
       text.append("# No key carries " + finding.cause + " of " + finding.subject + ".\n");
   }
   return text + machine.text() + "\n";

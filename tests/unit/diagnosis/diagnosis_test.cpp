@@ -74,9 +74,8 @@ FoundGain found_gain(Hidden hidden) {
   runs[0].values.erase(runs[0].values.begin() + 2);
   const MeasuredData data = measured_data(one_input(), runs, {"train.csv"},
                                           shared_columns(one_input(), runs), Purpose::search);
-  const StackedRows rows = stacked_rows(data);
-  const std::vector<Hypothesis> all = hypotheses(data, rows);
-  const SearchResult result = search(data, rows, all, Rules{});
+  const std::vector<Hypothesis> all = hypotheses(data);
+  const SearchResult result = search(data, all);
   REQUIRE_FALSE(result.findings.empty());
   const Finding& found = result.findings.front();
   const Interval& of = found.gains_ci[0][0];

@@ -87,7 +87,7 @@ TEST_CASE("a false reading acts through every term as the prediction does", "[di
   const Panel answers_um = answer_to_errors(data, run, 0, 0, errors_K);
   for (Eigen::Index i = 0; i < errors_K.cols(); ++i) {
     MeasuredRun wrong = run;
-    wrong.inputs_K[0] += errors_K.col(i);
+    wrong.temps_K[0] += errors_K.col(i);
     const Column expected = model_over(model, wrong, data)[0] - model_over(model, run, data)[0];
     CHECK((answers_um.col(i) - expected).cwiseAbs().maxCoeff() < 1e-9);
   }
@@ -101,11 +101,11 @@ TEST_CASE("faults of a reading have the columns that a prediction with them has"
   const MeasuredRun& run = data.runs.front();
   const Column right_um = model_over(model, run, data)[0];
   std::size_t faults = 0;
-  for (const Hypothesis& fault : hypotheses(data, stacked_rows(data))) {
+  for (const Hypothesis& fault : hypotheses(data)) {
     if (!fault.sensor || *fault.sensor != 0) continue;
     const Shape shape = {fault.shape[0].grid[fault.shape[0].grid.size() / 3]};
     MeasuredRun wrong = run;
-    wrong.inputs_K[0] += fault.errors_K({shape}).col(0);
+    wrong.temps_K[0] += fault.errors_K({shape}).col(0);
     const Column missing_um = right_um - model_over(model, wrong, data)[0];
     INFO(fault.cause);
     CHECK((fault.columns({shape}, 0).col(0) - missing_um).cwiseAbs().maxCoeff() < 1e-9);
@@ -119,9 +119,9 @@ TEST_CASE("exchanged readings and play of one act through a bank of lags", "[dia
   const ThermalModel model = model_with_bank();
   const MeasuredData data = data_of(model, 300);
   MeasuredRun denoised = data.runs.front();
-  denoised.inputs_K = denoised.denoised_inputs_K;
+  denoised.temps_K = denoised.denoised_K;
   const Column before_um = model_over(model, denoised, data)[0];
-  for (const Hypothesis& of : hypotheses(data, stacked_rows(data))) {
+  for (const Hypothesis& of : hypotheses(data)) {
     const bool play = of.cause == "hysteresis" && of.subject == "t1_degC";
     if (of.cause != "sensor_swap" && !play) continue;
     const Shape shape = play ? Shape{of.shape[0].grid[5]} : Shape{};
@@ -140,7 +140,7 @@ TEST_CASE("the lag of a place may take what coefficient and bank give it in the 
   const MeasuredData data = data_of(model_with_bank(), 300);
   CHECK(settled_um_per_K(data, 0, 0) == Approx(5.0));
   CHECK(settled_um_per_K(data, 0, 1) == Approx(0.9));
-  for (const Hypothesis& lag : hypotheses(data, stacked_rows(data))) {
+  for (const Hypothesis& lag : hypotheses(data)) {
     if (lag.cause != "thermal_lag" || lag.subject != "t1_degC") continue;
     CHECK(lag.bounds(0).low == 0.0);
     CHECK(lag.bounds(0).high > 4.5);

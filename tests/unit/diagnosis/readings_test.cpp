@@ -78,14 +78,13 @@ MeasuredData data_of(const std::vector<RunFile>& runs) {
 
 /// ln L that the reading adds for a fault of the first run from a moment on.
 double support(const MeasuredData& data, const char* cause, std::size_t sensor, double onset_s) {
-  const StackedRows stacked = stacked_rows(data);
-  const std::vector<Hypothesis> all = hypotheses(data, stacked);
+  const std::vector<Hypothesis> all = hypotheses(data);
   const auto of = std::find_if(all.begin(), all.end(), [&](const Hypothesis& each) {
     return each.cause == cause && each.sensor == sensor && each.run == std::size_t{0};
   });
   REQUIRE(of != all.end());
-  Readings readings(data, stacked);
-  return Fits(data, stacked, readings, {}).trials(*of, {{onset_s}}).front().witness;
+  Readings readings(data);
+  return Fits(data, readings, {}).trials(*of, {{onset_s}}).front().witness;
 }
 
 constexpr double half_s = step_s * rows / 2;

@@ -249,7 +249,7 @@ TEST_CASE("a test run that the model was fitted to is not called unseen", "[diag
     measured.runs.push_back(run);
   }
   const std::vector<Residuals> left{
-      {{wave(1.0, 0.1), wave(1.0, 0.1), wave(1.0, 0.1), wave(1.0, 0.1)}}};
+      {wave(1.0, 0.1), wave(1.0, 0.1), wave(1.0, 0.1), wave(1.0, 0.1)}};
   ReportData read;
   add_runs(read, none(), measured, left, left, true);
   CHECK(read.runs[0].of_the_model);
@@ -324,10 +324,12 @@ TEST_CASE("only what has the unit of a speed is called one", "[diagnosis][report
   finding.cause = "speed_growth";
   for (const char* speed : {"spindle_rpm", "x_mm_per_min"}) {
     finding.subject = speed;
-    CHECK(title_of(finding) == std::string("Growth with speed, not with heat: ") + speed);
+    CHECK(title_of(finding.cause, finding.subject) ==
+          std::string("Growth with speed, not with heat: ") + speed);
   }
   finding.subject = "cos_elevation";
-  CHECK(title_of(finding) == "Growth with the square of a signal, not with heat: cos_elevation");
+  CHECK(title_of(finding.cause, finding.subject) ==
+        "Growth with the square of a signal, not with heat: cos_elevation");
   CHECK(sentence_of(finding) ==
         "cos_elevation: the displacement jumps with the square of this signal.");
   CHECK_FALSE(what_to_do(finding).empty());
