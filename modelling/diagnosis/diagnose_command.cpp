@@ -155,20 +155,16 @@ Diagnosis diagnosis_of(const Options& options, ReportData* report) {
                   progress);
 }
 
-/// What the test runs do not speak against.
-std::vector<NamedFinding> confirmed(const Diagnosis& diagnosis) {
-  std::vector<NamedFinding> findings = diagnosis.findings;
-  std::erase_if(findings, fails_on_test_runs);
-  return findings;
-}
-
-/// The report, and the model or machine file with what was found.
+/// The report, and the model or machine file with the findings that the test runs do not
+/// contradict.
 void write_folder(const Options& options, const Diagnosis& diagnosis, const ReportData& report) {
   const std::filesystem::path folder(options.folder);
   std::filesystem::create_directories(folder);
+  std::vector<NamedFinding> confirmed = diagnosis.findings;
+  std::erase_if(confirmed, fails_on_test_runs);
   if (options.thermal.empty())
     cli::write_file((folder / "model.toml").string(), write_model(diagnosis.extended));
-  else if (const auto text = corrected_machine(options.thermal, confirmed(diagnosis)))
+  else if (const auto text = corrected_machine(options.thermal, confirmed))
     cli::write_file((folder / "machine.toml").string(), *text);
   cli::write_file((folder / "report.html").string(), report_html(diagnosis, report));
 }

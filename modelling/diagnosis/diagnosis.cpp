@@ -12,9 +12,6 @@
 namespace thermocomp::diagnosis {
 namespace {
 
-/// Candidates whose gain alone is measured.
-constexpr std::size_t candidates_tried = 3;
-
 /// The model with one finding more; nothing where neither a term nor a correction carries it.
 std::optional<Extended> with_finding(const Extended& before, const Finding& finding,
                                      const MeasuredData& train) {
@@ -80,7 +77,7 @@ std::vector<Candidate> candidates_of(const std::vector<Explanation>& weighed,
                          {"left_out_of_best", each.left_out_of_best},
                          {"parameters", free_parameters(of)},
                          {"outputs", outputs.size()}};
-    if (all.size() < candidates_tried) {
+    if (all.size() < candidates_reported) {
       Finding alone{each};
       alone.shape_ci.resize(each.shape.size());
       for (const Eigen::VectorXd& gains : each.gains)
@@ -114,11 +111,6 @@ void add_remainder(ThermalModel& model, const RemainderBank& remainder) {
   model.terms.push_back(remainder.term);
 }
 
-void remove_output(RemainderBank& remainder, const std::string& output) {
-  remainder.term.bank.gain_um_per_unit.erase(output);
-  for (TermSpec& hinge : remainder.hinges) hinge.per_output["gain_um_per_unit"].erase(output);
-}
-
 /// Adds a bank of lags for the outputs of which enough can be predicted without a name.
 /// @return of each output the share that can
 std::vector<double> add_remainder_bank(Diagnosis& diagnosis, Extended& extended,
@@ -131,8 +123,12 @@ std::vector<double> add_remainder_bank(Diagnosis& diagnosis, Extended& extended,
   std::vector<std::string> outputs;
   for (const auto& [name, gain] : diagnosis.remainder->left_out) outputs.push_back(name);
   diagnosis.remainder->test = gains_on_test(extended, longer, outputs, test);
-  for (const auto& [name, gain] : diagnosis.remainder->test)
-    if (!(gain.reduction > 0)) remove_output(*diagnosis.remainder, name);
+  for (const auto& [name, gain] : diagnosis.remainder->test) {
+    if (gain.reduction > 0) continue;
+    diagnosis.remainder->term.bank.gain_um_per_unit.erase(name);
+    for (TermSpec& hinge : diagnosis.remainder->hinges)
+      hinge.per_output["gain_um_per_unit"].erase(name);
+  }
   if (!diagnosis.remainder->term.bank.gain_um_per_unit.empty())
     add_remainder(extended.model, *diagnosis.remainder);
   return predictable;
@@ -155,10 +151,8 @@ Diagnosis diagnose(const ThermalModel& model, std::vector<RunFile> train,
                    const std::vector<std::string>& test_names, ReportData* report,
                    const std::function<void()>& progress) {
   const SharedColumns columns = shared_columns(model, train, test);
-  const MeasuredData train_data =
-      measured_data(model, train, train_names, columns, Purpose::search);
-  const MeasuredData test_data =
-      measured_data(model, test, test_names, columns, Purpose::comparison);
+  const MeasuredData train_data = measured_data(model, train, train_names, columns);
+  const MeasuredData test_data = measured_data(model, test, test_names, columns);
   train.clear();
   test.clear();
   const std::vector<Hypothesis> all = hypotheses(train_data);

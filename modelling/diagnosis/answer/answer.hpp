@@ -42,6 +42,8 @@ struct NamedFinding {
   std::vector<std::string> group{};  ///< places that cannot be told apart, the subject's first
 };
 
+constexpr std::size_t candidates_reported = 3;
+
 /// What was weighed for the first finding, whether it became one or not.
 struct Candidate {
   std::string cause;

@@ -9,8 +9,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::size_t candidates_reported = 3;
-
 Json number(double value) {
   return std::isfinite(value) ? Json(value) : Json(nullptr);
 }

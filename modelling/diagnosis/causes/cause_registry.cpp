@@ -46,10 +46,12 @@ std::vector<Hypothesis> hypotheses(const MeasuredData& data) {
       if (cause.hypotheses == nullptr) continue;
       for (Hypothesis& each : cause.hypotheses(*material, subject)) {
         each.cause = cause.name;
-        // Its columns refer to the material, which it keeps alive.
-        each.columns = [material, columns = std::move(each.columns)](const Shapes& shapes,
-                                                                     std::size_t output) {
-          return columns(shapes, output);
+        // The effect refers to the material, which the columns keep alive.
+        each.columns = [material, effect = each.effect, run = each.run](const Shapes& shapes,
+                                                                        std::size_t output) {
+          return stacked(
+              material->data(), [&](const MeasuredRun& of) { return effect(of, shapes, output); },
+              run);
         };
         all.push_back(std::move(each));
       }

@@ -13,26 +13,25 @@ constexpr CauseParameter shift{"shift_s", "s", -3600.0, 3600.0, "shifted by"};
 
 std::vector<Hypothesis> time_shift_hypotheses(const Material& material, const Subject& subject) {
   if (subject.kind != SubjectKind::output) return {};
-  const ColumnOf model_um = [output = subject.index](const MeasuredRun& run) -> const Column& {
-    return run.model_um[output];
-  };
-  if (!(material.range(model_um) > 0)) return {};
+  const double range_um =
+      material.range([output = subject.index](const MeasuredRun& run) -> const Column& {
+        return run.model_um[output];
+      });
+  if (!(range_um > 0)) return {};
   std::vector<double> shifts =
       logarithmic_grid(std::max(5.0, 0.2 * material.step_s()), shift.high, 14);
   for (std::size_t i = 0, count = shifts.size(); i < count; ++i)
     shifts.insert(shifts.begin(), -shifts[2 * i]);
   Hypothesis late{material.name_of(subject), Form::no_gain, {{std::string(shift.name), shifts}}};
   late.output = subject.index;
-  late.columns = [&material, model_um](const Shapes& shapes, std::size_t) {
-    return material.stacked([&](const MeasuredRun& run) {
-      // Interpolation averages two rows; both sides are smoothed, so that less noise is no gain.
-      const Column smooth_um = smoothed(run.time_s, model_um(run), 2.0 * material.step_s());
-      Panel all(run.rows(), std::ssize(shapes));
-      for (std::size_t i = 0; i < shapes.size(); ++i)
-        all.col(static_cast<Eigen::Index>(i)) =
-            shifted(run.time_s, smooth_um, shapes[i][0]) - smooth_um;
-      return all;
-    });
+  late.effect = [&material](const MeasuredRun& run, const Shapes& shapes, std::size_t output) {
+    // Interpolation averages two rows; both sides are smoothed, so that less noise is no gain.
+    const Column smooth_um = smoothed(run.time_s, run.model_um[output], 2.0 * material.step_s());
+    Panel all(run.rows(), std::ssize(shapes));
+    for (std::size_t i = 0; i < shapes.size(); ++i)
+      all.col(static_cast<Eigen::Index>(i)) =
+          shifted(run.time_s, smooth_um, shapes[i][0]) - smooth_um;
+    return all;
   };
   return {std::move(late)};
 }
@@ -71,21 +70,15 @@ std::vector<double> periods_of(const Material& material) {
   return periods;
 }
 
-/// A sine and a cosine for each run, those of one period after those of another.
-Panel waves(const Material& material, const Shapes& shapes) {
-  const StackedRows& rows = material.rows();
-  const Eigen::Index width = 2 * std::ssize(rows.runs);
-  Panel all = Panel::Zero(rows.time_s.size(), width * std::ssize(shapes));
-  for (std::size_t i = 0; i < shapes.size(); ++i)
-    for (std::size_t run = 0; run < rows.runs.size(); ++run) {
-      const Block& block = rows.runs[run];
-      const Eigen::Index count = block.end - block.begin;
-      const Eigen::ArrayXd angle =
-          2.0 * std::numbers::pi / shapes[i][0] * rows.time_s.segment(block.begin, count).array();
-      const auto first = width * static_cast<Eigen::Index>(i) + 2 * static_cast<Eigen::Index>(run);
-      all.col(first).segment(block.begin, count) = angle.sin();
-      all.col(first + 1).segment(block.begin, count) = angle.cos();
-    }
+/// A sine and a cosine for each of so many runs, those of one period after those of another.
+Panel waves(const MeasuredRun& run, std::size_t runs, const Shapes& shapes) {
+  Panel all = Panel::Zero(run.rows(), std::ssize(shapes) * 2 * static_cast<Eigen::Index>(runs));
+  for (std::size_t i = 0; i < shapes.size(); ++i) {
+    const Eigen::ArrayXd angle = 2.0 * std::numbers::pi / shapes[i][0] * run.time_s.array();
+    const auto first = static_cast<Eigen::Index>(2 * (runs * i + run.number));
+    all.col(first) = angle.sin();
+    all.col(first + 1) = angle.cos();
+  }
   return all;
 }
 
@@ -94,14 +87,14 @@ std::vector<Hypothesis> periodic_disturbance_hypotheses(const Material& material
   if (subject.kind != SubjectKind::output) return {};
   const std::vector<double> periods = periods_of(material);
   if (periods.empty()) return {};
+  const std::size_t runs = material.data().runs.size();
   std::vector<std::string> gains;
-  for (std::size_t run = 0; run < material.data().runs.size(); ++run)
-    gains.insert(gains.end(), {"sine_um", "cosine_um"});
+  for (std::size_t run = 0; run < runs; ++run) gains.insert(gains.end(), {"sine_um", "cosine_um"});
   Hypothesis period{
       material.name_of(subject), Form::own_gains, {{"period_s", periods, true, false}}, gains};
   period.output = subject.index;
-  period.columns = [&material](const Shapes& shapes, std::size_t) {
-    return waves(material, shapes);
+  period.effect = [runs](const MeasuredRun& run, const Shapes& shapes, std::size_t) {
+    return waves(run, runs, shapes);
   };
   return {std::move(period)};
 }
@@ -144,8 +137,8 @@ std::vector<Hypothesis> displacement_step_hypotheses(const Material& material,
       {"step_um"},
       subject.index,
       run};
-  step.columns = [&material, run](const Shapes& shapes, std::size_t) {
-    return material.in_run(run, since(material.data().runs[run].time_s, firsts_of(shapes)));
+  step.effect = [](const MeasuredRun& of, const Shapes& shapes, std::size_t) {
+    return since(of.time_s, firsts_of(shapes));
   };
   return {std::move(step)};
 }
@@ -171,9 +164,8 @@ std::vector<Hypothesis> displacement_drift_hypotheses(const Material& material,
   if (subject.kind != SubjectKind::output_in_run) return {};
   Hypothesis drift{material.name_of(subject), Form::own_gains, {},
                    {"rate_um_per_h"},         subject.index,   subject.run};
-  drift.columns = [&material, run = subject.run](const Shapes&, std::size_t) {
-    const MeasuredRun& of = material.data().runs[run];
-    return material.in_run(run, (of.time_s.array() - of.time_s[of.begin]) / 3600.0);
+  drift.effect = [](const MeasuredRun& run, const Shapes&, std::size_t) -> Column {
+    return (run.time_s.array() - run.time_s[run.begin]) / 3600.0;
   };
   return {std::move(drift)};
 }

@@ -23,25 +23,24 @@ std::vector<Hypothesis> missing_heat_source_hypotheses(const Material& material,
                   {{std::string(tau.name), material.lag_times_s(tau.low, tau.high, 22), true},
                    {std::string(power.name), {power.low, power.high}, false, true}},
                   {"gain_um_per_unit"}};
-  const auto columns = [&material, signal = material.values_of(subject)](ColumnOf room_K) {
-    return [&material, signal, room_K = std::move(room_K)](const Shapes& shapes, std::size_t) {
-      return material.stacked([&](const MeasuredRun& run) {
-        Panel all(run.rows(), (room_K ? 2 : 1) * std::ssize(shapes));
-        Eigen::Index column = 0;
-        for (const Shape& shape : shapes) {
-          all.col(column++) = lagged(run.time_s, signal(run).array().pow(shape[1]), shape[0]);
-          if (room_K) all.col(column++) = lagged(run.time_s, room_K(run), shape[0]);
-        }
-        return all;
-      });
+  const auto effect = [signal = material.values_of(subject)](ColumnOf room_K) {
+    return [signal, room_K = std::move(room_K)](const MeasuredRun& run, const Shapes& shapes,
+                                                std::size_t) {
+      Panel all(run.rows(), (room_K ? 2 : 1) * std::ssize(shapes));
+      Eigen::Index column = 0;
+      for (const Shape& shape : shapes) {
+        all.col(column++) = lagged(run.time_s, signal(run).array().pow(shape[1]), shape[0]);
+        if (room_K) all.col(column++) = lagged(run.time_s, room_K(run), shape[0]);
+      }
+      return all;
     };
   };
-  heat.columns = columns({});
+  heat.effect = effect({});
   const std::optional<Subject> room = material.room();
   if (!room || room->kind != SubjectKind::other_temperature) return {std::move(heat)};
   Hypothesis with_room = heat;
   with_room.gains.emplace_back("gain_um_per_K");
-  with_room.columns = columns(material.values_of(*room));
+  with_room.effect = effect(material.values_of(*room));
   with_room.log_prior = log_prior_of_room;
   with_room.simpler_cause = "missing_temperature";
   with_room.simpler_subject = material.name_of(*room);
@@ -121,9 +120,9 @@ std::vector<Hypothesis> speed_growth_hypotheses(const Material& material, const 
   const auto unit = unit_of(material.name_of(subject)).suffix;
   if (unit != "_rpm" && unit != "_mm_per_min" && !unit.empty()) return {};
   Hypothesis growth{material.name_of(subject), Form::own_gains, {}, {"gain_um_per_unit2"}};
-  growth.columns = [&material, values = material.values_of(subject)](const Shapes&, std::size_t) {
-    return material.stacked(
-        [&](const MeasuredRun& run) -> Column { return values(run).array().square(); });
+  growth.effect = [values = material.values_of(subject)](const MeasuredRun& run, const Shapes&,
+                                                         std::size_t) -> Column {
+    return values(run).array().square();
   };
   return {std::move(growth)};
 }

@@ -34,16 +34,13 @@ Hypothesis of_reading_fault(const Material& material, const Subject& subject,
                 {fault.gain}};
   of.run = subject.run;
   of.sensor = subject.index;
-  const auto errors_K = [&material, &run, input = subject.index,
-                         error = fault.error](const Shapes& shapes) {
-    return error(material.data(), run, input, firsts_of(shapes));
+  of.errors_K = [&material, input = subject.index, error = fault.error](const MeasuredRun& faulty,
+                                                                        const Shapes& shapes) {
+    return error(material.data(), faulty, input, firsts_of(shapes));
   };
-  of.errors_K = [&material, number = subject.run, errors_K](const Shapes& shapes) {
-    return material.in_run(number, errors_K(shapes));
-  };
-  of.columns = [&material, &run, subject, errors_K](const Shapes& shapes, std::size_t output) {
-    return material.in_run(subject.run, -answer_to_errors(material.data(), run, output,
-                                                          subject.index, errors_K(shapes)));
+  of.effect = [&material, input = subject.index, errors_K = of.errors_K](
+                  const MeasuredRun& faulty, const Shapes& shapes, std::size_t output) -> Panel {
+    return -answer_to_errors(material.data(), faulty, output, input, errors_K(faulty, shapes));
   };
   return of;
 }
@@ -218,12 +215,11 @@ Cause sensor_loose() {
 Hypothesis exchanged(const Material& material, std::size_t input, std::size_t other) {
   const MeasuredData& data = material.data();
   Hypothesis swap{data.model.inputs[input] + "|" + data.model.inputs[other], Form::no_gain};
-  swap.columns = [&material, &data, input, other](const Shapes&, std::size_t output) {
-    return material.stacked([&](const MeasuredRun& run) -> Panel {
-      const Panel more_K = run.denoised_K[other] - run.denoised_K[input];
-      return answer_to_errors(data, run, output, input, more_K) +
-             answer_to_errors(data, run, output, other, -more_K);
-    });
+  swap.effect = [&data, input, other](const MeasuredRun& run, const Shapes&,
+                                      std::size_t output) -> Panel {
+    const Panel more_K = run.denoised_K[other] - run.denoised_K[input];
+    return answer_to_errors(data, run, output, input, more_K) +
+           answer_to_errors(data, run, output, other, -more_K);
   };
   return swap;
 }

@@ -13,9 +13,8 @@ std::vector<Hypothesis> wrong_coefficient_hypotheses(const Material& material,
                                                      const Subject& subject) {
   if (subject.kind != SubjectKind::input) return {};
   Hypothesis wrong{material.name_of(subject), Form::own_gains, {}, {"delta_um_per_K"}};
-  wrong.columns = [&material, rise_K = material.values_of(subject)](const Shapes&, std::size_t) {
-    return material.stacked(rise_K);
-  };
+  wrong.effect = [rise_K = material.values_of(subject)](const MeasuredRun& run, const Shapes&,
+                                                        std::size_t) { return rise_K(run); };
   return {std::move(wrong)};
 }
 
@@ -56,11 +55,9 @@ std::vector<Hypothesis> thermal_lag_hypotheses(const Material& material, const S
       Form::own_gains,
       {{std::string(lag_tau.name), material.lag_times_s(lag_tau.low, lag_tau.high, 20), true}},
       {"gain_um_per_K"}};
-  lag.columns = [&material, rise_K = material.values_of(subject)](const Shapes& shapes,
-                                                                  std::size_t) {
-    return material.stacked([&](const MeasuredRun& run) -> Panel {
-      return lagged(run.time_s, rise_K(run), firsts_of(shapes)).colwise() - rise_K(run);
-    });
+  lag.effect = [rise_K = material.values_of(subject)](const MeasuredRun& run, const Shapes& shapes,
+                                                      std::size_t) -> Panel {
+    return lagged(run.time_s, rise_K(run), firsts_of(shapes)).colwise() - rise_K(run);
   };
   if (material.data().model.guideways.empty()) lag.bounds = lag_shares_of(material, subject.index);
   return {std::move(lag)};
@@ -90,10 +87,9 @@ std::vector<Hypothesis> missing_temperature_hypotheses(const Material& material,
                      Form::own_gains,
                      {{std::string(missing_tau.name), taus_s, true}},
                      {"gain_um_per_K"}};
-  missing.columns = [&material, rise_K = material.values_of(subject)](const Shapes& shapes,
-                                                                      std::size_t) {
-    return material.stacked(
-        [&](const MeasuredRun& run) { return lagged(run.time_s, rise_K(run), firsts_of(shapes)); });
+  missing.effect = [rise_K = material.values_of(subject)](const MeasuredRun& run,
+                                                          const Shapes& shapes, std::size_t) {
+    return lagged(run.time_s, rise_K(run), firsts_of(shapes));
   };
   return {std::move(missing)};
 }
@@ -116,9 +112,9 @@ std::vector<Hypothesis> nonlinear_expansion_hypotheses(const Material& material,
   if (subject.kind != SubjectKind::input && subject.kind != SubjectKind::other_temperature)
     return {};
   Hypothesis square{material.name_of(subject), Form::own_gains, {}, {"gain_um_per_K2"}};
-  square.columns = [&material, rise_K = material.values_of(subject)](const Shapes&, std::size_t) {
-    return material.stacked(
-        [&](const MeasuredRun& run) -> Column { return rise_K(run).array().square(); });
+  square.effect = [rise_K = material.values_of(subject)](const MeasuredRun& run, const Shapes&,
+                                                         std::size_t) -> Column {
+    return rise_K(run).array().square();
   };
   return {std::move(square)};
 }
@@ -143,13 +139,11 @@ Hypothesis along_axis(const Material& material, const Subject& place, const Subj
   along.simpler_cause =
       place.kind == SubjectKind::input ? "wrong_coefficient" : "missing_temperature";
   along.simpler_subject = temperature;  // without the position
-  along.columns = [&material, rise_K = material.values_of(place),
-                   position_mm = material.values_of(position)](const Shapes&, std::size_t) {
-    return material.stacked([&](const MeasuredRun& run) {
-      Panel both(run.rows(), 2);
-      both << position_mm(run).cwiseProduct(rise_K(run)), rise_K(run);
-      return both;
-    });
+  along.effect = [rise_K = material.values_of(place), position_mm = material.values_of(position)](
+                     const MeasuredRun& run, const Shapes&, std::size_t) {
+    Panel both(run.rows(), 2);
+    both << position_mm(run).cwiseProduct(rise_K(run)), rise_K(run);
+    return both;
   };
   return along;
 }
@@ -233,20 +227,17 @@ Hypothesis by_start(const Material& material, const Subject& subject, std::size_
   if (now) by.shape[1].grid = {0.0};
   by.simpler_cause = is_signal ? "missing_heat_source" : "wrong_coefficient";
   by.simpler_subject = material.name_of(subject);
-  by.columns = [&material, place, now, values = material.values_of(subject)](const Shapes& shapes,
-                                                                             std::size_t) {
-    return material.stacked([&](const MeasuredRun& run) {
-      const Panel late = lagged(run.time_s, values(run), firsts_of(shapes));
-      const double start_degC = run.reference_degC[place] - usual_degC;
-      Panel all(run.rows(), 2 * std::ssize(shapes));
-      for (Eigen::Index i = 0; i < std::ssize(shapes); ++i) {
-        Column above_K = Column::Constant(run.rows(), start_degC);
-        if (now) above_K += now(run);
-        all.col(2 * i) = above_K.cwiseProduct(late.col(i));
-        all.col(2 * i + 1) = late.col(i);
-      }
-      return all;
-    });
+  by.effect = [place, now, values = material.values_of(subject)](
+                  const MeasuredRun& run, const Shapes& shapes, std::size_t) {
+    const Panel late = lagged(run.time_s, values(run), firsts_of(shapes));
+    Column above_K = Column::Constant(run.rows(), run.reference_degC[place] - usual_degC);
+    if (now) above_K += now(run);
+    Panel all(run.rows(), 2 * late.cols());
+    for (Eigen::Index i = 0; i < late.cols(); ++i) {
+      all.col(2 * i) = above_K.cwiseProduct(late.col(i));
+      all.col(2 * i + 1) = late.col(i);
+    }
+    return all;
   };
   return by;
 }
@@ -296,15 +287,14 @@ std::vector<Hypothesis> slow_sensor_hypotheses(const Material& material, const S
                   Form::no_gain,
                   {{std::string(sensor_tau.name),
                     material.lag_times_s(sensor_tau.low, sensor_tau.high, 16), true}}};
-  slow.columns = [&material, input = subject.index](const Shapes& shapes, std::size_t output) {
-    return material.stacked([&](const MeasuredRun& run) {
-      // A reading that is late misses sensor_tau times its slope.
-      Panel missed_K(run.rows(), std::ssize(shapes));
-      for (std::size_t i = 0; i < shapes.size(); ++i)
-        missed_K.col(static_cast<Eigen::Index>(i)) =
-            shapes[i][0] * slope(run.time_s, run.temps_K[input], slope_smoothing * shapes[i][0]);
-      return answer_to_errors(material.data(), run, output, input, missed_K);
-    });
+  slow.effect = [&material, input = subject.index](const MeasuredRun& run, const Shapes& shapes,
+                                                   std::size_t output) {
+    // A reading that is late misses sensor_tau times its slope.
+    Panel missed_K(run.rows(), std::ssize(shapes));
+    for (std::size_t i = 0; i < shapes.size(); ++i)
+      missed_K.col(static_cast<Eigen::Index>(i)) =
+          shapes[i][0] * slope(run.time_s, run.temps_K[input], slope_smoothing * shapes[i][0]);
+    return answer_to_errors(material.data(), run, output, input, missed_K);
   };
   return {std::move(slow)};
 }
@@ -356,29 +346,26 @@ std::vector<Hypothesis> play_of_input(const Material& material, const Subject& s
   Hypothesis play{material.name_of(subject),
                   Form::no_gain,
                   {{"width_K", linear_grid(0.04 * range_K, 0.8 * range_K, 16)}}};
-  play.columns = [&material, input = subject.index](const Shapes& shapes, std::size_t output) {
-    return material.stacked([&](const MeasuredRun& run) {
-      return answer_to_errors(material.data(), run, output, input,
-                              played_less_values(run.denoised_K[input], firsts_of(shapes)));
-    });
+  play.effect = [&material, input = subject.index](const MeasuredRun& run, const Shapes& shapes,
+                                                   std::size_t output) {
+    return answer_to_errors(material.data(), run, output, input,
+                            played_less_values(run.denoised_K[input], firsts_of(shapes)));
   };
   return {std::move(play)};
 }
 
 std::vector<Hypothesis> play_of_output(const Material& material, const Subject& subject) {
-  const ColumnOf model_um = [output = subject.index](const MeasuredRun& run) -> const Column& {
-    return run.model_um[output];
-  };
-  const double range_um = material.range(model_um);
+  const double range_um =
+      material.range([output = subject.index](const MeasuredRun& run) -> const Column& {
+        return run.model_um[output];
+      });
   if (!(range_um > 0)) return {};
   Hypothesis play{material.name_of(subject),
                   Form::no_gain,
                   {{"width_um", linear_grid(0.03 * range_um, 0.7 * range_um, 20)}}};
   play.output = subject.index;
-  play.columns = [&material, model_um](const Shapes& shapes, std::size_t) {
-    return material.stacked([&](const MeasuredRun& run) {
-      return played_less_values(denoised(run.time_s, model_um(run)), firsts_of(shapes));
-    });
+  play.effect = [](const MeasuredRun& run, const Shapes& shapes, std::size_t output) {
+    return played_less_values(denoised(run.time_s, run.model_um[output]), firsts_of(shapes));
   };
   return {std::move(play)};
 }

@@ -57,8 +57,7 @@ void take_displacements(const RunFile& file, const std::vector<std::size_t>& row
   }
 }
 
-MeasuredRun measured_run(const RunFile& file, const std::string& name, const MeasuredData& data,
-                         Purpose purpose) {
+MeasuredRun measured_run(const RunFile& file, const std::string& name, const MeasuredData& data) {
   const ModelInputs inputs = model_inputs(data.model, file);
   std::vector<std::size_t> rows = inputs.rows;
   rows.erase(std::lower_bound(rows.begin(), rows.end(), file.selected_end), rows.end());
@@ -77,7 +76,7 @@ MeasuredRun measured_run(const RunFile& file, const std::string& name, const Mea
                                      ? inputs.reference_degC[i]
                                      : first_value(temps_degC).value_or(0.0));
     run.temps_K.push_back(taken(temps_degC, rows).array() - run.reference_degC[i]);
-    if (purpose == Purpose::search) run.denoised_K.push_back(denoised(run.time_s, run.temps_K[i]));
+    run.denoised_K.push_back(denoised(run.time_s, run.temps_K[i]));
   }
   for (const std::string& signal : data.signals)
     run.signals.push_back(taken(file.column(signal), rows));
@@ -159,6 +158,7 @@ void MeasuredData::add(MeasuredRun run) {
   rows.runs.push_back({begin, begin + count});
   rows.time_s.conservativeResize(begin + count);
   rows.time_s.tail(count) = run.time_s.tail(count);
+  run.number = runs.size();
   runs.push_back(std::move(run));
 }
 
@@ -175,11 +175,9 @@ Column MeasuredData::coefficient(const MeasuredRun& run, std::size_t output,
 }
 
 MeasuredData measured_data(const ThermalModel& model, const std::vector<RunFile>& runs,
-                           const std::vector<std::string>& names, const SharedColumns& columns,
-                           Purpose purpose) {
+                           const std::vector<std::string>& names, const SharedColumns& columns) {
   MeasuredData data{model, columns.temperatures, columns.signals, {}, {}, {}, coefficient_sd};
-  for (std::size_t i = 0; i < runs.size(); ++i)
-    data.add(measured_run(runs[i], names[i], data, purpose));
+  for (std::size_t i = 0; i < runs.size(); ++i) data.add(measured_run(runs[i], names[i], data));
   return data;
 }
 

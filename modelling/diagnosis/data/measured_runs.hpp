@@ -23,16 +23,16 @@ struct Block {
 /// One run: its rows in which no input of the model is missing, from the file's first such row to
 /// the end of the selection. Missing values of other columns are held at the last one.
 struct MeasuredRun {
-  std::string name;  ///< the argument as given
+  std::string name;       ///< the argument as given
+  std::size_t number{0};  ///< among MeasuredData::runs
   Column time_s;
-  Eigen::Index begin{0};        ///< first selected row
-  std::vector<Column> temps_K;  ///< rise over the reference, order of MeasuredData::temperatures
-  std::vector<double> reference_degC;  ///< the same order
-  std::vector<Column>
-      denoised_K;                ///< temps_K without the noise of single values; training runs only
-  std::vector<Column> signals;   ///< order of MeasuredData::signals
-  std::vector<Column> model_um;  ///< order of the outputs, relative to the output's first row
-  std::vector<Column> measured_um;  ///< the same; NaN: missing
+  Eigen::Index begin{0};               ///< first selected row
+  std::vector<Column> temps_K;         ///< rises, order of MeasuredData::temperatures
+  std::vector<double> reference_degC;  ///< where the rises are 0
+  std::vector<Column> denoised_K;      ///< temps_K without the noise of single values
+  std::vector<Column> signals;         ///< order of MeasuredData::signals
+  std::vector<Column> model_um;        ///< order of the outputs, relative to the output's first row
+  std::vector<Column> measured_um;     ///< the same; NaN: missing
   [[nodiscard]] Eigen::Index rows() const { return time_s.size(); }
 };
 
@@ -77,15 +77,13 @@ struct SharedColumns {
 [[nodiscard]] std::vector<Column> model_over(const ThermalModel& model, const MeasuredRun& run,
                                              const MeasuredData& data);
 
-enum class Purpose { search, comparison };
-
 /// @param names  the runs' arguments as given
 /// @throws ConfigurationError when a run lacks an input or signal of the model, or has no measured
 ///         value of any output
 [[nodiscard]] MeasuredData measured_data(const ThermalModel& model,
                                          const std::vector<RunFile>& runs,
                                          const std::vector<std::string>& names,
-                                         const SharedColumns& columns, Purpose purpose);
+                                         const SharedColumns& columns);
 
 /// Place of the room's temperature: one that the model does not use, else one of its inputs;
 /// nullopt: none is called so.
@@ -93,14 +91,17 @@ enum class Purpose { search, comparison };
 
 /// Columns over the stacked rows.
 /// @param make  of a run: all its rows, a column or shape (rows, m)
+/// @param only  if given, the other runs are 0
 /// @return shape (stacked rows, m)
 template <class Make>
-[[nodiscard]] Panel stacked(const MeasuredData& data, Make make) {
+[[nodiscard]] Panel stacked(const MeasuredData& data, Make make,
+                            std::optional<std::size_t> only = std::nullopt) {
   Panel all;
   for (std::size_t i = 0; i < data.runs.size(); ++i) {
+    if (only && *only != i) continue;
     const Panel whole = make(data.runs[i]);
     const Block& block = data.rows.runs[i];
-    if (all.size() == 0) all.resize(data.rows.time_s.size(), whole.cols());
+    if (all.size() == 0) all.setZero(data.rows.time_s.size(), whole.cols());
     all.middleRows(block.begin, block.end - block.begin) =
         whole.bottomRows(block.end - block.begin);
   }

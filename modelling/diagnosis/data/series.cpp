@@ -103,12 +103,6 @@ Column slope(const Column& time_s, const Column& values, double tau_s) {
   return out;
 }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + std::ssize(values) / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 std::vector<double> logarithmic_grid(double low, double high, std::size_t count) {
   std::vector<double> grid;
   for (std::size_t i = 0; i < count; ++i)

@@ -34,9 +34,6 @@ using Panel = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMa
 /// The derivative [1/s] of the values smoothed with tau_s.
 [[nodiscard]] Column slope(const Column& time_s, const Column& values, double tau_s);
 
-/// @pre at least one
-[[nodiscard]] double median(std::vector<double> values);
-
 /// `count` values from low to high, each the same factor after the one before, or the same step.
 [[nodiscard]] std::vector<double> logarithmic_grid(double low, double high, std::size_t count);
 [[nodiscard]] std::vector<double> linear_grid(double low, double high, std::size_t count);

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "config/runs/robust.hpp"
+
 namespace thermocomp::diagnosis {
 
 Panel centred_in(const std::vector<Block>& runs, Panel columns) {

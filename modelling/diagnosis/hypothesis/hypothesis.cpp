@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "config/runs/robust.hpp"
 #include "estimator/checks.hpp"
 #include "modelling/diagnosis/data/measured_runs.hpp"
 
@@ -174,13 +175,6 @@ std::vector<double> Material::onsets_s(std::size_t run, double first, double las
   std::sort(onsets.begin(), onsets.end());
   onsets.erase(std::unique(onsets.begin(), onsets.end()), onsets.end());
   return onsets;
-}
-
-Panel Material::in_run(std::size_t run, const Panel& whole) const {
-  const Block& block = data_.rows.runs[run];
-  Panel all = Panel::Zero(data_.rows.time_s.size(), whole.cols());
-  all.middleRows(block.begin, block.end - block.begin) = whole.bottomRows(block.end - block.begin);
-  return all;
 }
 
 Panel since(const Column& time_s, const std::vector<double>& onsets_s) {

@@ -72,8 +72,10 @@ struct Hypothesis {
   std::vector<std::string> gains{};     ///< names of the gains, one a column
   std::optional<std::size_t> output{};  ///< acts on this output alone
   std::optional<std::size_t> run{};     ///< a fault of this run alone
-  /// Displacement of an output over the stacked rows, the columns of one shape after those of
+  /// Displacement of an output over all rows of a run, the columns of one shape after those of
   /// another: shape (rows, width() shapes).
+  std::function<Panel(const MeasuredRun& run, const Shapes& shapes, std::size_t output)> effect{};
+  /// The same over the stacked rows, 0 in runs in which it does not act. Set by the catalogue.
   std::function<Panel(const Shapes& shapes, std::size_t output)> columns{};
   /// What is physically possible of a gain; empty: everything is.
   std::function<Interval(std::size_t output)> bounds{};
@@ -90,8 +92,8 @@ struct Hypothesis {
 
   // Of a fault of one reading:
   std::optional<std::size_t> sensor{};  ///< the input
-  /// Its error for a gain of 1 [K] over the stacked rows, one column a shape.
-  std::function<Panel(const Shapes& shapes)> errors_K{};
+  /// Its error for a gain of 1 [K] over all rows of the run, one column a shape.
+  std::function<Panel(const MeasuredRun& run, const Shapes& shapes)> errors_K{};
   bool shrinks_reading{false};  ///< the error is in proportion to the reading
 
   /// Columns for one shape: as many as gains, or one.
@@ -136,7 +138,6 @@ class Material {
   explicit Material(const MeasuredData& data);
 
   [[nodiscard]] const MeasuredData& data() const noexcept { return data_; }
-  [[nodiscard]] const StackedRows& rows() const noexcept { return data_.rows; }
   /// Median step between two rows.
   [[nodiscard]] double step_s() const noexcept { return step_s_; }
   /// Of the longest run.
@@ -167,16 +168,6 @@ class Material {
   /// @param values  of all rows of the run; NaN: missing
   [[nodiscard]] std::vector<double> onsets_s(std::size_t run, double first, double last,
                                              std::size_t count, const Column& values) const;
-
-  /// As stacked() of all runs.
-  template <class Make>
-  [[nodiscard]] Panel stacked(Make make) const {
-    return diagnosis::stacked(data_, make);
-  }
-
-  /// @param whole  of one run: all its rows
-  /// @return the same over the stacked rows, zero in the other runs
-  [[nodiscard]] Panel in_run(std::size_t run, const Panel& whole) const;
 
  private:
   const MeasuredData& data_;

@@ -328,7 +328,9 @@ std::vector<Explanation> Fits::trials(const Hypothesis& hypothesis, const Shapes
   Eigen::VectorXd shrunk = Eigen::VectorXd::Zero(std::ssize(shapes));
   if (hypothesis.sensor) {
     const OutputFit& reading = readings_.of(*hypothesis.sensor);
-    const Panel errors_K = reading.rows().means_of(hypothesis.errors_K(shapes));
+    const Panel errors_K = reading.rows().means_of(stacked(
+        data_, [&](const MeasuredRun& run) { return hypothesis.errors_K(run, shapes); },
+        hypothesis.run));
     of_reading = reading.equations(errors_K, 1);
     if (hypothesis.shrinks_reading)
       shrunk = (errors_K.array() != 0.0).cast<double>().colwise().sum().transpose();

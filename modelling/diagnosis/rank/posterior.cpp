@@ -123,46 +123,49 @@ Posterior weigh_against_each_other(std::vector<Explanation>& explanations, Round
   return posterior;
 }
 
-Choice likeliest(const std::vector<Explanation>& explanations, const PlaceGroups& groups) {
-  const auto of_group = [&](const Explanation& centre) {
-    Choice choice;
-    double best = -1.0;
-    for (std::size_t i = 0; i < explanations.size(); ++i) {
-      const Explanation& each = explanations[i];
-      if (each.hypothesis->cause != centre.hypothesis->cause ||
-          !same_places(groups, centre.hypothesis->subject, each.hypothesis->subject))
-        continue;
-      choice.probability += each.probability;
-      if (each.probability <= best) continue;
-      best = each.probability;
-      choice.index = i;
-    }
-    return choice;
-  };
+namespace {
+
+/// The likeliest of the explanations that `accept` takes, and the sum of their probabilities.
+template <class Accept>
+Choice sum_of(const std::vector<Explanation>& explanations, Accept accept) {
   Choice choice;
-  std::map<std::string, double> causes;
-  for (const Explanation& each : explanations) {
-    causes[each.hypothesis->cause] += each.probability;
-    if (each.probability < 1e-6) continue;
-    if (Choice other = of_group(each); other.probability > choice.probability) choice = other;
-  }
-  if (choice.probability >= likelier_than_not) return choice;
-  const auto cause =
-      std::max_element(causes.begin(), causes.end(),
-                       [](const auto& a, const auto& b) { return a.second < b.second; });
-  if (cause == causes.end() || cause->second < likelier_than_not) return choice;
-  choice = {0, cause->second, {}};
   double best = -1.0;
-  for (std::size_t i = 0; i < explanations.size(); ++i)
-    if (explanations[i].hypothesis->cause == cause->first && explanations[i].probability > best) {
-      best = explanations[i].probability;
-      choice.index = i;
-    }
-  for (const Explanation& each : explanations)
-    if (each.hypothesis->cause == cause->first && each.probability > as_likely_min * best &&
-        each.hypothesis->subject != explanations[choice.index].hypothesis->subject)
-      choice.other_subjects.push_back(each.hypothesis->subject);
+  for (std::size_t i = 0; i < explanations.size(); ++i) {
+    const Explanation& each = explanations[i];
+    if (!accept(*each.hypothesis)) continue;
+    choice.probability += each.probability;
+    if (each.probability <= best) continue;
+    best = each.probability;
+    choice.index = i;
+  }
   return choice;
+}
+
+}  // namespace
+
+Choice likeliest(const std::vector<Explanation>& explanations, const PlaceGroups& groups) {
+  Choice of_place;
+  Choice of_cause;
+  for (const Explanation& each : explanations) {
+    if (each.probability < 1e-6) continue;
+    const Hypothesis& centre = *each.hypothesis;
+    const auto same_cause = [&](const Hypothesis& of) { return of.cause == centre.cause; };
+    const Choice place = sum_of(explanations, [&](const Hypothesis& of) {
+      return same_cause(of) && same_places(groups, centre.subject, of.subject);
+    });
+    if (place.probability > of_place.probability) of_place = place;
+    const Choice cause = sum_of(explanations, same_cause);
+    if (cause.probability > of_cause.probability) of_cause = cause;
+  }
+  if (of_place.probability >= likelier_than_not || of_cause.probability < likelier_than_not)
+    return of_place;
+  const Explanation& best = explanations[of_cause.index];
+  for (const Explanation& each : explanations)
+    if (each.hypothesis->cause == best.hypothesis->cause &&
+        each.hypothesis->subject != best.hypothesis->subject &&
+        each.probability > as_likely_min * best.probability)
+      of_cause.other_subjects.push_back(each.hypothesis->subject);
+  return of_cause;
 }
 
 }  // namespace thermocomp::diagnosis

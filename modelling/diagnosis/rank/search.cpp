@@ -150,28 +150,27 @@ class Search {
 
   SearchResult run() {
     SearchResult result;
-    std::vector<double> left_before;
+    std::vector<Remainder> before;
     for (std::size_t round = 0; round < findings_max; ++round) {
       const Fits fits = fits_beside(explanations_of(result.findings));
-      if (round == 0) {
-        left_before = structure_left(fits);
-        result.noise_share = noise_shares(fits);
-        result.unexplained = is_structure(fits, left_before);
-      }
+      if (round == 0) before = remainders(fits);
       if (!add_finding(fits, round, result)) break;
     }
-    std::vector<double> left = left_before;
+    std::vector<Remainder> after = before;
     if (!result.findings.empty()) {
       settle_together(result.findings);
-      result.unexplained = result.unexplained && result.findings.empty();
       const Fits fits = fits_beside(explanations_of(result.findings));
-      left = structure_left(fits);
-      for (std::size_t output = 0; output < data_.model.outputs.size(); ++output)
+      after = remainders(fits);
+      for (std::size_t output = 0; output < after.size(); ++output)
         result.coefficient_errors.push_back(fits.coefficient_errors(output));
     }
-    for (std::size_t output = 0; output < left.size(); ++output)
+    for (std::size_t output = 0; output < before.size(); ++output) {
+      const Remainder& of = before[output];
+      result.noise_share.push_back(of.noise_share);
       result.unexplained_share.push_back(
-          left_before[output] > 0 ? std::min(1.0, left[output] / left_before[output]) : 0.0);
+          of.structure > 0 ? std::min(1.0, after[output].structure / of.structure) : 0.0);
+      result.unexplained = result.unexplained || (of.is_large && result.findings.empty());
+    }
     return result;
   }
 
@@ -188,37 +187,26 @@ class Search {
     return Fits(data_, readings_, accepted);
   }
 
-  /// Variance of each output above that of the noise.
-  std::vector<double> structure_left(const Fits& fits) const {
-    std::vector<double> left;
-    for (std::size_t output = 0; output < data_.model.outputs.size(); ++output) {
-      left.push_back(0.0);
+  /// What is left of an output.
+  struct Remainder {
+    double structure{0.0};    ///< variance above that of the noise
+    double noise_share{1.0};  ///< of the variance
+    bool is_large{false};     ///< the structure, against noise and motion
+  };
+
+  std::vector<Remainder> remainders(const Fits& fits) const {
+    std::vector<Remainder> all(data_.model.outputs.size());
+    for (std::size_t output = 0; output < all.size(); ++output) {
       if (!fits.measured(output)) continue;
       const double rms = fits.rms_left(output);
       const double noise = fits.output(output).noise();
-      left.back() = std::max(0.0, rms * rms - noise * noise);
+      Remainder& of = all[output];
+      of.structure = std::max(0.0, rms * rms - noise * noise);
+      of.noise_share = std::min(1.0, std::pow(noise / std::max(1e-12, rms), 2));
+      of.is_large = std::sqrt(of.structure) > structure_over_noise * noise &&
+                    std::sqrt(of.structure) > structure_of_motion * motion_of(data_, output);
     }
-    return left;
-  }
-
-  std::vector<double> noise_shares(const Fits& fits) const {
-    std::vector<double> shares;
-    for (std::size_t output = 0; output < data_.model.outputs.size(); ++output)
-      shares.push_back(fits.measured(output)
-                           ? std::min(1.0, std::pow(fits.output(output).noise() /
-                                                        std::max(1e-12, fits.rms_left(output)),
-                                                    2))
-                           : 1.0);
-    return shares;
-  }
-
-  bool is_structure(const Fits& fits, const std::vector<double>& left) const {
-    for (std::size_t output = 0; output < left.size(); ++output)
-      if (fits.measured(output) &&
-          std::sqrt(left[output]) > structure_over_noise * fits.output(output).noise() &&
-          std::sqrt(left[output]) > structure_of_motion * motion_of(data_, output))
-        return true;
-    return false;
+    return all;
   }
 
   bool matters(const Fits& fits, const Explanation& explanation) const {

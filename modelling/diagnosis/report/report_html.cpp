@@ -12,7 +12,6 @@ namespace thermocomp::diagnosis {
 namespace {
 
 constexpr double support_reported_min = 0.05;
-constexpr std::size_t candidates_reported = 3;
 /// A share of what the model leaves that is worth an advice.
 constexpr double share_reported_min = 0.25;
 

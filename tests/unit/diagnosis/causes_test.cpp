@@ -162,8 +162,8 @@ TEST_CASE("what a cause is tried with lies within its physical range", "[diagnos
   model.matrix_um_per_K = {{5.0, 1.0}};
   const std::vector<RunFile> runs = {machine_run(900), machine_run(900, 18.0),
                                      machine_run(900, 23.0)};
-  const MeasuredData data = measured_data(model, runs, {"1.csv", "2.csv", "3.csv"},
-                                          shared_columns(model, runs), Purpose::search);
+  const MeasuredData data =
+      measured_data(model, runs, {"1.csv", "2.csv", "3.csv"}, shared_columns(model, runs));
   Names tried;
   for (const Hypothesis& each : hypotheses(data)) {
     const Cause& cause = cause_named(each.cause);

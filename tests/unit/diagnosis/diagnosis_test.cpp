@@ -72,8 +72,8 @@ FoundGain found_gain(Hidden hidden) {
   // Without the speed, whose heat would be as good a name.
   runs[0].columns.erase(runs[0].columns.begin() + 2);
   runs[0].values.erase(runs[0].values.begin() + 2);
-  const MeasuredData data = measured_data(one_input(), runs, {"train.csv"},
-                                          shared_columns(one_input(), runs), Purpose::search);
+  const MeasuredData data =
+      measured_data(one_input(), runs, {"train.csv"}, shared_columns(one_input(), runs));
   const std::vector<Hypothesis> all = hypotheses(data);
   const SearchResult result = search(data, all);
   REQUIRE_FALSE(result.findings.empty());

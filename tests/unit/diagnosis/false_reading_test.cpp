@@ -70,7 +70,7 @@ ThermalModel model_with_bank() {
 
 MeasuredData data_of(const ThermalModel& model, int rows) {
   const std::vector<RunFile> runs = {two_bodies(rows)};
-  return measured_data(model, runs, {"run.csv"}, shared_columns(model, runs), Purpose::search);
+  return measured_data(model, runs, {"run.csv"}, shared_columns(model, runs));
 }
 
 }  // namespace
@@ -105,7 +105,7 @@ TEST_CASE("faults of a reading have the columns that a prediction with them has"
     if (!fault.sensor || *fault.sensor != 0) continue;
     const Shape shape = {fault.shape[0].grid[fault.shape[0].grid.size() / 3]};
     MeasuredRun wrong = run;
-    wrong.temps_K[0] += fault.errors_K({shape}).col(0);
+    wrong.temps_K[0] += fault.errors_K(run, {shape}).col(0);
     const Column missing_um = right_um - model_over(model, wrong, data)[0];
     INFO(fault.cause);
     CHECK((fault.columns({shape}, 0).col(0) - missing_um).cwiseAbs().maxCoeff() < 1e-9);
