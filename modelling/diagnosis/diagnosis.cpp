@@ -114,9 +114,10 @@ void add_remainder(ThermalModel& model, const RemainderBank& remainder) {
 /// Adds a bank of lags for the outputs of which enough can be predicted without a name.
 /// @return of each output the share that can
 std::vector<double> add_remainder_bank(Diagnosis& diagnosis, Extended& extended,
-                                       const MeasuredData& train, const MeasuredData& test) {
+                                       const MeasuredData& train, const MeasuredData& test,
+                                       const std::vector<bool>& fitted) {
   std::vector<double> predictable;
-  diagnosis.remainder = remainder_bank(train, residuals(extended, train), predictable);
+  diagnosis.remainder = remainder_bank(train, residuals(extended, train), fitted, predictable);
   if (!diagnosis.remainder) return predictable;
   Extended longer = extended;
   add_remainder(longer.model, *diagnosis.remainder);
@@ -166,7 +167,7 @@ Diagnosis diagnose(const ThermalModel& model, std::vector<RunFile> train,
   if (!diagnosis.findings.empty())
     correct_coefficients(extended.model, model, result.coefficient_errors);
   const std::vector<double> predictable =
-      add_remainder_bank(diagnosis, extended, train_data, test_data);
+      add_remainder_bank(diagnosis, extended, train_data, test_data, result.fitted);
   diagnosis.extended = extended.model;
   const std::vector<Residuals> train_base = residuals(train_data);
   const std::vector<Residuals> base = residuals(test_data);

@@ -17,22 +17,19 @@ Json interval(const Interval& interval) {
   return Json::array({number(interval.low), number(interval.high)});
 }
 
-Json value_json(const Parameter& parameter) {
-  const auto whole = parameter.name == "power";
-  if (parameter.values.contains("")) {
-    const double value = parameter.values.at("");
-    return whole ? Json(static_cast<int>(std::lround(value))) : number(value);
-  }
+/// The value that all outputs share, or one an output.
+template <class Value, class ToJson>
+Json by_output(const std::map<std::string, Value>& values, ToJson to_json) {
+  if (values.contains("")) return to_json(values.at(""));
   Json table = Json::object();
-  for (const auto& [output, value] : parameter.values) table[output] = number(value);
+  for (const auto& [output, value] : values) table[output] = to_json(value);
   return table;
 }
 
-Json ci_json(const Parameter& parameter) {
-  if (parameter.ci95.contains("")) return interval(parameter.ci95.at(""));
-  Json table = Json::object();
-  for (const auto& [output, value] : parameter.ci95) table[output] = interval(value);
-  return table;
+Json value_json(const Parameter& parameter) {
+  return by_output(parameter.values, [&](double value) {
+    return parameter.name == "power" ? Json(static_cast<int>(std::lround(value))) : number(value);
+  });
 }
 
 /// "test_rms" as a key: test_rms_um.
@@ -65,7 +62,7 @@ Json finding_json(const NamedFinding& finding, const std::string& unit) {
   if (finding.run) parameters["run"] = *finding.run;
   for (const Parameter& parameter : finding.parameters) {
     parameters[parameter.name] = value_json(parameter);
-    if (!parameter.ci95.empty()) ci95[parameter.name] = ci_json(parameter);
+    if (!parameter.ci95.empty()) ci95[parameter.name] = by_output(parameter.ci95, interval);
   }
   Json alternatives = Json::array();
   for (const Alternative& other : finding.alternatives)
@@ -119,6 +116,7 @@ std::string diagnosis_json(const Diagnosis& diagnosis, bool weighed) {
   Json baseline = Json::object();
   Json extended = Json::object();
   Json unexplained = Json::object();
+  Json headroom = Json::object();
   for (const auto& [output, figures] : diagnosis.outputs) {
     baseline[output] = {{key_of("train_rms", unit), number(figures.train_rms_um)},
                         {test_rms, number(figures.test_rms_um)},
@@ -126,14 +124,12 @@ std::string diagnosis_json(const Diagnosis& diagnosis, bool weighed) {
     extended[output] = {{test_rms, number(figures.extended_test_rms_um)},
                         {test_peak, number(figures.extended_test_peak_um)}};
     unexplained[output] = number(figures.unexplained_fraction);
-  }
-  Json headroom = Json::object();
-  for (const auto& [output, figures] : diagnosis.outputs)
     if (figures.headroom)
       headroom[output] = {{"noise", number(figures.headroom->noise)},
                           {"named", number(figures.headroom->named)},
                           {"predictable", number(figures.headroom->predictable)},
                           {"not_recorded", number(figures.headroom->not_recorded)}};
+  }
   Json findings = Json::array();
   for (const NamedFinding& finding : diagnosis.findings)
     findings.push_back(finding_json(finding, unit));

@@ -22,7 +22,8 @@ constexpr std::size_t alternatives_max = 4;
 
 std::vector<Alternative> alternatives_of(const Finding& finding) {
   std::vector<Alternative> all;
-  for (const Explanation& other : finding.alternatives) {
+  for (const Explanation& other : finding.weighed) {
+    if (other.hypothesis == finding.explanation.hypothesis) continue;
     const double support = other.probability / finding.explanation.probability;
     if (!(support > support_shown_min) || all.size() >= alternatives_max) break;
     const Hypothesis& of = *other.hypothesis;
@@ -142,24 +143,17 @@ Column sine_in(const Column& time_s, const Column& residual, const Correction& c
   return correction.amplitude_um * (angle + std::atan2(of[1], of[0])).sin();
 }
 
-struct BlockSquares {
-  double before{0.0};
-  double after{0.0};
-};
-
-std::vector<BlockSquares> squares_by_block(const Residuals& before, const Residuals& after) {
-  std::vector<BlockSquares> blocks;
+/// Sums of squares before and after, by blocks of rows.
+std::vector<Eigen::Array2d> squares_by_block(const Residuals& before, const Residuals& after) {
+  std::vector<Eigen::Array2d> blocks;
   Eigen::Index rows = 0;
   for (const Column& run : before) rows += run.size();
   const Eigen::Index length = std::max<Eigen::Index>(1, rows / test_blocks);
   for (std::size_t i = 0; i < before.size(); ++i) {
     for (Eigen::Index row = 0; row < before[i].size(); ++row) {
-      if (row % length == 0) blocks.emplace_back();
-      const double a = before[i][row];
-      const double b = after[i][row];
-      if (!std::isfinite(a) || !std::isfinite(b)) continue;
-      blocks.back().before += a * a;
-      blocks.back().after += b * b;
+      if (row % length == 0) blocks.emplace_back(Eigen::Array2d::Zero());
+      const Eigen::Array2d both(before[i][row], after[i][row]);
+      if (both.isFinite().all()) blocks.back() += both.square();
     }
   }
   return blocks;
@@ -172,11 +166,6 @@ Column present(const Residuals& residuals) {
     std::copy_if(run.begin(), run.end(), std::back_inserter(values),
                  [](double value) { return std::isfinite(value); });
   return Eigen::Map<const Column>(values.data(), std::ssize(values));
-}
-
-double peak(const Residuals& residuals) {
-  const Column values = present(residuals);
-  return values.size() > 0 ? values.cwiseAbs().maxCoeff() : not_a_number;
 }
 
 }  // namespace
@@ -219,6 +208,11 @@ double root_mean_square(const Residuals& residuals) {
                            : not_a_number;
 }
 
+double peak(const Residuals& residuals) {
+  const Column values = present(residuals);
+  return values.size() > 0 ? values.cwiseAbs().maxCoeff() : not_a_number;
+}
+
 OutputFigures output_figures(const Residuals& train, const Residuals& test,
                              const Residuals& extended_test, double unexplained_fraction) {
   return {root_mean_square(train),         root_mean_square(test), peak(test),
@@ -228,18 +222,14 @@ OutputFigures output_figures(const Residuals& train, const Residuals& test,
 TestGain test_gain(const Residuals& before, const Residuals& after) {
   TestGain gain{root_mean_square(before), root_mean_square(after), 0.0, {}};
   gain.reduction = 1.0 - gain.after_um / gain.before_um;
-  const std::vector<BlockSquares> blocks = squares_by_block(before, after);
+  const std::vector<Eigen::Array2d> blocks = squares_by_block(before, after);
   std::mt19937_64 random(1);  // the same answer for the same data
   std::uniform_int_distribution<std::size_t> draw(0, blocks.size() - 1);
   std::vector<double> reductions;
   for (int i = 0; i < resamples; ++i) {
-    BlockSquares sum;
-    for (std::size_t j = 0; j < blocks.size(); ++j) {
-      const BlockSquares& block = blocks[draw(random)];
-      sum.before += block.before;
-      sum.after += block.after;
-    }
-    if (sum.before > 0) reductions.push_back(1.0 - std::sqrt(sum.after / sum.before));
+    Eigen::Array2d sum = Eigen::Array2d::Zero();
+    for (std::size_t j = 0; j < blocks.size(); ++j) sum += blocks[draw(random)];
+    if (sum[0] > 0) reductions.push_back(1.0 - std::sqrt(sum[1] / sum[0]));
   }
   if (reductions.empty()) return gain;
   std::sort(reductions.begin(), reductions.end());

@@ -2,7 +2,6 @@
 /// measures their gain on the test runs, and fits a bank of lags to the predictable remainder.
 #pragma once
 
-#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -46,6 +45,7 @@ using Residuals = std::vector<Column>;
 [[nodiscard]] std::vector<Residuals> residuals(const MeasuredData& data);
 [[nodiscard]] std::vector<Residuals> residuals(const Extended& extended, const MeasuredData& data);
 [[nodiscard]] double root_mean_square(const Residuals& residuals);
+[[nodiscard]] double peak(const Residuals& residuals);
 /// Figures of the model's remainder in training and test runs, and of the extended model's in test
 /// runs.
 [[nodiscard]] OutputFigures output_figures(const Residuals& train, const Residuals& test,
@@ -62,16 +62,17 @@ using Residuals = std::vector<Column>;
 /// run's first row, as it will in use: with a free offset a run twice as many outputs get a bank,
 /// and some are worse for it. Columns, penalties and gains: identification::BankEquations.
 ///
-/// Coefficients that were fitted to these very rows say nothing of what they leave of others. Where
-/// the matrix leaves no more of them than a fit of its inputs would, the output is fitted anew
-/// without the blocks, from the inputs as they are and with the bank, and compared so; the bank
-/// then holds what the coefficients change by, too.
+/// Coefficients that were fitted to these very rows say nothing of what they leave of others: such
+/// an output is fitted anew without the blocks, from the inputs as they are and with the bank, and
+/// compared so; the bank then holds what the coefficients change by, too.
 /// @param left         by the model with the findings, over the training runs, order of the outputs
+/// @param fitted       of each output, whether its coefficients were fitted to these rows
 /// @param predictable  receives of each output the share of the variance of its left-out rows that
 ///                     the bank predicts, whether it gets one or not
 /// @return nullopt: no output gains
 [[nodiscard]] std::optional<RemainderBank> remainder_bank(const MeasuredData& train,
                                                           const std::vector<Residuals>& left,
+                                                          const std::vector<bool>& fitted,
                                                           std::vector<double>& predictable);
 
 }  // namespace thermocomp::diagnosis

@@ -13,9 +13,6 @@ using identification::MeasuredTests;
 
 constexpr std::size_t blocks = 8;
 constexpr double gain_min = 0.1;
-/// RMS that the matrix may leave, over that of a fit of its inputs, and count as fitted to the
-/// rows.
-constexpr double fitted_factor = 1.1;
 /// Of all runs; more are thinned. The shortest low pass is many times longer than the steps then.
 constexpr Eigen::Index rows_max = 6000;
 
@@ -92,21 +89,18 @@ void add_matrix(MeasuredTests& tests, const Eigen::VectorXd& row) {
     run.outputs_um += run.places_K.leftCols(row.size()) * row;
 }
 
-/// The model's inputs alone.
-MeasuredTests inputs_only(const MeasuredTests& tests, const ThermalModel& model) {
-  MeasuredTests few = tests;
-  few.places = model.inputs;
-  few.signals.clear();
-  for (identification::TestRun& run : few.runs) {
-    run.places_K = run.places_K.leftCols(std::ssize(model.inputs)).eval();
+/// Static equations of the model's inputs alone, without what the matrix takes away.
+BankEquations static_equations(MeasuredTests tests, const ThermalModel& model,
+                               const Eigen::VectorXd& row) {
+  tests.places = model.inputs;
+  tests.signals.clear();
+  for (identification::TestRun& run : tests.runs) {
+    run.places_K = run.places_K.leftCols(row.size()).eval();
     run.signals.resize(run.time_s.size(), 0);
   }
-  return few;
-}
-
-/// As they are, without lags.
-BankColumns at_once(const ThermalModel& model) {
-  return {model.inputs, std::vector<double>(model.inputs.size(), 1.0), {0.0}, {}};
+  add_matrix(tests, row);
+  const BankColumns at_once{model.inputs, std::vector<double>(model.inputs.size(), 1.0), {0.0}, {}};
+  return {tests, at_once};
 }
 
 /// Sums over present rows.
@@ -144,28 +138,6 @@ Eigen::VectorXd left_of(const MeasuredTests& tests, std::size_t f, const BankEqu
   Eigen::VectorXd y = tests.runs[fold.run].outputs_um.middleRows(fold.begin, count);
   if (bank != nullptr) y -= bank->rows()[fold.run].middleRows(fold.begin, count) * bank->fit(f);
   return y;
-}
-
-/// Static equations of the model's inputs, where the matrix leaves of the tests' rows no more than
-/// they would.
-std::optional<BankEquations> fit_like_the_matrix(const MeasuredTests& tests,
-                                                 const ThermalModel& model,
-                                                 const Eigen::VectorXd& row) {
-  MeasuredTests few = inputs_only(tests, model);
-  add_matrix(few, row);
-  std::optional<BankEquations> fit(std::in_place, few, at_once(model));
-  const Eigen::MatrixXd gains = fit->fit(few.folds.size());
-  Sums of_matrix;
-  Sums of_fit;
-  for (std::size_t f = 0; f < few.folds.size(); ++f) {
-    const identification::Fold& fold = few.folds[f];
-    const Eigen::Index count = fold.end - fold.begin;
-    of_matrix.add(left_of(tests, f, nullptr));
-    of_fit.add(few.runs[fold.run].outputs_um.middleRows(fold.begin, count) -
-               fit->rows()[fold.run].middleRows(fold.begin, count) * gains);
-  }
-  if (of_matrix.squares > of_fit.squares * fitted_factor * fitted_factor) fit.reset();
-  return fit;
 }
 
 /// Of noise alone the first row's is left in all others, and a bank would carry that: so what is
@@ -212,6 +184,7 @@ Judged judged(const MeasuredTests& tests, const BankEquations& bank,
 
 std::optional<RemainderBank> remainder_bank(const MeasuredData& train,
                                             const std::vector<Residuals>& left,
+                                            const std::vector<bool>& fitted,
                                             std::vector<double>& predictable) {
   predictable.assign(left.size(), 0.0);
   Eigen::Index rows = 0;
@@ -227,8 +200,11 @@ std::optional<RemainderBank> remainder_bank(const MeasuredData& train,
   for (std::size_t output = 0; output < left.size(); ++output) {
     set_output(tests, train, left[output], apart);
     const Eigen::VectorXd row = matrix_row(train.model, output);
-    const std::optional<BankEquations> static_fit = fit_like_the_matrix(tests, train.model, row);
-    if (static_fit) add_matrix(tests, row);
+    std::optional<BankEquations> static_fit;
+    if (fitted[output]) {
+      static_fit = static_equations(tests, train.model, row);
+      add_matrix(tests, row);
+    }
     const BankEquations equations(tests, columns);
     const Judged of_output = judged(tests, equations, static_fit ? &*static_fit : nullptr);
     if (of_output.gain.before_um > 0)

@@ -64,8 +64,8 @@ constexpr double discrepancy = 0.1;
 constexpr double never_known = 1e-9;
 constexpr double least_variance = 1e-9;
 
-}  // namespace
-
+/// Standard deviation of the white noise, from second differences, which neither offsets nor slopes
+/// reach; 0 where there are none.
 double noise_of(const Column& values, const std::vector<Block>& runs) {
   std::vector<double> bends;
   for (const Block& run : runs)
@@ -73,6 +73,8 @@ double noise_of(const Column& values, const std::vector<Block>& runs) {
       bends.push_back(std::abs(values[row + 1] - 2.0 * values[row] + values[row - 1]));
   return bends.empty() ? 0.0 : median(std::move(bends)) / (0.6745 * std::sqrt(6.0));
 }
+
+}  // namespace
 
 double log_mean_exp(const Eigen::VectorXd& values) {
   const double most = values.maxCoeff();
@@ -197,12 +199,13 @@ double OutputFit::log_likelihood(Eigen::Index under, double explained, double ef
 }
 
 Eigen::VectorXd OutputFit::common_factors() const {
-  std::size_t best = 0;
-  for (std::size_t b = 1; b < under_.size(); ++b)
-    if (log_likelihood(static_cast<Eigen::Index>(b), 0.0, 0.0) >
-        log_likelihood(static_cast<Eigen::Index>(best), 0.0, 0.0))
-      best = b;
-  return under_[best].root.matrixU().solve(under_[best].common_remainder);
+  const auto likelihood = [&](const Under& of) {
+    return log_likelihood(&of - under_.data(), 0.0, 0.0);
+  };
+  const auto best =
+      std::max_element(under_.begin(), under_.end(),
+                       [&](const auto& a, const auto& b) { return likelihood(a) < likelihood(b); });
+  return best->root.matrixU().solve(best->common_remainder);
 }
 
 }  // namespace thermocomp::diagnosis

@@ -32,10 +32,6 @@ struct Background {
 double whiten(const Background& background, const Column& time_s, const std::vector<Block>& runs,
               Panel& columns);
 
-/// Standard deviation of the white noise, from second differences, which neither offsets nor slopes
-/// reach; 0 where there are none.
-[[nodiscard]] double noise_of(const Column& values, const std::vector<Block>& runs);
-
 /// The rows in which an output has a value; neighbours are averaged where there are many.
 class OutputRows {
  public:

@@ -77,10 +77,6 @@ bool fitted_to(const Column& remainder, const Panel& free, const Panel& coeffici
          (variances.size() > 2 && (is_ridge(free) || is_ridge(nothing)));
 }
 
-double log_add_exp(double a, double b) {
-  return std::max(a, b) + std::log1p(std::exp(-std::abs(a - b)));
-}
-
 /// Gains of least squares, kept within their bounds where there is one gain.
 Eigen::VectorXd gains_of(const Equations& equations, Eigen::Index shape, Eigen::Index under,
                          const Interval& bounds) {
@@ -109,10 +105,6 @@ Eigen::VectorXd likelihoods(const OutputFit& fit, const Equations& equations, Ei
 
 Interval bounds_of(const Hypothesis& hypothesis, std::size_t output) {
   return hypothesis.bounds ? hypothesis.bounds(output) : Interval{-unknown, unknown};
-}
-
-double price_of_gains(const Hypothesis& hypothesis, Eigen::Index rows) {
-  return 0.5 * static_cast<double>(hypothesis.gains.size()) * std::log(static_cast<double>(rows));
 }
 
 }  // namespace
@@ -185,7 +177,6 @@ Fits::Fits(const MeasuredData& data, Readings& readings, const std::vector<Expla
       }));
     const Column means = of.means_of(left);
     const bool fitted = coefficients.cols() > 0 && fitted_to(means, free, coefficients);
-    fitted_ = fitted_ || fitted;
     Eigen::VectorXd sd = Eigen::VectorXd::Constant(free.cols() + coefficients.cols(), unknown);
     sd.tail(coefficients.cols()).setConstant(fitted ? 1.0 : data.coefficient_sd);
     const double least = data.least_noise_um.empty() ? 1e-3 : data.least_noise_um[output];
@@ -195,7 +186,7 @@ Fits::Fits(const MeasuredData& data, Readings& readings, const std::vector<Expla
     if (fitted) beside = joined(beside, coefficients);
     outputs_[output] = {OutputFit(std::move(of), means, joined(free, coefficients), sd, least),
                         std::move(free),
-                        LeftOut(centred_in(runs, means).col(0), centred_in(runs, beside))};
+                        LeftOut(centred_in(runs, means).col(0), centred_in(runs, beside)), fitted};
   }
 }
 
@@ -232,10 +223,11 @@ void Fits::fit_own_gains(const std::vector<Equations>& equations, Eigen::Index s
       }
     }
     const double none = fit.log_likelihood_of_none();
-    const double with =
-        log_mean_exp(of_background) - none - price_of_gains(hypothesis, fit.rows().size());
+    const double with = log_mean_exp(of_background) - none -
+                        0.5 * static_cast<double>(hypothesis.gains.size()) *
+                            std::log(static_cast<double>(fit.rows().size()));
     // An output on which a cause does not act is as likely as one on which it does.
-    trial.score += may_spare ? log_add_exp(with, 0.0) - std::log(2.0) : with;
+    trial.score += may_spare ? log_mean_exp(Eigen::Vector2d(with, 0.0)) : with;
     const double variance =
         fit.variance(best_under, explained_by(equations[output], shape, best_under, best_gains));
     trial.gains[output] = best_gains;

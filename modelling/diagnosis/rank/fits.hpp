@@ -43,8 +43,10 @@ class Fits {
   /// The same between the points of the grid.
   void refine(Explanation& explanation, By by = By::worth) const;
 
-  /// Whether coefficients were fitted to these very rows.
-  [[nodiscard]] bool fitted() const { return fitted_; }
+  /// Whether the coefficients of an output were fitted to these very rows.
+  [[nodiscard]] bool fitted(std::size_t output) const {
+    return measured(output) && outputs_[output]->fitted;
+  }
   [[nodiscard]] bool measured(std::size_t output) const { return outputs_[output].has_value(); }
   [[nodiscard]] const OutputFit& output(std::size_t output) const { return outputs_[output]->fit; }
   /// By what share each coefficient of an output is wrong, fitted beside what is accepted; 0 where
@@ -60,6 +62,7 @@ class Fits {
     OutputFit fit;
     Panel free;        ///< offsets of the runs, columns of what is accepted
     LeftOut left_out;  ///< of the remainder, each run's mean off
+    bool fitted;
   };
   [[nodiscard]] bool concerns(const Hypothesis& hypothesis, std::size_t output) const;
   /// Set gains and score of a trial, shape number `shape`.
@@ -74,7 +77,6 @@ class Fits {
   const MeasuredData& data_;
   Readings& readings_;
   std::vector<std::optional<Output>> outputs_;
-  bool fitted_{false};
 };
 
 }  // namespace thermocomp::diagnosis

@@ -33,8 +33,8 @@ struct Finding {
   std::vector<std::vector<Interval>> gains_ci{};  ///< 95 %, of each output's gains
   double probability{0.0};                        ///< with all places that cannot be told apart
   double family_probability{0.0};
-  std::vector<std::string> group{};         ///< these places, the subject's first
-  std::vector<Explanation> alternatives{};  ///< likeliest first
+  std::vector<std::string> group{};    ///< these places, the subject's first
+  std::vector<Explanation> weighed{};  ///< against which it was found, likeliest first
 };
 
 /// `structure`, `heat`, `datum` or `sensor`.

@@ -13,7 +13,6 @@ namespace {
 constexpr double probability_min = 0.5;
 constexpr std::size_t findings_max = 4;
 constexpr std::size_t refined = 24;
-constexpr std::size_t alternatives_max = 40;
 /// A remainder is structure if it exceeds the noise by this factor and this share of the motion.
 constexpr double structure_over_noise = 1.5;
 constexpr double structure_of_motion = 0.03;
@@ -167,6 +166,7 @@ class Search {
     for (std::size_t output = 0; output < before.size(); ++output) {
       const Remainder& of = before[output];
       result.noise_share.push_back(of.noise_share);
+      result.fitted.push_back(of.fitted);
       result.unexplained_share.push_back(
           of.structure > 0 ? std::min(1.0, after[output].structure / of.structure) : 0.0);
       result.unexplained = result.unexplained || (of.is_large && result.findings.empty());
@@ -192,6 +192,7 @@ class Search {
     double structure{0.0};    ///< variance above that of the noise
     double noise_share{1.0};  ///< of the variance
     bool is_large{false};     ///< the structure, against noise and motion
+    bool fitted{false};       ///< by coefficients of these rows
   };
 
   std::vector<Remainder> remainders(const Fits& fits) const {
@@ -205,6 +206,7 @@ class Search {
       of.noise_share = std::min(1.0, std::pow(noise / std::max(1e-12, rms), 2));
       of.is_large = std::sqrt(of.structure) > structure_over_noise * noise &&
                     std::sqrt(of.structure) > structure_of_motion * motion_of(data_, output);
+      of.fitted = fits.fitted(output);
     }
     return all;
   }
@@ -240,8 +242,14 @@ class Search {
     std::sort(all.begin(), all.end(), likelier);
     for (std::size_t i = 0; i < std::min(refined, all.size()); ++i) fits.refine(all[i]);
     std::sort(all.begin(), all.end(), likelier);
+    bool fitted = false;
+    for (std::size_t output = 0; output < data_.model.outputs.size(); ++output)
+      fitted = fitted || fits.fitted(output);
     const Posterior posterior =
-        weigh_against_each_other(all, round == 0 ? Round::first : Round::later, fits.fitted());
+        weigh_against_each_other(all, round == 0 ? Round::first : Round::later, fitted);
+    std::stable_sort(all.begin(), all.end(), [](const Explanation& a, const Explanation& b) {
+      return a.probability > b.probability;
+    });
     const Choice choice = likeliest(all, groups_);
     if (round == 0) {
       result.families = posterior.families;
@@ -256,10 +264,7 @@ class Search {
     finding.family_probability =
         std::max(choice.probability, posterior.families.at(family_of(of.cause)));
     finding.group = group_of(groups_, of.subject, choice.other_subjects);
-    for (const Explanation& each : all) {
-      if (finding.alternatives.size() >= alternatives_max) break;
-      if (each.hypothesis != &of) finding.alternatives.push_back(each);
-    }
+    finding.weighed = std::move(all);
     result.findings.push_back(std::move(finding));
     return true;
   }

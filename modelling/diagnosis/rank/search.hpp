@@ -18,6 +18,7 @@ struct SearchResult {
   /// Of each output's coefficients, beside all findings: by what share they are wrong.
   std::vector<Eigen::VectorXd> coefficient_errors{};
   std::vector<double> noise_share;  ///< of an output's remaining variance before any finding
+  std::vector<bool> fitted;         ///< whether an output's coefficients were fitted to these rows
   /// Structure is left that is large against noise and motion, and nothing is named.
   bool unexplained{false};
   std::map<std::string, double> families{};  ///< for the first finding, and `none`

@@ -2,6 +2,7 @@
 /// residuals beside the operating signals by phase, words, pictures, the page.
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -11,20 +12,15 @@
 namespace thermocomp::diagnosis {
 
 enum class Phase { change, heating, cooling, standstill, steady };
-inline constexpr std::size_t phase_count = 5;
-[[nodiscard]] const char* phase_name(Phase phase);
+inline constexpr std::array phase_names{"speed change", "heating", "cooling", "standstill",
+                                        "steady"};
 
 /// The phase of each selected row: `change` in the ten minutes after a change of an operating
 /// signal, otherwise by the slope of the inputs' mean rise and by whether any signal is on.
 [[nodiscard]] std::vector<Phase> phases_of(const MeasuredRun& run, const MeasuredData& data);
 
-/// How white a residual is.
-struct Whiteness {
-  double noise_um{0.0};            ///< of a single value, from second differences
-  double noise_share{0.0};         ///< of the variance
-  double correlation_time_s{0.0};  ///< until the autocorrelation falls below 1/e
-};
-[[nodiscard]] Whiteness whiteness_of(const Column& time_s, const Column& residual);
+/// Time until the autocorrelation of a residual falls below 1/e; 0 where it is white.
+[[nodiscard]] double correlation_time_s(const Column& time_s, const Column& residual);
 
 struct ReportRun {
   std::string name;

@@ -1,11 +1,9 @@
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 
 #include "config/runs/run_file.hpp"
 #include "config/text/units.hpp"
 #include "modelling/diagnosis/data/series.hpp"
-#include "modelling/diagnosis/fit/output_fit.hpp"
 #include "modelling/diagnosis/report/diagnosis_report.hpp"
 
 namespace thermocomp::diagnosis {
@@ -17,22 +15,6 @@ constexpr double slope_smoothing_s = 300.0;
 constexpr double slope_share_min = 0.08;
 
 }  // namespace
-
-const char* phase_name(Phase phase) {
-  switch (phase) {
-    case Phase::change:
-      return "speed change";
-    case Phase::heating:
-      return "heating";
-    case Phase::cooling:
-      return "cooling";
-    case Phase::standstill:
-      return "standstill";
-    case Phase::steady:
-      break;
-  }
-  return "steady";
-}
 
 std::vector<Phase> phases_of(const MeasuredRun& run, const MeasuredData& data) {
   Column mean_K = Column::Zero(run.rows());
@@ -65,29 +47,20 @@ std::vector<Phase> phases_of(const MeasuredRun& run, const MeasuredData& data) {
   return phases;
 }
 
-Whiteness whiteness_of(const Column& time_s, const Column& residual) {
+double correlation_time_s(const Column& time_s, const Column& residual) {
   std::vector<Eigen::Index> present;
   for (Eigen::Index row = 0; row < residual.size(); ++row)
     if (std::isfinite(residual[row])) present.push_back(row);
-  Whiteness white;
   const Eigen::Index n = std::ssize(present);
-  if (n < 8) return white;
+  if (n < 8) return 0.0;
   Column values = residual(present);
-  white.noise_um = noise_of(values, {{0, n}});
   values.array() -= values.mean();
-  const double variance = values.squaredNorm() / static_cast<double>(n);
-  if (!(variance > 0)) return white;
-  white.noise_share = std::min(1.0, white.noise_um * white.noise_um / variance);
-  for (Eigen::Index lag = 1; lag < n / 2; ++lag) {
-    if (values.head(n - lag).dot(values.tail(n - lag)) / static_cast<double>(n - lag) >
-        variance / std::exp(1.0))
-      continue;
-    if (lag > 1)
-      white.correlation_time_s =
-          time_s[present[static_cast<std::size_t>(lag)]] - time_s[present.front()];
-    break;
-  }
-  return white;
+  const double limit = values.squaredNorm() / static_cast<double>(n) / std::exp(1.0);
+  for (Eigen::Index lag = 1; lag < n / 2; ++lag)
+    if (values.head(n - lag).dot(values.tail(n - lag)) <= limit * static_cast<double>(n - lag))
+      return lag > 1 ? time_s[present[static_cast<std::size_t>(lag)]] - time_s[present.front()]
+                     : 0.0;
+  return 0.0;
 }
 
 namespace {

@@ -1,8 +1,6 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdio>
-#include <string_view>
 
 #include "modelling/diagnosis/report/diagnosis_report.hpp"
 #include "report/html_page.hpp"
@@ -36,27 +34,6 @@ std::string folded(const std::string& title, const std::string& html) {
   return "<details><summary>" + xml_text(title) + "</summary>\n" + html + "</details>\n";
 }
 
-struct Figures {
-  double rms{not_a_number};
-  double peak{not_a_number};
-};
-
-/// RMS over the rows that `takes` accepts; and the largest value.
-template <class Takes>
-Figures figures_of(const Column& values, Takes takes) {
-  double squares = 0.0;
-  double count = 0.0;
-  Figures figures;
-  for (Eigen::Index i = 0; i < values.size(); ++i) {
-    if (!std::isfinite(values[i]) || !takes(i)) continue;
-    squares += values[i] * values[i];
-    count += 1.0;
-    if (!(std::abs(values[i]) <= figures.peak)) figures.peak = std::abs(values[i]);
-  }
-  if (count > 0) figures.rms = std::sqrt(squares / count);
-  return figures;
-}
-
 std::string unit_text(const Diagnosis& diagnosis, const std::string& output) {
   if (diagnosis.unit != "um") return diagnosis.unit;
   return output.ends_with("_urad") ? "µrad" : "µm";
@@ -66,19 +43,15 @@ std::string unit_text(const Diagnosis& diagnosis, const std::string& output) {
 double motion_rms(const ReportData& report, const std::string& output) {
   const auto at = static_cast<std::size_t>(
       std::find(report.outputs.begin(), report.outputs.end(), output) - report.outputs.begin());
-  double squares = 0.0;
-  double count = 0.0;
+  Residuals motion;
   for (const ReportRun& run : report.runs) {
     if (!run.test || at >= run.measured_um.size()) continue;
-    double first = not_a_number;
-    for (const double value : run.measured_um[at]) {
-      if (!std::isfinite(value)) continue;
-      if (!std::isfinite(first)) first = value;
-      squares += (value - first) * (value - first);
-      count += 1.0;
-    }
+    const Column& values = run.measured_um[at];
+    const auto first = std::find_if(values.begin(), values.end(),
+                                    [](double value) { return std::isfinite(value); });
+    if (first != values.end()) motion.emplace_back(values.array() - double(*first));
   }
-  return std::sqrt(squares / count);
+  return root_mean_square(motion);
 }
 
 /// "z: 1.0 of 44 µm is left on the test rows (2 %), with the extended model 0.80 µm."
@@ -271,53 +244,49 @@ std::string phases_table(const ReportRun& run, const ReportData& report) {
                "RMS after"}};
   const auto rows = static_cast<double>(run.phases.size());
   for (std::size_t output = 0; output < report.outputs.size(); ++output) {
-    const double all = figures_of(run.before_um[output], [](Eigen::Index) { return true; }).rms;
-    for (std::size_t p = 0; p < phase_count; ++p) {
+    const double all = root_mean_square({run.before_um[output]});
+    for (std::size_t p = 0; p < phase_names.size(); ++p) {
       const auto phase = static_cast<Phase>(p);
-      const auto in_phase = [&](Eigen::Index i) {
-        return run.phases[static_cast<std::size_t>(i)] == phase;
+      const auto in_phase = [&](Column values) -> Residuals {
+        for (Eigen::Index i = 0; i < values.size(); ++i)
+          if (run.phases[static_cast<std::size_t>(i)] != phase) values[i] = not_a_number;
+        return {std::move(values)};
       };
-      const Figures before = figures_of(run.before_um[output], in_phase);
-      if (!std::isfinite(before.rms)) continue;
+      const Residuals before = in_phase(run.before_um[output]);
+      const double rms = root_mean_square(before);
+      if (!std::isfinite(rms)) continue;
       const double share =
           static_cast<double>(std::count(run.phases.begin(), run.phases.end(), phase)) / rows;
-      const double squares = all > 0 ? share * before.rms * before.rms / (all * all) : 0.0;
-      table.push_back({phase_name(phase), fixed(100 * share, 0) + " %", report.outputs[output],
-                       fixed(before.rms), fixed(before.peak), fixed(100 * squares, 0) + " %",
-                       fixed(figures_of(run.after_um[output], in_phase).rms)});
+      const double squares = all > 0 ? share * rms * rms / (all * all) : 0.0;
+      table.push_back({phase_names[p], fixed(100 * share, 0) + " %", report.outputs[output],
+                       fixed(rms), fixed(peak(before)), fixed(100 * squares, 0) + " %",
+                       fixed(root_mean_square(in_phase(run.after_um[output])))});
     }
   }
   return html_table(table);
 }
 
 std::string whiteness_table(const ReportRun& run, const ReportData& report) {
-  Table rows{{"output", "noise of a value", "noise's share of the variance",
-              "residual correlated over", "after: correlated over"}};
-  for (std::size_t output = 0; output < report.outputs.size(); ++output) {
-    const Whiteness before = whiteness_of(run.time_s, run.before_um[output]);
-    const Whiteness after = whiteness_of(run.time_s, run.after_um[output]);
-    rows.push_back({report.outputs[output], fixed(before.noise_um, 3),
-                    fixed(100 * before.noise_share, 1) + " %",
-                    fixed(before.correlation_time_s / 60.0, 0) + " min",
-                    fixed(after.correlation_time_s / 60.0, 0) + " min"});
-  }
+  Table rows{{"output", "error correlated over", "after: correlated over"}};
+  const auto minutes = [&](const Column& residual) {
+    return fixed(correlation_time_s(run.time_s, residual) / 60.0, 0) + " min";
+  };
+  for (std::size_t output = 0; output < report.outputs.size(); ++output)
+    rows.push_back(
+        {report.outputs[output], minutes(run.before_um[output]), minutes(run.after_um[output])});
   return html_table(rows);
 }
 
 /// A picture that can be made wider: no script is needed for that.
 std::string zoomed(const std::string& picture, const std::string& group) {
   std::string html = "<div>wider:";
-  for (const char* times : {"1", "4", "16"}) {
-    const std::string id = std::string(group).append("x").append(times);
-    html.append(" <input type=\"radio\" name=\"").append(group).append("\" id=\"").append(id);
-    html.append("\" class=\"zoom").append(times).append("\"");
-    if (std::string_view(times) == "1") html.append(" checked");
-    html.append("><label for=\"").append(id);
-    html.append("\">").append(times).append(" x</label>");
+  for (const std::string times : {"1", "4", "16"}) {
+    const std::string id = group + "x" + times;
+    html += " <input type=\"radio\" name=\"" + group + "\" id=\"" + id + "\" class=\"zoom" + times +
+            (times == "1" ? "\" checked>" : "\">") + "<label for=\"" + id + "\">" + times +
+            " x</label>";
   }
-  return html.append("<div class=\"wide\" tabindex=\"0\">")
-      .append(picture)
-      .append("</div></div>\n");
+  return html + "<div class=\"wide\" tabindex=\"0\">" + picture + "</div></div>\n";
 }
 
 std::string role_text(const ReportRun& run) {

@@ -36,11 +36,6 @@ double correlation(const Column& a, const Column& b) {
   return xx > 0 && yy > 0 ? cross / std::sqrt(xx * yy) : 0.0;
 }
 
-std::string unit_of(const std::string& column) {
-  const std::size_t last = column.rfind('_');
-  return last == std::string::npos ? std::string() : column.substr(last + 1);
-}
-
 PlotPanel temperatures_panel(const ReportRun& run, const ReportData& report) {
   PlotPanel panel{"temperatures, rise", "K", {}, error_height};
   for (std::size_t i = 0; i < run.inputs_K.size(); ++i)
@@ -73,11 +68,12 @@ std::string course_picture(const ReportRun& run, const ReportData& report,
                        {"extended model", extended_colour, all_of(run.after_um[output])}},
                       error_height});
   }
-  for (std::size_t i = 0; i < std::min(signals_max, run.signals.size()); ++i)
-    panels.push_back({name_of_column(report.signals[i]),
-                      unit_of(report.signals[i]),
-                      {{"", "#444", all_of(run.signals[i])}},
-                      signal_height});
+  for (std::size_t i = 0; i < std::min(signals_max, run.signals.size()); ++i) {
+    const std::string name = name_of_column(report.signals[i]);
+    const std::string unit =
+        report.signals[i].substr(std::min(report.signals[i].size(), name.size() + 1));
+    panels.push_back({name, unit, {{"", "#444", all_of(run.signals[i])}}, signal_height});
+  }
   if (!run.inputs_K.empty()) panels.push_back(temperatures_panel(run, report));
   return panels_plot(all_of(run.time_s), panels);
 }

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <string_view>
@@ -106,6 +107,19 @@ const CauseTexts& texts_of(const std::string& cause_name, const std::string& sub
   return cause.texts;
 }
 
+/// In the order of Experiment.
+constexpr std::array<std::string_view, 8> experiment_texts{
+    "Warm up at one speed until nothing changes, then stop and record until nothing changes: the "
+    "steady state tells films and joints, the way there capacities, the level sources.",
+    "Repeat the run with the same duty: a fault of one run does not come back.",
+    "Hold one constant speed for two hours, then stop and record two hours of standstill.",
+    "Warm up, then measure at both ends and in the middle of the axis within ten minutes.",
+    "Repeat the same warm-up twice as slowly: a lag's loop closes, that of play does not.",
+    "Step the speed up and record until nothing moves, then step it down: only what has memory "
+    "parts the two branches.",
+    "Hold three different temperatures of the place until nothing moves any more.",
+    "Repeat the run with another sequence of speeds and another room temperature."};
+
 /// How the effects of two subjects are told apart: one moves, the other does not.
 std::string one_alone(const std::string& one, const std::string& other) {
   const bool can_warm = is_temperature(one) && !is_called_like_a_room(one);
@@ -154,28 +168,7 @@ std::string experiment_between(const Alternative& one, const Alternative& other)
   if (one.cause == other.cause && one.subject != other.subject &&
       experiment != Experiment::of_a_network)
     return one_alone(one.subject, other.subject);
-  switch (experiment) {
-    case Experiment::of_a_network:
-      return "Warm up at one speed until nothing changes, then stop and record until nothing "
-             "changes: the steady state tells films and joints, the way there capacities, the "
-             "level sources.";
-    case Experiment::another_run:
-      return "Repeat the run with the same duty: a fault of one run does not come back.";
-    case Experiment::standstill:
-      return "Hold one constant speed for two hours, then stop and record two hours of standstill.";
-    case Experiment::along_the_axis:
-      return "Warm up, then measure at both ends and in the middle of the axis within ten minutes.";
-    case Experiment::twice_as_slow:
-      return "Repeat the same warm-up twice as slowly: a lag's loop closes, that of play does not.";
-    case Experiment::up_and_down:
-      return "Step the speed up and record until nothing moves, then step it down: only what has "
-             "memory parts the two branches.";
-    case Experiment::steady_levels:
-      return "Hold three different temperatures of the place until nothing moves any more.";
-    case Experiment::other_duty:
-      break;
-  }
-  return "Repeat the run with another sequence of speeds and another room temperature.";
+  return std::string(experiment_texts.at(static_cast<std::size_t>(experiment)));
 }
 
 }  // namespace thermocomp::diagnosis

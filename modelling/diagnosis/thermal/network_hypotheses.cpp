@@ -1,7 +1,6 @@
 #include "modelling/diagnosis/thermal/network_hypotheses.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "estimator/checks.hpp"
 #include "modelling/diagnosis/causes/cause.hpp"

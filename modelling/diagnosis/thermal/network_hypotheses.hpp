@@ -2,9 +2,7 @@
 #pragma once
 
 #include <deque>
-#include <functional>
 #include <memory>
-#include <string>
 #include <vector>
 
 #include "modelling/diagnosis/answer/answer.hpp"

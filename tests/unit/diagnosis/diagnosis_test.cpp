@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include <Eigen/QR>
 #include <catch2/catch.hpp>
 
 #include "config/model/model_file.hpp"
@@ -389,6 +390,33 @@ TEST_CASE("an effect along an axis is no rival of a wrong coefficient where no a
   CHECK(wrong.findings[0].subject == "t1_degC");
   CHECK(weighed(wrong, "wrong_coefficient"));
   CHECK_FALSE(weighed(wrong, "position_dependence"));
+}
+
+TEST_CASE(
+    "a matrix counts as fitted to the rows only if a fit of its inputs leaves as much of them",
+    "[diagnosis]") {
+  MeasuredMachine machine{{0.05, 0.02}, {9.0, -12.0}, {1.0, 1.0}};
+  machine.heat_um = 30.0;
+  const std::vector<RunFile> runs = {machine.run(1), machine.run(2)};
+  const auto fitted = [&](const ThermalModel& model) {
+    const MeasuredData data = measured_data(model, runs, {"a", "b"}, shared_columns(model, runs));
+    const std::vector<Hypothesis> all = hypotheses(data);
+    const SearchResult result = search(data, all);
+    CHECK_FALSE(result.findings.empty());
+    return result.fitted;
+  };
+  ThermalModel model = machine.model();
+  CHECK(fitted(model) == std::vector<bool>{false});
+  const MeasuredData data = measured_data(model, runs, {"a", "b"}, shared_columns(model, runs));
+  const Panel readings = stacked(data, [](const MeasuredRun& run) -> Panel {
+    Panel both(run.rows(), 2);
+    both << run.temps_K[0], run.temps_K[1];
+    return both;
+  });
+  const Column moved = stacked(data, [](const MeasuredRun& run) { return run.measured_um[0]; });
+  const Eigen::VectorXd fit = readings.colPivHouseholderQr().solve(moved);
+  model.matrix_um_per_K = {{fit[0], fit[1]}};
+  CHECK(fitted(model) == std::vector<bool>{true});
 }
 
 TEST_CASE("a temperature that is named is shown beside those of the model", "[diagnosis]") {

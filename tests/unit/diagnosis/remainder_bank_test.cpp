@@ -62,7 +62,7 @@ MeasuredData data_of(const ThermalModel& model, const RunFile& run) {
 std::optional<RemainderBank> bank_of(const RunFile& run) {
   const MeasuredData data = data_of(one_input(), run);
   std::vector<double> predictable;
-  return remainder_bank(data, residuals(data), predictable);
+  return remainder_bank(data, residuals(data), {false}, predictable);
 }
 
 double left_um(const ThermalModel& model, const RunFile& run) {
@@ -127,7 +127,7 @@ TEST_CASE("a matrix fitted to the rows is fitted anew to be judged", "[diagnosis
   fitted.matrix_um_per_K = {{product / square}};
   const MeasuredData data = data_of(fitted, run);
   std::vector<double> predictable;
-  const auto bank = remainder_bank(data, residuals(data), predictable);
+  const auto bank = remainder_bank(data, residuals(data), {true}, predictable);
   REQUIRE(bank);
   CHECK(bank->changes_coefficients);
   ThermalModel longer = fitted;
