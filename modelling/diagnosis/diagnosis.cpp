@@ -12,20 +12,19 @@
 namespace thermocomp::diagnosis {
 namespace {
 
-/// The model with one finding more; nothing where neither a term nor a correction carries it.
-std::optional<Extended> with_finding(const Extended& before, const Finding& finding,
-                                     const MeasuredData& train) {
-  Extended longer = before;
+/// @return whether a term or a correction carries the finding
+bool add_finding(Extended& model, const Finding& finding, const MeasuredData& train) {
   const std::vector<TermSpec> terms = terms_of(finding, train);
-  longer.model.terms.insert(longer.model.terms.end(), terms.begin(), terms.end());
+  model.model.terms.insert(model.model.terms.end(), terms.begin(), terms.end());
   const Cause& cause = cause_named(finding.explanation.hypothesis->cause);
+  bool corrects = false;
   for (std::size_t output = 0; output < train.model.outputs.size(); ++output) {
     if (cause.correction == nullptr || finding.explanation.gains[output].size() == 0) continue;
-    longer.corrections.push_back(cause.correction(parameters_of(finding, train)));
-    longer.corrections.back().output = output;
+    model.corrections.push_back(cause.correction(parameters_of(finding, train)));
+    model.corrections.back().output = output;
+    corrects = true;
   }
-  if (terms.empty() && longer.corrections.size() == before.corrections.size()) return std::nullopt;
-  return longer;
+  return corrects || !terms.empty();
 }
 
 std::map<std::string, TestGain> gains_on_test(const Extended& before, const Extended& after,
@@ -34,27 +33,40 @@ std::map<std::string, TestGain> gains_on_test(const Extended& before, const Exte
   std::map<std::string, TestGain> gains;
   const std::vector<Residuals> was = residuals(before, test);
   const std::vector<Residuals> is = residuals(after, test);
-  for (const std::string& output : outputs) {
-    const auto index = static_cast<std::size_t>(
-        std::find(test.model.outputs.begin(), test.model.outputs.end(), output) -
-        test.model.outputs.begin());
-    if (std::isfinite(root_mean_square(was[index])))
-      gains[output] = test_gain(was[index], is[index]);
+  for (std::size_t i = 0; i < was.size(); ++i) {
+    const std::string& output = test.model.outputs[i];
+    if (std::find(outputs.begin(), outputs.end(), output) != outputs.end() &&
+        std::isfinite(root_mean_square(was[i])))
+      gains[output] = test_gain(was[i], is[i]);
   }
   return gains;
 }
 
-/// The model with each finding added after those before it, and what each gains. One that the test
-/// runs speak against is named, and the model goes without it.
-Extended extend(Diagnosis& diagnosis, const std::vector<Finding>& findings,
-                const MeasuredData& train, const MeasuredData& test) {
+/// Coefficients fitted anew beside the findings. A model with terms or guideways keeps its own.
+/// @param errors  of each output, by what share its coefficients are wrong
+ThermalModel corrected(ThermalModel model, const std::vector<Eigen::VectorXd>& errors) {
+  if (!model.terms.empty() || !model.guideways.empty()) return model;
+  for (std::size_t output = 0; output < errors.size(); ++output)
+    for (std::size_t input = 0; input < model.inputs.size(); ++input)
+      model.matrix_um_per_K[output][input] *=
+          1.0 + errors[output][static_cast<Eigen::Index>(input)];
+  return model;
+}
+
+/// The model with each finding added after those before it, its coefficients fitted anew with the
+/// first, and what each gains. One that the test runs speak against is named, and the model goes
+/// without it.
+Extended extend(Diagnosis& diagnosis, const SearchResult& result, const MeasuredData& train,
+                const MeasuredData& test) {
   Extended extended{train.model, {}};
-  for (const Finding& finding : findings) {
+  const ThermalModel fitted = corrected(train.model, result.coefficient_errors);
+  for (const Finding& finding : result.findings) {
     NamedFinding name = named_finding(finding, train, parameters_of(finding, train));
-    if (std::optional<Extended> longer = with_finding(extended, finding, train)) {
-      name.test = gains_on_test(extended, *longer, name.outputs, test);
-      if (!fails_on_test_runs(name)) extended = std::move(*longer);
-    }
+    Extended longer = extended;
+    longer.model.matrix_um_per_K = fitted.matrix_um_per_K;
+    if (add_finding(longer, finding, train))
+      name.test = gains_on_test(extended, longer, name.outputs, test);
+    if (!fails_on_test_runs(name)) extended = std::move(longer);
     diagnosis.findings.push_back(std::move(name));
   }
   return extended;
@@ -83,8 +95,9 @@ std::vector<Candidate> candidates_of(const std::vector<Explanation>& weighed,
       for (const Eigen::VectorXd& gains : each.gains)
         alone.gains_ci.emplace_back(static_cast<std::size_t>(gains.size()));
       const Extended base{train.model, {}};
-      if (const auto longer = with_finding(base, alone, train))
-        candidate.test = gains_on_test(base, *longer, outputs, test);
+      Extended longer = base;
+      if (add_finding(longer, alone, train))
+        candidate.test = gains_on_test(base, longer, outputs, test);
       const Explanation& rival =
           &each == &weighed.front() && weighed.size() > 1 ? weighed[1] : weighed.front();
       candidate.would_decide = experiment_between(
@@ -93,16 +106,6 @@ std::vector<Candidate> candidates_of(const std::vector<Explanation>& weighed,
     all.push_back(std::move(candidate));
   }
   return all;
-}
-
-/// Coefficients fitted anew beside the findings. A model with terms or guideways keeps its own.
-void correct_coefficients(ThermalModel& extended, const ThermalModel& model,
-                          const std::vector<Eigen::VectorXd>& errors) {
-  if (!model.terms.empty() || !model.guideways.empty()) return;
-  for (std::size_t output = 0; output < errors.size(); ++output)
-    for (std::size_t input = 0; input < model.inputs.size(); ++input)
-      extended.matrix_um_per_K[output][input] *=
-          1.0 + errors[output][static_cast<Eigen::Index>(input)];
 }
 
 /// The bank last.
@@ -115,7 +118,10 @@ void add_remainder(ThermalModel& model, const RemainderBank& remainder) {
 /// @return of each output the share that can
 std::vector<double> add_remainder_bank(Diagnosis& diagnosis, Extended& extended,
                                        const MeasuredData& train, const MeasuredData& test,
-                                       const std::vector<bool>& fitted) {
+                                       const SearchResult& result) {
+  // Beside a finding the coefficients are no longer those that were fitted.
+  const std::vector<bool> fitted =
+      result.findings.empty() ? result.fitted : std::vector<bool>(result.fitted.size());
   std::vector<double> predictable;
   diagnosis.remainder = remainder_bank(train, residuals(extended, train), fitted, predictable);
   if (!diagnosis.remainder) return predictable;
@@ -163,11 +169,9 @@ Diagnosis diagnose(const ThermalModel& model, std::vector<RunFile> train,
   diagnosis.verdict = verdict_of(result);
   diagnosis.families = result.families;
   diagnosis.weighed = candidates_of(result.weighed, train_data, test_data);
-  Extended extended = extend(diagnosis, result.findings, train_data, test_data);
-  if (!diagnosis.findings.empty())
-    correct_coefficients(extended.model, model, result.coefficient_errors);
+  Extended extended = extend(diagnosis, result, train_data, test_data);
   const std::vector<double> predictable =
-      add_remainder_bank(diagnosis, extended, train_data, test_data, result.fitted);
+      add_remainder_bank(diagnosis, extended, train_data, test_data, result);
   diagnosis.extended = extended.model;
   const std::vector<Residuals> train_base = residuals(train_data);
   const std::vector<Residuals> base = residuals(test_data);

@@ -78,11 +78,6 @@ void set_output(MeasuredTests& tests, const MeasuredData& data, const Residuals&
   }
 }
 
-Eigen::VectorXd matrix_row(const ThermalModel& model, std::size_t output) {
-  const std::vector<double>& row = model.matrix_um_per_K[output];
-  return Eigen::Map<const Eigen::VectorXd>(row.data(), std::ssize(row));
-}
-
 /// Adds what the matrix takes away: the coefficients are free again.
 void add_matrix(MeasuredTests& tests, const Eigen::VectorXd& row) {
   for (identification::TestRun& run : tests.runs)
@@ -199,7 +194,9 @@ std::optional<RemainderBank> remainder_bank(const MeasuredData& train,
   RemainderBank bank;
   for (std::size_t output = 0; output < left.size(); ++output) {
     set_output(tests, train, left[output], apart);
-    const Eigen::VectorXd row = matrix_row(train.model, output);
+    const std::vector<double>& coefficients = train.model.matrix_um_per_K[output];
+    const Eigen::VectorXd row =
+        Eigen::Map<const Eigen::VectorXd>(coefficients.data(), std::ssize(coefficients));
     std::optional<BankEquations> static_fit;
     if (fitted[output]) {
       static_fit = static_equations(tests, train.model, row);
