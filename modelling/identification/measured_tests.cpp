@@ -24,6 +24,8 @@ constexpr double still_K = 1e-6;
 constexpr double rounding_share = 1e-9;
 /// Smaller reversals, as a share of a signal's range, are ignored.
 constexpr double way_share = 0.1;
+/// A signal with a larger step between two rows, as a share of its range, is not gradual.
+constexpr double gradual_share = 0.25;
 
 [[noreturn]] void refuse(const std::string& file, const std::string& key, const std::string& rule) {
   throw ConfigurationError({Problem{file, 0, key, "", rule}});
@@ -232,9 +234,13 @@ bool is_constant(const MeasuredTests& tests, std::size_t signal) {
   return !(within > still_share * still_share * size);
 }
 
-/// True if the signal goes up or down at most once in all runs together: its effect cannot be
-/// separated from that of time.
-bool is_monotonic(const MeasuredTests& tests, std::size_t signal) {
+/// Course of a signal over the selected rows of all runs.
+struct Ways {
+  int count{0};              ///< how often it goes up or down
+  double largest_step{0.0};  ///< between two rows, as a share of its range
+};
+
+Ways ways_of(const MeasuredTests& tests, std::size_t signal) {
   const auto column = static_cast<Eigen::Index>(signal);
   const auto selected = [column](const TestRun& run) {
     return run.signals.col(column).tail(run.time_s.size() - run.begin);
@@ -246,26 +252,41 @@ bool is_monotonic(const MeasuredTests& tests, std::size_t signal) {
     most = std::max(most, selected(run).maxCoeff());
   }
   const double turn = way_share * (most - least);
-  int ways = 0;
+  Ways ways;
   for (const TestRun& run : tests.runs) {
     int way = 0;  // up: 1, down: -1
-    double low = selected(run)[0];
-    double high = low;
+    double last = selected(run)[0];
+    double low = last;
+    double high = last;
     for (const double value : selected(run)) {
+      ways.largest_step = std::max(ways.largest_step, std::abs(value - last) / (most - least));
+      last = value;
       low = std::min(low, value);
       high = std::max(high, value);
       if (way != 1 && value > low + turn) {
         way = 1;
         high = value;
-        ++ways;
+        ++ways.count;
       } else if (way != -1 && value < high - turn) {
         way = -1;
         low = value;
-        ++ways;
+        ++ways.count;
       }
     }
   }
-  return ways < 2;
+  return ways;
+}
+
+/// Fills `unmoved` and `gradual`. The effect of a signal that goes one way once cannot be separated
+/// from that of time.
+void find_unmoved(MeasuredTests& tests) {
+  for (std::size_t i = 0; i < tests.signals.size(); ++i) {
+    const bool constant = is_constant(tests, i);
+    const Ways ways = ways_of(tests, i);
+    if (!constant && ways.count > 1) continue;
+    tests.unmoved.push_back(tests.signals[i]);
+    if (!constant && ways.largest_step < gradual_share) tests.gradual.push_back(tests.signals[i]);
+  }
 }
 
 std::vector<Fold> make_folds(const std::vector<TestRun>& runs, std::size_t stretches) {
@@ -343,8 +364,7 @@ MeasuredTests measured_tests(const std::vector<RunFile>& given, const TestOption
   for (const RunFile& run : runs)
     tests.runs.push_back(
         make_run(run, tests.places, tests.outputs, tests.signals, options.between_probings));
-  for (std::size_t i = 0; i < tests.signals.size(); ++i)
-    if (is_constant(tests, i) || is_monotonic(tests, i)) tests.unmoved.push_back(tests.signals[i]);
+  find_unmoved(tests);
   leave_out_still_places(tests);
   if (tests.places.empty()) refuse(runs.front().name, "", "has no temperature that can be used");
   tests.folds = make_folds(tests.runs, options.folds_of_one_run);

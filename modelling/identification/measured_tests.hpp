@@ -43,6 +43,8 @@ struct MeasuredTests {
   /// Signals that stay at a level within each run, or change in one direction once in all runs:
   /// they get no gain.
   std::vector<std::string> unmoved;
+  /// Those of `unmoved` that change gradually, like a charge: see fit_families().
+  std::vector<std::string> gradual;
   std::vector<TestRun> runs;
   std::vector<Fold> folds;
   HotHalf hot;

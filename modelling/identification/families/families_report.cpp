@@ -103,7 +103,7 @@ std::string families_json(const MeasuredTests& tests, const FamiliesFit& fit) {
   json["family"] = to_string(fit.chosen);
   json["chosen_because"] = fit.chosen_because;
   json["together"] = fit.together;
-  json["unmoved"] = tests.unmoved;
+  json["unmoved"] = fit.unmoved;
   json["judged_within_one_run"] = tests.runs.size() < 2;
   const FamilyResult& chosen = fit.chosen_result();
   for (std::size_t o = 0; o < tests.outputs.size(); ++o) {

@@ -463,6 +463,30 @@ TEST_CASE("a signal that changes in one direction once in all runs gets no gain"
   CHECK_FALSE(unmoved({0.0, 60.0, 0.0, 60.0}));
 }
 
+TEST_CASE("a signal that goes one way gradually gets gains if all that is left out needs them",
+          "[families]") {
+  const auto unmoved = [](double um_per_Ah, bool gradual) {
+    RunFile run =
+        machine_run("run", 1, [](double quick, double, double, double) { return 2.0 * quick; });
+    run.columns[3] = "charge_Ah";
+    for (std::size_t row = 0; row < run.rows(); ++row) {
+      const double hour = static_cast<double>(row) / 60.0;
+      run.values[3][row] = gradual ? hour + 0.4 * std::sin(2.0 * hour) : (hour > 4.0 ? 6.0 : 0.0);
+      run.values[4][row] += um_per_Ah * run.values[3][row];
+    }
+    TestOptions options;
+    options.outputs = {"z_um"};
+    options.folds_of_one_run = 8;
+    options.signals = true;
+    const FamiliesFit fit = fitted(measured_tests({run}, options));
+    CHECK(fit.model.signal_columns().empty() == !fit.unmoved.empty());
+    return fit.unmoved;
+  };
+  CHECK(unmoved(10.0, true).empty());
+  CHECK(unmoved(0.0, true) == std::vector<std::string>{"charge_Ah"});
+  CHECK(unmoved(10.0, false) == std::vector<std::string>{"charge_Ah"});
+}
+
 TEST_CASE("a family that is worse than no model on a run left out is not chosen", "[families]") {
   // The third run moves in the opposite direction: any two runs predict the other wrongly.
   std::vector<RunFile> files;
