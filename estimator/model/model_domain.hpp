@@ -60,7 +60,7 @@ class OutsideShare {
 
 /// Standard deviation of a prediction's error [um]:
 ///
-///     hypot(left_out_rms_um, 0.3 no_model_rms_um / sqrt(runs)).
+///     hypot(left_out_rms_um, 0.25 no_model_rms_um / runs^(1/4)).
 ///
 /// The second part is for behaviour that the runs have not shown; outside the domain runs = 1.
 /// Measured machines show no further growth with the distance (docs/measurements.md).

@@ -50,9 +50,9 @@ TEST_CASE("an indeterminate remainder is unknown, and a linear rise is not close
 ThermalModel model_with_claim() {
   ThermalModel model;
   model.outputs = {"z_um"};
-  model.made_from.emplace().runs.resize(4);
+  model.made_from.emplace().runs.resize(16);
   MadeFrom::Output& output = model.made_from->outputs["z_um"];
-  output.left_out_rms_um = 4.0;
+  output.left_out_rms_um = std::sqrt(5.0 * 5.0 - 2.5 * 2.5);
   output.no_model_rms_um = 20.0;
   return model;
 }
@@ -65,7 +65,7 @@ TEST_CASE("a probing is due by the model's error since the last one", "[warm_up]
   since.note(axes, "a");
   axes[0].displacement_um = 25.0;
   since.note(axes, "a");
-  // 5 / 20 of the 20 um since the start; 5 = hypot(4 left out, 3 for the number of runs).
+  // 5 / 20 of the 20 um since the start; 5 = hypot(what was left out, 2.5 for the number of runs).
   CHECK(since.error_um(0, axes[0], model, "z_um", false) == Approx(5.0));
   axes[0].probings = 1;
   since.note(axes, "a");

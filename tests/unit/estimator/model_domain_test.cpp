@@ -51,13 +51,13 @@ TEST_CASE("the distance uses the covariance: a feature at its own standard devia
   CHECK(domain.distance() == Approx(std::sqrt((1.0 + 1.0) / 2.0)));
   CHECK_FALSE(domain.outside());
   CHECK(domain.used_share() == 1.0);
-  CHECK(domain.sd_um(0) == Approx(std::hypot(1.5, 1.5)));
+  CHECK(domain.sd_um(0) == Approx(std::hypot(1.5, 2.5 / std::sqrt(2.0))));
   domain.step(3s, Vector{26.0, 0.0}, Vector{20.0, 0.0}, {});
   const double squared = (36.0 + 9.0) / 2.0;
   CHECK(domain.distance() == Approx(std::sqrt(squared)));
   CHECK(domain.outside());
   CHECK(domain.used_share() == Approx(4.0 / squared));
-  CHECK(domain.sd_um(0) == Approx(std::hypot(1.5, 3.0)));  // its runs count as one
+  CHECK(domain.sd_um(0) == Approx(std::hypot(1.5, 2.5)));  // its runs count as one
 }
 
 TEST_CASE("a cold morning is outside although the machine has not moved", "[domain]") {

@@ -193,11 +193,11 @@ TEST_CASE("few runs increase the uncertainty of a prediction", "[families]") {
   made_from.runs = {"a.csv"};
   MadeFrom::Output output;
   output.left_out_rms_um = 4.0;
-  output.no_model_rms_um = 10.0;
+  output.no_model_rms_um = 12.0;
   CHECK(spread_um(made_from, output, false) == Approx(5.0));
-  made_from.runs.resize(9);
+  made_from.runs.resize(16);
   CHECK(spread_um(made_from, output, true) == Approx(5.0));
-  CHECK(spread_um(made_from, output, false) == Approx(std::hypot(4.0, 1.0)));
+  CHECK(spread_um(made_from, output, false) == Approx(std::hypot(4.0, 1.5)));
   output.no_model_rms_um = 0.0;  // not stated
   CHECK(spread_um(made_from, output, false) == 4.0);
 }
