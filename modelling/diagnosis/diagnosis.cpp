@@ -42,10 +42,9 @@ std::map<std::string, TestGain> gains_on_test(const Extended& before, const Exte
   return gains;
 }
 
-/// Coefficients fitted anew beside the findings. A model with terms or guideways keeps its own.
+/// Coefficients fitted anew beside the findings.
 /// @param errors  of each output, by what share its coefficients are wrong
 ThermalModel corrected(ThermalModel model, const std::vector<Eigen::VectorXd>& errors) {
-  if (!model.terms.empty() || !model.guideways.empty()) return model;
   for (std::size_t output = 0; output < errors.size(); ++output)
     for (std::size_t input = 0; input < model.inputs.size(); ++input)
       model.matrix_um_per_K[output][input] *=

@@ -18,10 +18,6 @@ constexpr double missing_share_max = 0.2;
 /// A matrix that was fitted or calculated is right to a few per cent.
 constexpr double coefficient_sd = 0.03;
 
-bool contains(const std::vector<std::string>& names, const std::string& name) {
-  return std::find(names.begin(), names.end(), name) != names.end();
-}
-
 double missing_share(const std::vector<double>& values) {
   const auto missing =
       std::count_if(values.begin(), values.end(), [](double x) { return !std::isfinite(x); });
@@ -99,13 +95,15 @@ SharedColumns shared_columns(const ThermalModel& model, const std::vector<RunFil
   std::vector<std::string> always = model.temperature_columns();
   for (const std::string& name : model.signal_columns()) always.push_back(name);
   for (const std::string& name : runs.front().columns) {
-    if (name == "time_s" || contains(model.inputs, name) || is_output(name)) continue;
+    if (name == "time_s" || place_among(model.inputs, name) < model.inputs.size() ||
+        is_output(name))
+      continue;
     const auto has = [&name](const RunFile& run) {
       return run.find(name) && missing_share(run.column(name)) <= missing_share_max;
     };
     const bool everywhere = std::all_of(runs.begin(), runs.end(), has) &&
                             std::all_of(further.begin(), further.end(), has);
-    if (!everywhere && !contains(always, name)) continue;
+    if (!everywhere && place_among(always, name) == always.size()) continue;
     (is_temperature(name) ? columns.temperatures : columns.signals).push_back(name);
   }
   return columns;

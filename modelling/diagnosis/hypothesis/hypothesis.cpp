@@ -77,10 +77,6 @@ double median_step_s(const MeasuredData& data) {
   return steps.empty() ? 1.0 : median(std::move(steps));
 }
 
-bool moves(const Column& column) {
-  return column.size() > 1 && column.maxCoeff() > column.minCoeff();
-}
-
 }  // namespace
 
 Material::Material(const MeasuredData& data) : data_(data), step_s_(median_step_s(data)) {
@@ -136,7 +132,8 @@ std::optional<Subject> Material::room() const {
 
 bool Material::moves_anywhere(const ColumnOf& of) const {
   return std::any_of(data_.runs.begin(), data_.runs.end(), [&](const MeasuredRun& run) {
-    return moves(of(run).tail(run.rows() - run.begin));
+    const auto values = of(run).tail(run.rows() - run.begin);
+    return values.size() > 1 && values.maxCoeff() > values.minCoeff();
   });
 }
 

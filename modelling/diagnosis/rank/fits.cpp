@@ -185,7 +185,7 @@ Fits::Fits(const MeasuredData& data, Readings& readings, const std::vector<Expla
     Panel beside = free.rightCols(free.cols() - std::ssize(runs));
     if (fitted) beside = joined(beside, coefficients);
     outputs_[output] = {OutputFit(std::move(of), means, joined(free, coefficients), sd, least),
-                        std::move(free),
+                        std::move(free), std::move(coefficients),
                         LeftOut(centred_in(runs, means).col(0), centred_in(runs, beside)), fitted};
   }
 }
@@ -440,7 +440,9 @@ void Fits::judge_left_out(const Hypothesis& hypothesis, std::size_t output, cons
 
 Eigen::VectorXd Fits::coefficient_errors(std::size_t output) const {
   const auto inputs = std::ssize(data_.model.inputs);
-  if (!outputs_[output] || !(data_.coefficient_sd > 0)) return Eigen::VectorXd::Zero(inputs);
+  const bool plain = data_.model.terms.empty() && data_.model.guideways.empty();
+  if (!outputs_[output] || !(data_.coefficient_sd > 0) || !plain)
+    return Eigen::VectorXd::Zero(inputs);
   return outputs_[output]->fit.common_factors().tail(inputs);
 }
 
@@ -450,8 +452,11 @@ Column Fits::effect_of(const Explanation& explanation, std::size_t output) const
   return centred_in(rows.runs(), rows.means_of(columns) * explanation.gains[output]).col(0);
 }
 
-double Fits::rms_left(std::size_t output) const {
-  return rms_beside(outputs_[output]->fit.remainder(), outputs_[output]->free);
+double Fits::rms_left(std::size_t output, bool corrected) const {
+  const Output& of = *outputs_[output];
+  Column left = of.fit.remainder();
+  if (corrected && of.coefficients.cols() > 0) left -= of.coefficients * coefficient_errors(output);
+  return rms_beside(left, of.free);
 }
 
 }  // namespace thermocomp::diagnosis

@@ -50,18 +50,20 @@ class Fits {
   [[nodiscard]] bool measured(std::size_t output) const { return outputs_[output].has_value(); }
   [[nodiscard]] const OutputFit& output(std::size_t output) const { return outputs_[output]->fit; }
   /// By what share each coefficient of an output is wrong, fitted beside what is accepted; 0 where
-  /// they are not doubted.
+  /// they are not doubted, and of a model with terms or guideways, which keeps its own.
   [[nodiscard]] Eigen::VectorXd coefficient_errors(std::size_t output) const;
   /// What an explanation moves the rows of an output by, each run's mean off.
   [[nodiscard]] Column effect_of(const Explanation& explanation, std::size_t output) const;
   /// RMS of the remainder beside the runs' offsets and what is accepted.
-  [[nodiscard]] double rms_left(std::size_t output) const;
+  /// @param corrected  with the coefficients fitted anew
+  [[nodiscard]] double rms_left(std::size_t output, bool corrected) const;
 
  private:
   struct Output {
     OutputFit fit;
-    Panel free;        ///< offsets of the runs, columns of what is accepted
-    LeftOut left_out;  ///< of the remainder, each run's mean off
+    Panel free;          ///< offsets of the runs, columns of what is accepted
+    Panel coefficients;  ///< the displacement that each makes
+    LeftOut left_out;    ///< of the remainder, each run's mean off
     bool fitted;
   };
   [[nodiscard]] bool concerns(const Hypothesis& hypothesis, std::size_t output) const;

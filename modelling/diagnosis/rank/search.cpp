@@ -152,14 +152,14 @@ class Search {
     std::vector<Remainder> before;
     for (std::size_t round = 0; round < findings_max; ++round) {
       const Fits fits = fits_beside(explanations_of(result.findings));
-      if (round == 0) before = remainders(fits);
+      if (round == 0) before = remainders(fits, false);
       if (!add_finding(fits, round, result)) break;
     }
     std::vector<Remainder> after = before;
     if (!result.findings.empty()) {
       settle_together(result.findings);
       const Fits fits = fits_beside(explanations_of(result.findings));
-      after = remainders(fits);
+      after = remainders(fits, true);
       for (std::size_t output = 0; output < after.size(); ++output)
         result.coefficient_errors.push_back(fits.coefficient_errors(output));
     }
@@ -195,11 +195,11 @@ class Search {
     bool fitted{false};       ///< by coefficients of these rows
   };
 
-  std::vector<Remainder> remainders(const Fits& fits) const {
+  std::vector<Remainder> remainders(const Fits& fits, bool corrected) const {
     std::vector<Remainder> all(data_.model.outputs.size());
     for (std::size_t output = 0; output < all.size(); ++output) {
       if (!fits.measured(output)) continue;
-      const double rms = fits.rms_left(output);
+      const double rms = fits.rms_left(output, corrected);
       const double noise = fits.output(output).noise();
       Remainder& of = all[output];
       of.structure = std::max(0.0, rms * rms - noise * noise);
@@ -283,26 +283,23 @@ class Search {
   /// explain, and those whose gain may be 0.
   void settle_together(std::vector<Finding>& findings) {
     for (std::size_t i = 0; i < findings.size();) {
-      std::vector<Explanation> others;
-      for (std::size_t j = 0; j < findings.size(); ++j)
-        if (j != i) others.push_back(findings[j].explanation);
+      Finding& finding = findings[i];
+      std::vector<Explanation> others = explanations_of(findings);
+      others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
       const Fits fits = fits_beside(others);
-      if (!others.empty()) fits.refine(findings[i].explanation);
-      std::vector<Explanation> alone = {findings[i].explanation};
-      if (!others.empty() &&
-          (weigh_against_each_other(alone, Round::first).none > 1.0 - probability_min ||
-           !matters(fits, findings[i].explanation))) {
-        findings.erase(findings.begin() + static_cast<std::ptrdiff_t>(i));
-        i = 0;
-        continue;
+      bool keep = true;
+      if (!others.empty()) {
+        fits.refine(finding.explanation);
+        std::vector<Explanation> alone = {finding.explanation};
+        keep = weigh_against_each_other(alone, Round::first).none <= 1.0 - probability_min &&
+               matters(fits, finding.explanation);
       }
-      fits.refine(findings[i].explanation, Fits::By::likelihood);
-      if (!set_spread(fits, findings[i])) {
-        findings.erase(findings.begin() + static_cast<std::ptrdiff_t>(i));
-        i = 0;
-        continue;
+      if (keep) {
+        fits.refine(finding.explanation, Fits::By::likelihood);
+        keep = set_spread(fits, finding);
       }
-      ++i;
+      if (!keep) findings.erase(findings.begin() + static_cast<std::ptrdiff_t>(i));
+      i = keep ? i + 1 : 0;
     }
   }
 

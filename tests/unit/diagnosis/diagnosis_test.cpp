@@ -403,6 +403,7 @@ TEST_CASE(
     const std::vector<Hypothesis> all = hypotheses(data);
     const SearchResult result = search(data, all);
     CHECK_FALSE(result.findings.empty());
+    CHECK(result.unexplained_share[0] < 0.1);  // the coefficients fitted anew beside the finding
     return result.fitted;
   };
   ThermalModel model = machine.model();
