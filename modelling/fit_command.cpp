@@ -122,14 +122,15 @@ int run_few(const Options& options, const MeasuredTests& tests, const FitOptions
   return 0;
 }
 
-int run_families(const Options& options, const MeasuredTests& tests,
-                 const FitOptions& fit_options) {
+FamiliesFit compared_families(const Options& options, const MeasuredTests& tests,
+                              const FitOptions& fit_options) {
   std::optional<Family> forced;
   if (!options.family.empty()) forced = family_of(options.family);
-  std::optional<cli::Progress> progress("comparing models");
-  const FamiliesFit fit =
-      fit_families(tests, fit_options, forced, [&](double share) { progress->update(share); });
-  progress.reset();
+  cli::Progress progress("comparing models");
+  return fit_families(tests, fit_options, forced, [&](double share) { progress.update(share); });
+}
+
+int write_families(const Options& options, const MeasuredTests& tests, const FamiliesFit& fit) {
   cli::write_file(options.model, model_text(options, fit.model));
   if (!options.report.empty()) cli::write_file(options.report, families_html(tests, fit));
   if (options.model == "-") return 0;
@@ -137,18 +138,33 @@ int run_families(const Options& options, const MeasuredTests& tests,
   return 0;
 }
 
-/// Coefficients of a type or of last year's model, updated by the runs.
-int run_prior(const Options& options, const std::vector<RunFile>& runs) {
+/// Coefficients of a type or of last year's model, updated by the runs; the machine's own fit where
+/// the prior does not hold.
+int run_prior(const Options& options, const std::vector<RunFile>& runs, const MeasuredTests& tests,
+              const FitOptions& fit_options) {
   const series::Series prior =
       series::load_prior(options.prior, options.drift_percent / 100.0, options.years);
-  std::vector<std::string> notes;
-  const series::Statistics machine = series::statistics_of(
-      runs, "the machine", options.tests.outputs, prior.columns.taus_s, notes);
-  for (const std::string& note : notes) std::fprintf(stderr, "%s\n", note.c_str());
+  std::vector<std::string> notes;  // those of tests
+  const series::Statistics machine =
+      series::statistics_of(runs, "the machine", tests.outputs, prior.columns.taus_s, notes);
   const series::Adapted adapted = series::adapted(prior, machine, options.prior);
+  const FamiliesFit own = compared_families(options, tests, fit_options);
+  const series::PriorJudgement judgement =
+      series::judged(prior, runs, tests, own.model, options.prior);
+  if (!judgement.holds()) {
+    std::fprintf(stderr,
+                 "%s%s is not used, since it leaves no less than no model. The model is the "
+                 "machine's own fit\n",
+                 judgement.text(tests.outputs).c_str(), options.prior.c_str());
+    return write_families(options, tests, own);
+  }
+  if (judgement.own_is_better())
+    std::fprintf(stderr,
+                 "warning: the machine's own fit leaves less than the prior of these runs. Next: "
+                 "judge both (fit with and without --prior) on the next run\n");
   cli::write_file(options.model, model_text(options, adapted.model));
   if (options.model == "-") return 0;
-  cli::write_file("-", series::adapted_text(prior, machine, adapted, options.json));
+  cli::write_file("-", series::adapted_text(prior, machine, adapted, judgement, options.json));
   return 0;
 }
 
@@ -184,7 +200,6 @@ int run(const Options& options) {
   const auto [runs, steps] = inspection::without_steps(
       cli::RunLoader(options.columns).load(options.runs), options.tests.outputs);
   for (const std::string& note : steps) std::fprintf(stderr, "%s\n", note.c_str());
-  if (!options.prior.empty()) return run_prior(options, runs);
   TestOptions test_options = options.tests;
   const bool few = options.few_asked_for() && options.family.empty();
   if (few && !options.free_choice && options.tests.places.empty())
@@ -196,7 +211,9 @@ int run(const Options& options) {
   MeasuredTests tests = measured_tests(runs, test_options);
   note_doubtful_readings(runs, tests);
   for (const std::string& note : tests.notes) std::fprintf(stderr, "%s\n", note.c_str());
-  return few ? run_few(options, tests, fit_options) : run_families(options, tests, fit_options);
+  if (!options.prior.empty()) return run_prior(options, runs, tests, fit_options);
+  if (few) return run_few(options, tests, fit_options);
+  return write_families(options, tests, compared_families(options, tests, fit_options));
 }
 
 }  // namespace

@@ -10,6 +10,10 @@
 #include "estimator/thermal_model.hpp"
 #include "modelling/series/statistics.hpp"
 
+namespace thermocomp::identification {
+struct MeasuredTests;
+}
+
 namespace thermocomp::series {
 
 struct OutputSeries {
@@ -56,6 +60,24 @@ struct Adapted {
 [[nodiscard]] Adapted adapted(const Series& series, const Statistics& machine,
                               const std::string& prior_name);
 
+/// RMS on left-out runs, of a single run on each half by the other; one value per output.
+struct PriorJudgement {
+  std::vector<double> prior_um;  ///< the prior, adapted to the rest; empty: too few rows to judge
+  std::vector<double> own_um;    ///< the machine's own fit
+  std::vector<double> none_um;
+
+  /// False unless the prior leaves a tenth less than no model, in geometric mean of the outputs.
+  [[nodiscard]] bool holds() const;
+  /// Of four measured machines with this result on the first part of a run, all had the smaller
+  /// error with the prior on the rest: a reason to compare the two later, not to choose.
+  [[nodiscard]] bool own_is_better() const;
+  [[nodiscard]] std::string text(const std::vector<std::string>& outputs) const;
+};
+/// @param runs, tests  the same runs
+[[nodiscard]] PriorJudgement judged(const Series& prior, const std::vector<RunFile>& runs,
+                                    const identification::MeasuredTests& tests,
+                                    const ThermalModel& own, const std::string& prior_name);
+
 /// A machine's own past as a prior: m = b, S = V plus `drift`, a share of the displacement.
 /// @throws std::runtime_error if machine and series do not fit together
 [[nodiscard]] Series own_series(const Series& prior, const Statistics& machine,
@@ -63,7 +85,8 @@ struct Adapted {
 
 /// Result of prior and rows, as text or JSON.
 [[nodiscard]] std::string adapted_text(const Series& series, const Statistics& machine,
-                                       const Adapted& adapted, bool json);
+                                       const Adapted& adapted, const PriorJudgement& judgement,
+                                       bool json);
 
 /// Departure of a machine from its sisters in one output.
 struct Comparison {

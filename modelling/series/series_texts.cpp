@@ -23,7 +23,7 @@ double learned_of(const OutputSeries& output, const Eigen::MatrixXd& moment,
 }  // namespace
 
 std::string adapted_text(const Series& series, const Statistics& machine, const Adapted& adapted,
-                         bool json) {
+                         const PriorJudgement& judgement, bool json) {
   Json all;
   std::string text = printed("%.3g h of %zu runs, prior of %zu machines\n", machine.time_s / 3600.0,
                              machine.runs.size(), series.machines.size());
@@ -40,6 +40,12 @@ std::string adapted_text(const Series& series, const Statistics& machine, const 
                             {"expected_rms_um", stated.left_out_rms_um},
                             {"no_model_rms_um", stated.no_model_rms_um}};
   }
+  for (std::size_t o = 0; o < judgement.prior_um.size(); ++o) {
+    Json& output = all["outputs"][machine.outputs[o]];
+    output["left_out_rms_um"] = judgement.prior_um[o];
+    output["own_left_out_rms_um"] = judgement.own_um[o];
+  }
+  text += judgement.text(machine.outputs);
   return json ? all.dump(2) + "\n" : text;
 }
 

@@ -22,10 +22,6 @@ constexpr Eigen::Index stretches_of_only_run = 6;
 constexpr std::size_t runs_that_choose = 4;
 constexpr std::size_t stretches_that_choose = 8;
 constexpr double correlation_of_one = 0.98;
-/// Least reduction of the left-out RMS relative to no model. With it, pure noise got a model in
-/// none of 60 sets of four to seven simulated runs, and in three of 30 sets with noise that wanders
-/// for hours.
-constexpr double less_than_none = 0.1;
 /// The bank is kept while its error exceeds that of few sensors by at most this share: on later
 /// rows it had the smaller error on 68 of 86 splits of measured machines, and on 8 of the 12 in
 /// which few sensors had the smaller error on the stretches.
@@ -220,15 +216,6 @@ std::vector<FamilyResult> judged(const MeasuredTests& tests, const FitOptions& o
   }
   results.push_back(judge_bank(tests, BankEquations(tests, columns), done));
   return results;
-}
-
-/// The halves of the only run as folds, since a model is used after its record.
-MeasuredTests in_halves(const MeasuredTests& tests) {
-  MeasuredTests halves = tests;
-  const Fold& first = tests.folds[tests.folds.size() / 2];
-  const Eigen::Index middle = first.begin;
-  halves.folds = {{0, tests.folds.front().begin, middle}, {0, middle, tests.folds.back().end}};
-  return halves;
 }
 
 using Judgement = std::pair<MeasuredTests, std::vector<FamilyResult>>;
@@ -530,6 +517,14 @@ std::optional<Family> family_of(std::string_view name) {
   for (const Family family : all_families)
     if (to_string(family) == name) return family;
   return std::nullopt;
+}
+
+MeasuredTests in_halves(const MeasuredTests& tests) {
+  MeasuredTests halves = tests;
+  const Fold& first = tests.folds[tests.folds.size() / 2];
+  const Eigen::Index middle = first.begin;
+  halves.folds = {{0, tests.folds.front().begin, middle}, {0, middle, tests.folds.back().end}};
+  return halves;
 }
 
 const FamilyResult& FamiliesFit::chosen_result() const {

@@ -31,7 +31,8 @@ struct Feature {
   Eigen::VectorXd floor;  ///< smallest standard deviations
 };
 
-/// Column of the model over a run: rise or signal, and the reference of a temperature.
+/// Column of the model over a run: rise or signal, and the reference of a temperature; zeros if
+/// `tests` left it out.
 struct Course {
   Eigen::VectorXd values;
   double reference{0.0};
@@ -44,6 +45,7 @@ Course course_of(const MeasuredTests& tests, const TestRun& run, const std::stri
     return {run.places_K.col(at), run.reference_degC[at]};
   }
   const auto signal = std::find(tests.signals.begin(), tests.signals.end(), name);
+  if (signal == tests.signals.end()) return {Eigen::VectorXd::Zero(run.time_s.size()), 0.0};
   return {run.signals.col(signal - tests.signals.begin()), 0.0};
 }
 
@@ -149,7 +151,8 @@ void fill_noise(const MeasuredTests& tests, const Eigen::VectorXd& left, MadeFro
   output.freedom = std::clamp(hours_s / std::max(2.0 * output.noise_time_s, 1e-9), 1.0, size);
 }
 
-/// RMS remainder of the model on the rows that it was fitted to, one per output.
+}  // namespace
+
 std::vector<double> remainders_um(const MeasuredTests& tests, const ThermalModel& model) {
   std::vector<double> squares(model.outputs.size(), 0.0);
   DisplacementModel displacement(model);
@@ -159,29 +162,30 @@ std::vector<double> remainders_um(const MeasuredTests& tests, const ThermalModel
   const std::vector<double> reference(temperatures.size(), 0.0);
   std::vector<double> values(signals.size());
   std::vector<double> now_um(model.outputs.size());
-  for (const TestRun& run : tests.runs) {
+  double rows = 0.0;
+  for (const Fold& fold : tests.folds) {
+    const TestRun& run = tests.runs[fold.run];
     displacement.restart();
     std::vector<Course> courses;
     courses.reserve(temperatures.size() + signals.size());
     for (const std::string& name : temperatures) courses.push_back(course_of(tests, run, name));
     for (const std::string& name : signals) courses.push_back(course_of(tests, run, name));
     std::vector<double> first_um;
-    for (Eigen::Index row = 0; row < run.time_s.size(); ++row) {
+    for (Eigen::Index row = 0; row < fold.end; ++row) {
       for (std::size_t i = 0; i < temps.size(); ++i) temps[i] = courses[i].values[row];
       for (std::size_t i = 0; i < values.size(); ++i)
         values[i] = courses[temps.size() + i].values[row];
       displacement.step(time_of(run.time_s[row]), temps, reference, values, now_um);
       if (row == 0) first_um = now_um;
-      for (std::size_t o = 0; o < now_um.size() && row >= run.begin; ++o)
+      for (std::size_t o = 0; o < now_um.size() && row >= fold.begin; ++o)
         squares[o] += std::pow(
             run.outputs_um(row, static_cast<Eigen::Index>(o)) - (now_um[o] - first_um[o]), 2.0);
     }
+    rows += static_cast<double>(fold.end - fold.begin);
   }
-  for (double& each : squares) each = std::sqrt(each / static_cast<double>(tests.rows()));
+  for (double& each : squares) each = std::sqrt(each / rows);
   return squares;
 }
-
-}  // namespace
 
 MadeFrom made_from_tests(const MeasuredTests& tests, const FamiliesFit& fit) {
   MadeFrom made_from;

@@ -76,6 +76,20 @@ def test_a_new_machine_with_one_hour_is_better_with_its_sisters(series, tmp_path
     assert again.returncode == 0, again.stderr
 
 
+def test_a_prior_that_leaves_no_less_than_no_model_is_not_used(series, tmp_path):
+    last_year, model = tmp_path / "last_year.toml", tmp_path / "model.toml"
+    healthy = write_run(tmp_path / "healthy.csv", 93, 5.0)
+    done = run("fit", healthy, "--outputs", "z_um", "--prior", series, "-o", last_year)
+    assert done.returncode == 0 and "is not used" not in done.stderr, done.stderr
+    assert "z_um: RMS of left-out data: with the prior" in done.stdout, done.stdout
+    other = write_run(tmp_path / "other.csv", 94, -5.0)
+    done = run("fit", f"{other}@:3600", "--outputs", "z_um", "--prior", last_year, "-o", model,
+               "--drift-percent", 0)
+    assert done.returncode == 0 and f"{last_year} is not used" in done.stderr, done.stderr
+    test = write_run(tmp_path / "test.csv", 95, -5.0)
+    assert left_um(model, test, tmp_path) < 0.5 * left_um(last_year, test, tmp_path)
+
+
 def test_a_machine_whose_sensors_are_exchanged_departs_from_its_sisters(series, tmp_path):
     healthy = write_run(tmp_path / "healthy.csv", 92, 5.0)
     printed = run("inspect", healthy, "--series", series, "--json", "-")
