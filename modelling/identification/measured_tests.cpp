@@ -99,8 +99,8 @@ void leave_out_spikes(RunFile& run, std::vector<std::string>& notes) {
     }
     if (spikes > 0)
       notes.push_back(run.name + ": " + run.columns[i] + ": " + std::to_string(spikes) +
-                      (spikes == 1 ? " reading is" : " readings are") +
-                      " left out: off its neighbours by more than " + number_text(limit_K) + " K");
+                      (spikes == 1 ? " reading is" : " readings are") + " left out: more than " +
+                      number_text(limit_K) + " K from the neighbouring rows");
   }
 }
 

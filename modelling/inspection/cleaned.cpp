@@ -41,13 +41,13 @@ std::string clean(RunFile& run, const Finding& finding) {
   }
   if (finding.kind == "sensor_step" || finding.kind == "displacement_step") {
     for (std::size_t row = begin; row < run.rows(); ++row) values[row] -= finding.size;
-    return "the step was taken out";
+    return "the step was subtracted";
   }
   if (finding.kind == "sensor_drift") {
     const double duration_s = finding.until_s - finding.at_s;
     for (std::size_t row = begin; row < run.rows(); ++row)
       values[row] -= finding.size * std::min(1.0, (run.time_s()[row] - finding.at_s) / duration_s);
-    return "the creep was taken out as a straight line";
+    return "the drift was subtracted as a straight line";
   }
   if (finding.kind == "stuck" || finding.kind == "sensor_loose") {
     for (std::size_t row = begin; row < end; ++row)

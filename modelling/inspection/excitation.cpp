@@ -118,13 +118,13 @@ void judge_excitation(const Recording& recording, Inspection& inspection) {
     if (changes == 0)
       inspection.experiments.push_back(
           name +
-          " never changed: nothing can be said of what it does. Run it at two levels, an "
-          "hour each, with everything else held.");
+          " never changed, so its effect is unknown. Run it at two levels for an hour each and "
+          "keep everything else constant.");
     else if (changes < changes_min)
       inspection.experiments.push_back(
           name +
-          " changed once: what it does cannot be told from anything that grows with time. "
-          "Take it back and change it again, an hour each.");
+          " changed once, so its effect cannot be separated from a drift. Change it back and "
+          "again, for an hour each.");
     else
       add_pair(i, nearest);
   }
@@ -134,8 +134,8 @@ void judge_excitation(const Recording& recording, Inspection& inspection) {
     for (const std::string& name : group) names += (names.empty() ? "" : ", ") + name;
     inspection.experiments.push_back(
         names +
-        " moved alike: a model cannot tell them apart, and one of them serves. To tell "
-        "them apart, heat one from outside, or run what heats only one of them.");
+        " moved alike, so a model cannot separate them, and one of them is enough. To separate "
+        "them, heat only one of them.");
   }
 }
 

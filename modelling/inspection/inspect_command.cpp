@@ -62,16 +62,17 @@ int run(const Options& options) {
 
 void add_inspect_command(CLI::App& app, std::function<int()>& action) {
   const auto options = std::make_shared<Options>();
-  CLI::App* sub = app.add_subcommand(
-      "inspect", "what is wrong with recordings themselves, and what they can tell at all");
+  CLI::App* sub =
+      app.add_subcommand("inspect", "faults of recordings, and the effects that they can show");
   sub->add_option("RUN.csv", options->runs, "runs: RUN.csv[@T0:T1]")->required();
   sub->add_option("--columns", options->columns, cli::columns_help);
   sub->add_option("--json", options->json, "file for the answer as JSON; - is the output");
   sub->add_option("--report", options->report, "page with pictures (HTML); - is the output");
-  sub->add_flag("--all", options->all, "also tell what is less likely than not");
+  sub->add_flag("--all", options->all, "also list findings below 50 %");
   sub->add_option("--series", options->series,
-                  "series file: where the machine of these runs departs from its sisters");
-  sub->footer("Exit status: 0 nothing found, 1 something, 2 usage error or bad input.");
+                  "series file: also compare the machine with its sisters");
+  sub->footer(
+      "Exit status: 0 nothing found, 1 a fault or a departure, 2 usage error or bad input.");
   sub->callback([options, &action] { action = [options] { return run(*options); }; });
 }
 

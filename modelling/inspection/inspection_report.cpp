@@ -70,7 +70,7 @@ std::string finding_html(const std::vector<RunFile>& runs, const Inspection& ins
                       finding.kind == "sensor_loose";
   const double near_s = 0.03 * (last_s - first_s);
   if (sudden)
-    html += html_paragraph("The moment itself:", "small") +
+    html += html_paragraph("Enlarged:", "small") +
             picture(run, finding.column, finding.at_s - near_s, finding.at_s + near_s, finding);
   const std::string neighbour = neighbour_of(inspection, finding, run);
   if (!neighbour.empty())
@@ -91,10 +91,9 @@ std::string runs_table(const Inspection& inspection) {
 
 std::string inspection_html(const std::vector<RunFile>& runs, const Inspection& inspection) {
   std::string html = html_begin("Faults of the recordings");
-  html += html_paragraph(inspection.findings.empty()
-                             ? "No faults were found in these recordings."
-                             : std::to_string(inspection.findings.size()) +
-                                   " found; the likeliest stands first, with its probability.");
+  html += html_paragraph(inspection.findings.empty() ? "No faults were found in these recordings."
+                                                     : std::to_string(inspection.findings.size()) +
+                                                           " found, in order of probability.");
   for (const Finding& finding : inspection.findings)
     html += finding_html(runs, inspection, finding);
   html += runs_table(inspection);

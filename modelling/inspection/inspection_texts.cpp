@@ -60,44 +60,40 @@ std::string sentence(const Finding& finding, const RunFile& run) {
   const std::string size = two_digits(std::abs(finding.size)) + " " + finding.unit;
   const std::string& kind = finding.kind;
   const std::string count = std::to_string(finding.times_s.size());
+  const char* direction = finding.size > 0 ? " up by " : " down by ";
   if (kind == "spikes")
-    return finding.column + " leaps away and back (" + count + "), by up to " + size +
-           ": look at its plug and its shield; these values should be left out.";
+    return finding.column + " has spikes (" + count + ") of up to " + size +
+           ": check its plug and its shield, and leave these values out.";
   if (kind == "outliers")
-    return finding.column + " has values apart from their neighbours (" + count + "), by up to " +
-           size + ": a probing that went wrong, or chips; they should be left out.";
+    return finding.column + " has outliers (" + count + ") of up to " + size +
+           ": probings that failed, or chips. Leave these values out.";
   if (kind == "sensor_step")
-    return finding.column + " jumps by " + size + (finding.size > 0 ? " upwards" : " downwards") +
-           " after " + at +
-           " and stays there, while its neighbours do not: the sensor moved, or its "
-           "contact or channel changed.";
+    return finding.column + " jumps" + direction + size + " after " + at +
+           " and stays there; its neighbours do not: the sensor moved, or its contact or channel "
+           "changed.";
   if (kind == "sensor_drift")
-    return finding.column + " creeps " + (finding.size > 0 ? "up" : "down") + " by " + size +
-           " from " + at +
-           " to the end of the run, while its neighbours do not: the sensor ages or "
-           "comes off.";
+    return finding.column + " drifts" + direction + size + " from " + at +
+           " to the end of the run; its neighbours do not: the sensor ages or comes off.";
   if (kind == "sensor_loose")
-    return finding.column + " follows its neighbours with only " +
-           std::to_string(std::lround(100 * finding.size)) + " % of its motion from " + at +
-           " on: the sensor has come loose and feels the air.";
+    return finding.column + " shows only " + std::to_string(std::lround(100 * finding.size)) +
+           " % of the motion that its neighbours predict, from " + at +
+           " on: the sensor has come loose and measures the air.";
   if (kind == "sensor_swap")
     return finding.column + " and " + finding.other +
-           " agree with the other runs only when they are "
-           "exchanged: check the plugs; they were " +
-           size + " apart.";
+           " agree with the other runs only when exchanged: check the plugs. They differ by " +
+           size + ".";
   if (kind == "stuck")
     return finding.column + " stays at one value from " + at + " to " +
-           moment(finding.until_s, run) + " while other places moved by " + size +
-           ": the channel hangs, or it is a set value and no "
-           "reading.";
+           moment(finding.until_s, run) + " while other places change by " + size +
+           ": the channel is stuck, or this is a setpoint.";
   if (kind == "coarse")
     return finding.column + " is recorded in steps of " + size +
-           ": nothing finer can be learnt from it; have it written with more digits.";
+           ", which hide smaller changes: record it with more digits.";
   if (kind == "copy")
-    return finding.column + " is the same as " + finding.other +
+    return finding.column + " equals " + finding.other +
            " throughout: one channel was recorded twice.";
   if (kind == "displacement_step")
-    return finding.column + " jumps by " + size + " after " + at +
+    return finding.column + " jumps" + direction + size + " after " + at +
            " without a change of temperature or operation: the probe, the work or the zero was "
            "moved.";
   if (kind == "gap")
@@ -107,9 +103,9 @@ std::string sentence(const Finding& finding, const RunFile& run) {
            " for " + duration(finding.size) + " after " + at + ".";
   if (finding.size < 0)
     return "Two rows after " + at +
-           " are closer together than the sampling: the clock was set back.";
-  return "The time leaps by " + duration(finding.size) + " after " + at +
-         " while all temperatures go on: the clock was put forward (summer time?).";
+           " are closer together than the sampling interval: the clock was set back.";
+  return "The time jumps by " + duration(finding.size) + " after " + at +
+         " while all temperatures continue: the clock was set forward (summer time?).";
 }
 
 }  // namespace
@@ -178,7 +174,7 @@ std::string inspection_text(const Inspection& inspection) {
       .append(groups.empty() ? none_alike : "Places that correlate above 0.98:")
       .append("\n");
   for (const std::string& group : groups) text.append("  ").append(group).append("\n");
-  if (!inspection.experiments.empty()) text += "\nWhat would tell more:\n";
+  if (!inspection.experiments.empty()) text += "\nExperiments that would show more:\n";
   for (const std::string& experiment : inspection.experiments) text += "  " + experiment + "\n";
   return text;
 }

@@ -203,14 +203,15 @@ void warn(const MeasuredTests& tests, Fit& fit) {
     for (std::size_t f = 0; f < output.fold_rms_um.size(); ++f)
       if (!(output.fold_rms_um[f] < output.fold_no_model_rms_um[f]))
         fit.warnings.push_back(tests.outputs[o] + ": on " + tests.fold_name(f) +
-                               ", left out, it does worse than no model at all");
+                               ", left out, the model is worse than no model");
   }
   if (!(fit.condition <= condition_max))
     fit.warnings.emplace_back(
-        "the chosen places say nearly the same (condition above 1000): coefficients balance each "
-        "other, and a sensor's fault is magnified");
+        "the chosen places are nearly collinear (condition above 1000): their coefficients balance "
+        "each other and amplify a sensor's error");
   if (tests.folds.size() < 2)
-    fit.warnings.emplace_back("only one test: nothing could be left out, figures are of the fit");
+    fit.warnings.emplace_back(
+        "one test only: nothing could be left out, and the errors are those of the fitted rows");
 }
 
 SubsetOptions subset_options(const MeasuredTests& tests, const FitOptions& options,
@@ -243,7 +244,7 @@ std::vector<std::size_t> choose_columns(const ColumnPool& pool, const FitOptions
   }
   if (best.empty())
     throw std::runtime_error(
-        "no combination is allowed: fewer terms, a free choice, or another threshold");
+        "no combination is allowed. Next: fewer --terms, --free, or another --threshold");
   double lowest = best[0].score;
   for (const LaggedSubset& each : best) lowest = std::min(lowest, each.score);
   const auto found = std::find_if(best.begin(), best.end(), [&](const LaggedSubset& each) {
@@ -264,7 +265,7 @@ SubsetSearch search_relaxing(const NormalEquations& equations, SubsetOptions sub
   if (!relaxes || found_any(search)) return search;
   subset.terms_min = 1;
   search = search_subsets(equations, subset);
-  fit.warnings.emplace_back("the groups of places allow fewer terms than asked for");
+  fit.warnings.emplace_back("the groups of places allow fewer terms than requested");
   if (found_any(search)) return search;
   subset.group_of.clear();
   fit.warnings.emplace_back("the groups of places allow no combination: any places were tried");
@@ -282,7 +283,8 @@ Chosen choose(const MeasuredTests& tests, const FitOptions& options, Fit& fit) {
                                         : group_places(s, noise_floor(tests));
   const SubsetOptions subset = subset_options(tests, options, fit.grouping);
   if (!(combinations(tests.places.size(), subset.terms_min, subset.terms_max) <= combinations_max))
-    throw std::runtime_error("too many combinations: fewer terms, or fewer places by --places");
+    throw std::runtime_error(
+        "too many combinations. Next: fewer --terms, or fewer places (--places)");
   const double sensor_error_K = options.sensor_error_K >= 0 ? options.sensor_error_K
                                 : tests.runs.size() > 1     ? 0.0
                                                             : sensor_error_K_of_one_run;

@@ -118,7 +118,7 @@ int run(const Options& options) {
   if (options.threshold >= 0) {
     grouping = group_places(s, options.threshold);
   } else if (options.as_published) {
-    throw std::runtime_error("--as-published needs a --threshold: sums have no scale of their own");
+    throw std::runtime_error("--as-published needs --threshold, since sums have no common scale");
   } else {
     grouping = group_places(s, noise_floor(tests));
   }
@@ -139,19 +139,19 @@ void add_group_command(CLI::App& app, std::function<int()>& action) {
   CLI::App* sub = app.add_subcommand("group", "similarity groups of measured temperatures");
   sub->add_option("RUN.csv", options->runs, "runs, each one test: RUN.csv[@T0:T1]")->required();
   sub->add_option("--columns", options->columns, cli::columns_help);
-  sub->add_option("--places", options->places, "temperatures to look at; else all of them")
+  sub->add_option("--places", options->places, "temperatures to compare; default: all")
       ->delimiter(',')
       ->type_name("NAME");
   sub->add_option("--threshold", options->threshold,
-                  "S up to which places are of one group; else the widest gap is looked for")
+                  "largest S within a group; default: the widest gap between mergings")
       ->check(CLI::Range(0.0, 1e9));
   sub->add_flag("--as-published", options->as_published,
                 "S as sums, not divided by the place's own sum of squares");
   sub->add_flag(
       "--range-of-each-test", options->range_of_each_test,
-      "a place's rise over its largest in each test; else over its largest in all of them");
+      "divide a place's rise by its largest in each test; default: by its largest in all tests");
   sub->add_option("--picture", options->picture, "heat map of S in the order of the groups (SVG)");
-  sub->add_flag("--json", options->json, "groups, S and all thresholds, for a program");
+  sub->add_flag("--json", options->json, "groups, S and all thresholds as JSON");
   sub->callback([options, &action] { action = [options] { return run(*options); }; });
 }
 

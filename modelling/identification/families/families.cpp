@@ -149,7 +149,7 @@ FamilyResult judge_few(Family family, const MeasuredTests& tests, const FitOptio
   FamilyResult result;
   result.family = family;
   if (family == Family::physical && tests.signals.empty() && !any_start_differs(tests)) {
-    result.why_not = "no operating signal varies, and no three runs begin 1 K apart";
+    result.why_not = "no operating signal varies, and no three runs start 1 K apart";
     return result;
   }
   try {
@@ -212,7 +212,7 @@ std::vector<FamilyResult> judged(const MeasuredTests& tests, const FitOptions& o
     }
     FamilyResult& result = results.emplace_back();
     result.family = family;
-    result.why_not = "only where asked for: --family " + std::string(to_string(family));
+    result.why_not = "only on request: --family " + std::string(to_string(family));
   }
   results.push_back(judge_bank(tests, BankEquations(tests, columns), done));
   return results;
@@ -299,8 +299,8 @@ void choose(const std::vector<Judgement>& judgements, FamiliesFit& fit) {
   }
   fit.chosen = all_families[chosen];
   fit.chosen_because = printed(
-                           "leaves %.3g um of what was left out (geometric mean), no "
-                           "model %.3g",
+                           "leaves %.3g um of left-out data (geometric mean), no "
+                           "model %.3g um",
                            left_um[chosen], left_um[0]) +
                        worse;
 }
@@ -441,18 +441,20 @@ void add_deciding_run(const MeasuredTests& tests, const FamilyResult& result, st
   }
   const double others_um = std::sqrt(squares / rows);
   if (!(fold_um[worst] > decides_from * others_um)) return;
-  warnings.push_back(tests.outputs[output] + ": " + tests.fold_name(worst) +
-                     printed(" decides: left out, %s leaves %.3g um of it and %.3g of the others",
-                             std::string(to_string(result.family)).c_str(), fold_um[worst],
-                             others_um) +
-                     difference_of(tests, tests.folds[worst].run));
+  warnings.push_back(
+      tests.outputs[output] + ": " + tests.fold_name(worst) +
+      printed(
+          " decides: when it is left out, %s leaves %.3g um of it and %.3g um of the other runs",
+          std::string(to_string(result.family)).c_str(), fold_um[worst], others_um) +
+      difference_of(tests, tests.folds[worst].run));
 }
 
 void add_warnings(const MeasuredTests& tests, FamiliesFit& fit) {
   if (tests.runs.size() < 2)
     fit.warnings.emplace_back(
-        "judged within one run: not valid for other days. Next: a run of another day with another "
-        "course of speeds or loads; fit both, and each judges the other");
+        "judged within one run: the error on other days is unknown. Next: a run of another day "
+        "with "
+        "another course of speeds or loads; fit both, and each judges the other");
   const FamilyResult& chosen = fit.chosen_result();
   const FamilyResult& none = fit.results[index_of_family(Family::none)];
   for (const std::string& signal : fit.unmoved)
@@ -470,29 +472,30 @@ void add_warnings(const MeasuredTests& tests, FamiliesFit& fit) {
   for (std::size_t o = 0; o < tests.outputs.size(); ++o)
     add_deciding_run(tests, best, o, fit.warnings);
   if (fit.chosen == Family::none) {
-    fit.warnings.emplace_back("no model is better than none on what was left out: its matrix is 0");
+    fit.warnings.emplace_back(
+        "no family is better than no model on left-out data: the matrix is 0");
     return;
   }
   for (std::size_t o = 0; o < tests.outputs.size(); ++o)
     if (is_unfit(chosen.left_out_rms_um[o], none.left_out_rms_um[o]))
-      fit.warnings.push_back(
-          tests.outputs[o] +
-          printed(
-              ": %.0f %% of no model's RMS is left on what was left out, and a model fit for use "
-              "leaves less than half. Next: thermocomp diagnose",
-              100.0 * chosen.left_out_rms_um[o] / none.left_out_rms_um[o]));
+      fit.warnings.push_back(tests.outputs[o] +
+                             printed(": on left-out data the model leaves %.0f %% of the RMS "
+                                     "without a model; one that is fit "
+                                     "for use leaves less than half. Next: thermocomp diagnose",
+                                     100.0 * chosen.left_out_rms_um[o] / none.left_out_rms_um[o]));
   for (const auto& group : fit.together) {
     std::string names;
     for (const std::string& name : group) names += (names.empty() ? "" : ", ") + name;
-    fit.warnings.push_back(names +
-                           " always moved together: nothing recorded tells which of them a gain "
-                           "belongs to. Where they can move apart, record that once");
+    fit.warnings.push_back(
+        names +
+        " always moved together, so their gains cannot be separated. Next: a run "
+        "in which they move apart, if they can");
   }
   for (std::size_t o = 0; o < tests.outputs.size(); ++o)
     for (std::size_t f = 0; f < tests.folds.size(); ++f)
       if (!(chosen.fold_um[o][f] < none.fold_um[o][f]))
         fit.warnings.push_back(tests.outputs[o] + ": on " + tests.fold_name(f) +
-                               ", left out, it does worse than no model at all");
+                               ", left out, the model is worse than no model");
 }
 
 }  // namespace
@@ -557,7 +560,7 @@ FamiliesFit fit_families(const MeasuredTests& given, const FitOptions& options,
   choose(judgements, fit);
   if (forced) {
     fit.chosen = *forced;
-    fit.chosen_because = "as asked for";
+    fit.chosen_because = "as requested";
   }
   if (one_run && judgements.size() > 1)
     fit.other_half_um = judgements[1].second[index_of_family(fit.chosen)].left_out_rms_um;

@@ -69,18 +69,18 @@ double worst_um(const FamilyResult& result, std::size_t output) {
 std::string families_text(const MeasuredTests& tests, const FamiliesFit& fit) {
   const bool one_run = tests.runs.size() < 2;
   std::string text = printed(
-      "temperatures: %zu, operating signals: %zu, %s: %zu; left out one at a "
-      "time, everything chosen anew, RMS in um:\n",
+      "temperatures: %zu, operating signals: %zu, %s: %zu. Each left out "
+      "in turn, everything chosen again on the rest; RMS in um:\n",
       tests.places.size(), tests.signals.size(), one_run ? "blocks of one run" : "runs",
       tests.folds.size());
   text += printed("    %-11s", "family");
   for (const std::string& output : tests.outputs) text += printed(" %10s", output.c_str());
-  text += "   of none's RMS\n";
+  text += "   of no model's RMS\n";
   for (const FamilyResult& result : fit.results)
     text += line_of(result, result.family == fit.chosen);
   text += printed("chosen: %s, %s\n", std::string(to_string(fit.chosen)).c_str(),
                   fit.chosen_because.c_str());
-  if (one_run) text += "judged within one run: not valid for other days\n";
+  if (one_run) text += "judged within one run: the error on other days is unknown\n";
   if (fit.chosen != Family::none) {
     const MadeFrom& made_from = *fit.model.made_from;
     for (const auto& [name, output] : made_from.outputs)

@@ -66,8 +66,8 @@ std::string curves(const MeasuredTests& tests, const Fit& fit, Eigen::Index outp
     start_h += length_h(fold) + between_h;
   }
   const std::string& name = tests.outputs[static_cast<std::size_t>(output)];
-  return html_figure(curves_drawing(hours, "h, tests one behind the other",
-                                    {{name + ", each test predicted without itself",
+  return html_figure(curves_drawing(hours, "h, tests one after another",
+                                    {{name + ", each test predicted by a fit to the others",
                                       "",
                                       {{"measured", "#606060", measured},
                                        {"predicted, left out", "#c8502c", predicted},
@@ -80,8 +80,8 @@ std::string curves(const MeasuredTests& tests, const Fit& fit, Eigen::Index outp
 std::string groups_map(const MeasuredTests& tests, const Fit& fit) {
   std::vector<std::string> names = tests.places;
   for (const std::size_t place : fit.places) names[place].insert(0, "* ");
-  const char* title = fit.places.empty() ? "which places move alike: light"
-                                         : "which places move alike: light; chosen: *";
+  const char* title = fit.places.empty() ? "similarity of places, light: alike"
+                                         : "similarity of places, light: alike; chosen: *";
   return html_figure(groups_drawing(title, names, similarity(tests, true), fit.grouping).svg(), "");
 }
 
@@ -102,23 +102,24 @@ std::string page(const MeasuredTests& tests, const Fit& fit, const std::vector<L
   for (std::size_t o = 0; o < tests.outputs.size(); ++o) {
     std::string verdict = tests.outputs[o] + ": ";
     if (!(left_out[o].with_um < left_out[o].without_um))
-      verdict += "no model does better than none, which leaves " +
+      verdict += "no family is better than no model, which leaves " +
                  figure_text(left_out[o].without_um) + " µm RMS.";
     else if (left_out[o].other_day_um > 0.0)
       verdict += "expect about " + figure_text(left_out[o].other_day_um) +
-                 " µm RMS on another day, none of which was measured.";
+                 " µm RMS on another day (none was measured).";
     else
       verdict += std::string("on ") + judged_on + " that it was not fitted to, the model leaves " +
                  figure_text(left_out[o].with_um) + " µm RMS of " +
                  figure_text(left_out[o].without_um) + " µm.";
     if (is_unfit(left_out[o].with_um, left_out[o].without_um))
-      verdict += " Half or more is left: not fit for use. Next: thermocomp diagnose.";
+      verdict += " The model leaves half or more: not fit for use. Next: thermocomp diagnose.";
     text += html_paragraph(verdict);
   }
   for (std::size_t o = 0; o < tests.outputs.size(); ++o)
     text += curves(tests, fit, static_cast<Eigen::Index>(o));
-  if (!warnings.empty()) text += html_heading("What to know, and what to do") + html_list(warnings);
-  text += "<details><summary>How it was chosen</summary>\n<pre style=\"white-space:pre-wrap\">";
+  if (!warnings.empty()) text += html_heading("Warnings") + html_list(warnings);
+  text +=
+      "<details><summary>How the model was chosen</summary>\n<pre style=\"white-space:pre-wrap\">";
   text.append(xml_text(summary)).append("</pre>\n").append(groups_map(tests, fit));
   return text.append("</details>\n").append(html_end());
 }
@@ -145,7 +146,7 @@ std::string fit_text(const MeasuredTests& tests, const Fit& fit) {
                     output.left_out_rms_um, output.left_out_peak_um, output.train_rms_um,
                     output.no_model_rms_um);
     if (is_unfit(output.left_out_rms_um, output.no_model_rms_um))
-      text += "  half or more is left: not fit for use. Next: thermocomp diagnose\n";
+      text += "  the model leaves half or more: not fit for use. Next: thermocomp diagnose\n";
     for (std::size_t i = 0; i < fit.columns.size(); ++i)
       text += printed(
           "  %+10.4f +- %.4f um/K  %s\n", output.coefficients[static_cast<Eigen::Index>(i)],
@@ -160,7 +161,7 @@ std::string fit_text(const MeasuredTests& tests, const Fit& fit) {
                     fit.outputs[o].hot_rms_um);
   text += printed("condition of the chosen columns: %.1f\n", fit.condition);
   text += losses_text(tests, fit);
-  if (tests.runs.size() < 2) text += "judged within one run: not valid for other days\n";
+  if (tests.runs.size() < 2) text += "judged within one run: the error on other days is unknown\n";
   for (const std::string& warning : fit.warnings)
     text.append("warning: ").append(warning).append("\n");
   return text;

@@ -51,17 +51,17 @@ ThermalModel in_frame(const ThermalModel& fitted, const ThermalModel& frame, Nam
   if (has_more && !kept.empty())
     throw std::runtime_error("--like: " + joined(kept) +
                              " of that model was not fitted, and its terms, guideways or course "
-                             "would be lost: name it in --outputs too, or a model with a matrix "
-                             "alone");
-  if (!kept.empty()) notes.push_back(joined(kept) + ": not fitted, the row of --like stays");
+                             "would be lost: add it to --outputs, or name a model with a matrix "
+                             "only");
+  if (!kept.empty()) notes.push_back(joined(kept) + ": not fitted, keeps the row of --like");
   for (const std::string& name : without(fitted.outputs, frame.outputs))
     notes.push_back(name +
                     ": no output of the model of --like; it compensates only where an axis "
                     "of the configuration names it");
-  if (has_more) notes.emplace_back("terms, guideways and course of --like are not taken over");
+  if (has_more) notes.emplace_back("terms, guideways and course of --like are not copied");
   if (!frame.covariance_K2.empty())
     notes.emplace_back(
-        "the covariance of --like is not taken over: make it anew (thermocomp covariance)");
+        "the covariance of --like is not copied: compute it again (thermocomp covariance)");
   ThermalModel model = fitted;
   model.inputs = together(frame.inputs, fitted.inputs);
   model.outputs = together(frame.outputs, fitted.outputs);

@@ -55,13 +55,13 @@ Section read_section(const TomlTable& column, TiedColumns& columns) {
 double read_held_foot_mm(const TomlTable& column, const Section& section,
                          const TiedColumns& columns) {
   if (!section.solid) {
-    column.problem("foot", "\"held\" is known of solid columns alone: depth_mm without wall_mm");
+    column.problem("foot", "\"held\" is only for solid columns: depth_mm without wall_mm");
     return 0.0;
   }
   const double slender = *section.depth_mm / columns.column_width_mm;
   if (!(slender >= 0.1 && slender <= 2.0 && columns.column_poisson_ratio <= 0.4))
     column.problem("foot",
-                   "\"held\" is known of depth_mm from 0.1 to 2 width_mm and poisson_ratio up to "
+                   "\"held\" is only for depth_mm from 0.1 to 2 width_mm and poisson_ratio up to "
                    "0.4");
   return held_foot_length_mm(columns.column_width_mm, *section.depth_mm,
                              columns.column_poisson_ratio);

@@ -88,7 +88,7 @@ Drawing swing_drawing(const GateFile& file, const std::vector<TieCourse>& course
   }
   const std::string name = printed("tie %zu, best at %.4g mm", tie + 1, best.ties[tie].height_mm);
   return curves_drawing(heights_mm, "height, mm",
-                        {{"Swing over the height of a tie, the others at their best",
+                        {{"Swing over the height of a tie, the others at their optimum",
                           "swing, um",
                           {{name, "#1b6ca8", swings_um}},
                           panel_px}});

@@ -101,7 +101,8 @@ void add_courses(const Options& options, const GateFile& file, Answer& answer) {
   if (best) {
     const Answer ties = ties_answer(*best);
     answer.json["best"] = ties.json;
-    answer.text += "\nbest ties, if each keeps its temperatures wherever it is:\n" + ties.text;
+    answer.text +=
+        "\nbest ties, if the temperature of each does not change with its place:\n" + ties.text;
   }
   if (!options.picture.empty())
     cli::write_file(options.picture, tie_picture(file, courses, best ? &*best : nullptr));
@@ -130,23 +131,23 @@ int run(const Options& options) {
 void add_tiebar_command(CLI::App& app, std::function<int()>& action) {
   const auto options = std::make_shared<Options>();
   CLI::App* sub =
-      app.add_subcommand("tiebar", "the coefficients of a gate-shaped machine with tie bars");
+      app.add_subcommand("tiebar", "coefficients of a gate-shaped machine with tie bars");
   sub->add_option("GEOMETRY.toml", options->geometry, "dimensions and materials")->required();
   sub->add_option("--ratio", options->ratio,
                   "theta_C / (theta_A - theta_B): where the tie displaces least")
       ->check(CLI::Range(-1e3, 1e3));
   sub->add_option("--curves", options->curves, "Ki and Kc over l / l4 (SVG)");
   CLI::Option* course = sub->add_option("--course", options->course,
-                                        "measured temperatures, RUN.csv[@T0:T1]: how far they move "
-                                        "tool and work")
+                                        "measured temperatures, RUN.csv[@T0:T1]: the displacement "
+                                        "that they cause")
                             ->type_name("RUN.csv");
   sub->add_option("--columns", options->columns, cli::columns_help)->needs(course);
   sub->add_flag("--optimise", options->optimise,
-                "places and areas of the ties with which the worst course moves them least")
+                "places and areas of the ties that minimise the displacement of the worst course")
       ->needs(course);
   sub->add_option("--picture", options->picture, "the courses without ties, as drawn, best (SVG)")
       ->needs(course);
-  sub->add_flag("--json", options->json, "the answer for a program");
+  sub->add_flag("--json", options->json, "result as JSON");
   sub->callback([options, &action] { action = [options] { return run(*options); }; });
 }
 

@@ -36,7 +36,7 @@ def test_help_tells_the_exit_statuses_of_this_command():
     for command in (["thermal-test", "plan"], ["thermal-test", "report"], ["plan"], ["fit"]):
         said = run(*command, "--help").stdout
         assert "Exit status: 0 success, 2 usage error or bad input.\n" in said, (command, said)
-    assert "Exit status: 0 nothing found, 1 something, 2" in run("inspect", "--help").stdout
+    assert "Exit status: 0 nothing found, 1 a fault or a departure, 2" in run("inspect", "--help").stdout
 
 
 def write_tests(folder, count=4):
@@ -177,7 +177,7 @@ def test_one_run_is_said_to_judge_itself_and_the_same_rows_twice_are_refused(tmp
     model = tmp_path / "model.toml"
     answer = run("fit", files[0], "--outputs", "z_um", "-o", model)
     assert answer.returncode == 0, answer.stderr
-    assert "judged within one run: not valid for other days" in answer.stdout
+    assert "judged within one run: the error on other days is unknown" in answer.stdout
     answer = run("fit", files[0], f"{files[0]}@0:6000", "--outputs", "z_um", "-o", model)
     assert answer.returncode == 2 and "given twice" in answer.stderr
 

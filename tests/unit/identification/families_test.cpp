@@ -108,7 +108,7 @@ TEST_CASE("displacement independent of all recorded columns gets no model", "[fa
     const FamiliesFit fit = fitted(tests);
     CHECK(fit.chosen == Family::none);
     CHECK(fit.model.matrix_um_per_K[0][0] == 0.0);
-    CHECK(families_text(tests, fit).find("no model is better than none") != std::string::npos);
+    CHECK(families_text(tests, fit).find("no family is better than no model") != std::string::npos);
   }
 }
 
@@ -149,8 +149,7 @@ TEST_CASE("for two different runs the family is chosen by stretches of both", "[
   const FamiliesFit fit = fitted(tests);
   CHECK(fit.chosen != Family::none);
   CHECK(fit.results.front().fold_um[0].size() == 2);  // figures are of whole runs
-  CHECK(families_text(tests, fit).find("um of what was left out (geometric mean") !=
-        std::string::npos);
+  CHECK(families_text(tests, fit).find("um of left-out data (geometric mean") != std::string::npos);
 }
 
 TEST_CASE("one temperature is enough for a model", "[families]") {
@@ -171,7 +170,8 @@ TEST_CASE("a model judged within one run has a warning", "[families]") {
       1, [](double quick, double slow, double, double) { return 5.0 * quick - 3.0 * slow; });
   const FamiliesFit fit = fitted(tests);
   const std::string message = families_text(tests, fit);
-  CHECK(message.find("judged within one run: not valid for other days") != std::string::npos);
+  CHECK(message.find("judged within one run: the error on other days is unknown") !=
+        std::string::npos);
   CHECK(message.find("Next: a run of another day") != std::string::npos);
   CHECK(message.find("on another day (each half of this run by a model of the other)") !=
         std::string::npos);
@@ -522,11 +522,11 @@ TEST_CASE("the run with most of the error is named with its difference", "[famil
     const MeasuredTests tests = measured_tests(files, options);
     const std::string message = families_text(tests, fitted(tests, Family::static_few));
     CAPTURE(message);
-    CHECK((message.find("z_um: run3 decides: left out, static_few leaves ") != std::string::npos) ==
-          one_differs);
-    CHECK(
-        (message.find("of the others; it starts at spindle_rpm = 10000, the others at 0 to 3500") !=
-         std::string::npos) == one_differs);
+    CHECK((message.find("z_um: run3 decides: when it is left out, static_few leaves ") !=
+           std::string::npos) == one_differs);
+    CHECK((message.find(
+               "of the other runs; it starts at spindle_rpm = 10000, the others at 0 to 3500") !=
+           std::string::npos) == one_differs);
   }
 }
 

@@ -31,7 +31,7 @@ TEST_CASE("a fitted model takes inputs, outputs and other rows of the daemon's m
   CHECK(model.matrix_um_per_K ==
         std::vector<std::vector<double>>{{1.0, 2.0, 3.0}, {8.0, 0.0, 7.0}});
   CHECK(model.terms.size() == 1);
-  CHECK(notes == std::vector<std::string>{"x_um: not fitted, the row of --like stays"});
+  CHECK(notes == std::vector<std::string>{"x_um: not fitted, keeps the row of --like"});
 }
 
 TEST_CASE("columns that the frame lacks are appended", "[frame]") {

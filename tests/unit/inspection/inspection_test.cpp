@@ -109,7 +109,7 @@ TEST_CASE("only steps of displacements are removed before a fit, above or below 
   for (std::size_t row = 400; row < rows; ++row) column(run, "t3_degC")[row] += 2.0;
   const Cleaned clean = without_steps({run}, {"z_um"});
   REQUIRE(clean.notes.size() == 1);
-  CHECK_THAT(clean.notes.front(), Catch::Contains("z_um jumps") && Catch::Contains("taken out"));
+  CHECK_THAT(clean.notes.front(), Catch::Contains("z_um jumps") && Catch::Contains("subtracted"));
   CHECK(clean.runs.front().column("z_um")[500] ==
         Approx(still.column("z_um")[500]).margin(0.1 * size_um));
   CHECK(clean.runs.front().column("t3_degC") == run.column("t3_degC"));
@@ -289,6 +289,6 @@ TEST_CASE("the page shows each finding with its picture", "[inspection]") {
   for (std::size_t row = 400; row < rows; ++row) column(run, "t3_degC")[row] += 2.0;
   const Inspection inspection = inspect({run});
   const std::string page = inspection_html({run}, inspection);
-  CHECK(page.find("t3_degC jumps by 2") != std::string::npos);
+  CHECK(page.find("t3_degC jumps up by 2") != std::string::npos);
   CHECK(page.find("<svg") != std::string::npos);
 }
