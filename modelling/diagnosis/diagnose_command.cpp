@@ -113,7 +113,7 @@ Diagnosis thermal_diagnosis_of(const Options& options, const std::vector<RunFile
 }
 
 #ifdef THERMOCOMP_WITH_STRUCTURE
-/// Also writes the body's page into the folder.
+/// Also writes body.html into the folder.
 Diagnosis diagnosis_with_body(const Options& options, const std::vector<RunFile>& train,
                               const std::vector<RunFile>& test, ReportData* report) {
   const cli::ProgressLines lines;

@@ -12,7 +12,7 @@
 namespace thermocomp::diagnosis {
 namespace {
 
-/// @return whether a term or a correction carries the finding
+/// @return whether a term or a correction represents the finding
 bool add_finding(Extended& model, const Finding& finding, const MeasuredData& train) {
   const std::vector<TermSpec> terms = terms_of(finding, train);
   model.model.terms.insert(model.model.terms.end(), terms.begin(), terms.end());
@@ -42,8 +42,8 @@ std::map<std::string, TestGain> gains_on_test(const Extended& before, const Exte
   return gains;
 }
 
-/// Coefficients fitted anew beside the findings.
-/// @param errors  of each output, by what share its coefficients are wrong
+/// The model with its coefficients fitted jointly with the findings.
+/// @param errors  relative errors of the coefficients, per output
 ThermalModel corrected(ThermalModel model, const std::vector<Eigen::VectorXd>& errors) {
   for (std::size_t output = 0; output < errors.size(); ++output)
     for (std::size_t input = 0; input < model.inputs.size(); ++input)
@@ -52,9 +52,8 @@ ThermalModel corrected(ThermalModel model, const std::vector<Eigen::VectorXd>& e
   return model;
 }
 
-/// The model with each finding added after those before it, its coefficients fitted anew with the
-/// first, and what each gains. One that the test runs speak against is named, and the model goes
-/// without it.
+/// Extends the model by one finding after another, its coefficients fitted anew with the first, and
+/// measures the gain of each. A finding that the test runs contradict is reported, not added.
 Extended extend(Diagnosis& diagnosis, const SearchResult& result, const MeasuredData& train,
                 const MeasuredData& test) {
   Extended extended{train.model, {}};
@@ -71,7 +70,7 @@ Extended extend(Diagnosis& diagnosis, const SearchResult& result, const Measured
   return extended;
 }
 
-/// What was weighed, the likeliest with what each would gain alone.
+/// All hypotheses; of the likeliest also the gain on test rows as the only extension.
 std::vector<Candidate> candidates_of(const std::vector<Explanation>& weighed,
                                      const MeasuredData& train, const MeasuredData& test) {
   std::vector<Candidate> all;
@@ -107,18 +106,18 @@ std::vector<Candidate> candidates_of(const std::vector<Explanation>& weighed,
   return all;
 }
 
-/// The bank last.
+/// The bank is the last term.
 void add_remainder(ThermalModel& model, const RemainderBank& remainder) {
   model.terms.insert(model.terms.end(), remainder.hinges.begin(), remainder.hinges.end());
   model.terms.push_back(remainder.term);
 }
 
-/// Adds a bank of lags for the outputs of which enough can be predicted without a name.
-/// @return of each output the share that can
+/// Adds a bank of lags for outputs with enough predictable remainder.
+/// @return predictable share of the variance, per output
 std::vector<double> add_remainder_bank(Diagnosis& diagnosis, Extended& extended,
                                        const MeasuredData& train, const MeasuredData& test,
                                        const SearchResult& result) {
-  // Beside a finding the coefficients are no longer those that were fitted.
+  // With a finding the coefficients are no longer those of the fit.
   const std::vector<bool> fitted =
       result.findings.empty() ? result.fitted : std::vector<bool>(result.fitted.size());
   std::vector<double> predictable;

@@ -1,4 +1,4 @@
-/// From measured runs to an answer; `thermocomp diagnose`.
+/// Diagnosis of measured runs; `thermocomp diagnose`.
 #pragma once
 
 #include <filesystem>
@@ -20,13 +20,13 @@ namespace thermocomp::diagnosis {
 struct ReportData;
 struct ThermalRuns;
 
-/// Receives the test runs, the network as the file has it and the network with what was found.
+/// Receives the test runs, the network of the file and the network with the findings.
 using NetworkView = std::function<void(const ThermalRuns&, const HeatNetwork&, const HeatNetwork&)>;
 
-/// @param train, test  taken: their memory is free for the search
+/// @param train, test  by value: their memory is released before the search
 /// @param train_names, test_names  the runs' arguments as given
-/// @param report    if given, receives what the report shows
-/// @param progress  if given, called while the search goes on
+/// @param report    if given, receives the data of the report
+/// @param progress  if given, called during the search
 /// @throws ConfigurationError when a run lacks a column of the model or any measured value
 [[nodiscard]] Diagnosis diagnose(const ThermalModel& model, std::vector<RunFile> train,
                                  const std::vector<std::string>& train_names,
@@ -35,10 +35,10 @@ using NetworkView = std::function<void(const ThermalRuns&, const HeatNetwork&, c
                                  ReportData* report = nullptr,
                                  const std::function<void()>& progress = nullptr);
 
-/// The same of a thermal network, or a finite-element model reduced to one: temperatures are
-/// compared, in kelvin.
-/// @return figures of every sensor that the training runs have; `extended` is empty, since the
-///         corrected values stand in the findings' parameters
+/// Diagnosis of a thermal network, or of a finite-element model reduced to one, by temperatures in
+/// kelvin.
+/// @return figures of every sensor in the training runs; `extended` is empty, since the findings'
+///         parameters hold the corrected values
 /// @param view  if given, called at the end
 /// @throws ConfigurationError when a run lacks the room, a signal of the network or every sensor
 [[nodiscard]] Diagnosis diagnose_thermal(
@@ -47,9 +47,9 @@ using NetworkView = std::function<void(const ThermalRuns&, const HeatNetwork&, c
     const std::vector<std::string>& test_names, ReportData* report = nullptr,
     const std::function<void()>& progress = nullptr, const NetworkView& view = nullptr);
 
-/// Films, conductances, capacities and heats are multiplied by their factor, missing sources and
-/// lags of thermocouples are added; what no key carries stands in comments at the top. Comments of
-/// the file are not kept. A signal that only a missing source needs is added, constantly 0.
+/// Multiplies films, conductances, capacities and heats by their factors, and adds missing sources
+/// and lags of thermocouples. Findings without a key become comments at the top; comments of the
+/// file are lost. A signal that only a missing source uses is added with the constant value 0.
 /// @param path  a machine file that load_thermal_plant() accepts
 /// @return the file's text; nothing where the machine is a body, whose matrices are not edited
 /// @throws toml::parse_error when the file has become unreadable since

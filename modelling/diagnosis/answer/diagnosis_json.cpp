@@ -17,7 +17,7 @@ Json interval(const Interval& interval) {
   return Json::array({number(interval.low), number(interval.high)});
 }
 
-/// The value that all outputs share, or one an output.
+/// One shared value, or a table with one value per output.
 template <class Value, class ToJson>
 Json by_output(const std::map<std::string, Value>& values, ToJson to_json) {
   if (values.contains("")) return to_json(values.at(""));
@@ -84,7 +84,7 @@ Json finding_json(const NamedFinding& finding, const std::string& unit) {
           {key_of("test_rms", unit), finding.test.empty() ? Json(nullptr) : test}};
 }
 
-/// @param in_full  with what the probability comes from
+/// @param in_full  with the inputs of the probability
 Json candidate_json(const Candidate& of, const std::string& unit, bool in_full) {
   Json json = {{"cause", of.cause},
                {"subject", of.subject},

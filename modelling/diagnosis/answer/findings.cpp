@@ -130,8 +130,7 @@ constexpr int resamples = 400;
 constexpr int test_blocks = 16;
 constexpr double turn = 6.283185307179586;
 
-/// The sine of known period and size that fits the residual best beside a level: only its phase is
-/// free.
+/// Sine of known period and amplitude, fitted to the residual: only phase and level are free.
 Column sine_in(const Column& time_s, const Column& residual, const Correction& correction) {
   const Eigen::ArrayXd angle = turn / correction.period_s * time_s.array();
   Eigen::MatrixXd waves(time_s.size(), 3);
@@ -223,7 +222,7 @@ TestGain test_gain(const Residuals& before, const Residuals& after) {
   TestGain gain{root_mean_square(before), root_mean_square(after), 0.0, {}};
   gain.reduction = 1.0 - gain.after_um / gain.before_um;
   const std::vector<Eigen::Array2d> blocks = squares_by_block(before, after);
-  std::mt19937_64 random(1);  // the same answer for the same data
+  std::mt19937_64 random(1);  // reproducible
   std::uniform_int_distribution<std::size_t> draw(0, blocks.size() - 1);
   std::vector<double> reductions;
   for (int i = 0; i < resamples; ++i) {

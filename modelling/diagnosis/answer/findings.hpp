@@ -1,4 +1,4 @@
-/// Turns findings of the search into names, parameters with intervals and terms of the model file,
+/// Converts findings of the search to names, parameters with intervals and terms of the model file,
 /// measures their gain on the test runs, and fits a bank of lags to the predictable remainder.
 #pragma once
 
@@ -13,11 +13,11 @@
 
 namespace thermocomp::diagnosis {
 
-/// Share by which the RMS of left-out rows falls, of the output that gains most.
+/// Reduction of the cross-validated RMS, of the output with the largest reduction.
 [[nodiscard]] double share_of_remainder(const Explanation& explanation);
 
-/// Everything but the gain on test runs.
-/// @param data  whose outputs and runs the finding is of
+/// All members but the gain on test runs.
+/// @param data  training data
 [[nodiscard]] NamedFinding named_finding(const Finding& finding, const MeasuredData& data,
                                          std::vector<Parameter> parameters);
 
@@ -31,17 +31,17 @@ namespace thermocomp::diagnosis {
 ///         without an input
 [[nodiscard]] std::vector<TermSpec> terms_of(const Finding& finding, const MeasuredData& data);
 
-/// A model with the findings that no term can carry.
+/// A model with corrections for findings that no term represents.
 struct Extended {
   ThermalModel model;
   std::vector<Correction> corrections;
 };
 
-/// Of each run, over its selected rows; NaN where nothing was measured.
+/// One column per run over its selected rows; NaN: not measured.
 using Residuals = std::vector<Column>;
 
-/// measured - model of every output over the selected rows of every run, both from the run's first
-/// row on: the data's own model, or another.
+/// measured - model of every output and run over the selected rows, both relative to the run's
+/// first row; of the data's own model or of another.
 [[nodiscard]] std::vector<Residuals> residuals(const MeasuredData& data);
 [[nodiscard]] std::vector<Residuals> residuals(const Extended& extended, const MeasuredData& data);
 [[nodiscard]] double root_mean_square(const Residuals& residuals);
@@ -51,25 +51,25 @@ using Residuals = std::vector<Column>;
 [[nodiscard]] OutputFigures output_figures(const Residuals& train, const Residuals& test,
                                            const Residuals& extended_test,
                                            double unexplained_fraction);
-/// The interval comes from resampled blocks of rows.
+/// The interval is bootstrapped over blocks of rows.
 [[nodiscard]] TestGain test_gain(const Residuals& before, const Residuals& after);
 /// Whether the finding improves no output of the test runs; the extended model then omits it.
 [[nodiscard]] bool fails_on_test_runs(const NamedFinding& finding);
 
-/// A bank for each output whose left-out rows it predicts better: each of eight blocks of the
-/// training rows is left out, and what is left of them must fall by a tenth (RMS), about the
-/// run's mean too, and by more than the standard error over the blocks. Everything counts from the
-/// run's first row, as it will in use: with a free offset a run twice as many outputs get a bank,
-/// and some are worse for it. Columns, penalties and gains: identification::BankEquations.
+/// A bank for each output that it predicts better in cross-validation over eight blocks of the
+/// training rows: their residual RMS must fall by a tenth, about the run's mean too, and by more
+/// than its standard error over the blocks. Displacements are relative to the run's first row, as
+/// in use: with a free offset per run twice as many outputs get a bank, and some become worse.
+/// Columns, penalties and gains: identification::BankEquations.
 ///
-/// Coefficients that were fitted to these very rows say nothing of what they leave of others: such
-/// an output is fitted anew without the blocks, from the inputs as they are and with the bank, and
-/// compared so; the bank then holds what the coefficients change by, too.
-/// @param left         by the model with the findings, over the training runs, order of the outputs
-/// @param fitted       of each output, whether its coefficients were fitted to these rows
-/// @param predictable  receives of each output the share of the variance of its left-out rows that
-///                     the bank predicts, whether it gets one or not
-/// @return nullopt: no output gains
+/// The residuals of coefficients that were fitted to the same rows are too small for this
+/// comparison. Such an output is fitted without each block, by its inputs alone and by the bank;
+/// the bank then includes the change of the coefficients.
+/// @param left         residuals of the model with the findings over the training runs, per output
+/// @param fitted       whether an output's coefficients were fitted to these rows, per output
+/// @param predictable  receives per output the share of the variance that the bank predicts in
+///                     cross-validation, with or without a bank in the result
+/// @return nullopt: no output gets a bank
 [[nodiscard]] std::optional<RemainderBank> remainder_bank(const MeasuredData& train,
                                                           const std::vector<Residuals>& left,
                                                           const std::vector<bool>& fitted,

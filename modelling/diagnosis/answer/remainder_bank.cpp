@@ -13,7 +13,7 @@ using identification::MeasuredTests;
 
 constexpr std::size_t blocks = 8;
 constexpr double gain_min = 0.1;
-/// Of all runs; more are thinned. The shortest low pass is many times longer than the steps then.
+/// Rows of all runs; more are thinned. Steps remain short against the shortest low pass.
 constexpr Eigen::Index rows_max = 6000;
 
 /// Every n-th row.
@@ -28,7 +28,7 @@ bool varies(const MeasuredData& data, std::size_t signal) {
   });
 }
 
-/// The recorded inputs as a bank wants them, without an output.
+/// Recorded temperatures and signals as input of a bank, without an output.
 MeasuredTests inputs_of(const MeasuredData& data, Eigen::Index apart) {
   MeasuredTests tests;
   tests.places = data.temperatures;
@@ -68,7 +68,7 @@ void add_folds(MeasuredTests& tests) {
   }
 }
 
-/// What is left of the output stands at the rows of the tests; NaN before the selection.
+/// Sets the residuals of an output; NaN before the selection.
 void set_output(MeasuredTests& tests, const MeasuredData& data, const Residuals& left,
                 Eigen::Index apart) {
   for (std::size_t run = 0; run < tests.runs.size(); ++run) {
@@ -78,13 +78,13 @@ void set_output(MeasuredTests& tests, const MeasuredData& data, const Residuals&
   }
 }
 
-/// Adds what the matrix takes away: the coefficients are free again.
+/// Adds the displacement of the matrix, so that its coefficients can be fitted again.
 void add_matrix(MeasuredTests& tests, const Eigen::VectorXd& row) {
   for (identification::TestRun& run : tests.runs)
     run.outputs_um += run.places_K.leftCols(row.size()) * row;
 }
 
-/// Static equations of the model's inputs alone, without what the matrix takes away.
+/// Static equations of the model's inputs for the displacement including that of the matrix.
 BankEquations static_equations(MeasuredTests tests, const ThermalModel& model,
                                const Eigen::VectorXd& row) {
   tests.places = model.inputs;
@@ -98,7 +98,7 @@ BankEquations static_equations(MeasuredTests tests, const ThermalModel& model,
   return {tests, at_once};
 }
 
-/// Sums over present rows.
+/// Sums over rows with a value.
 struct Sums {
   double rows{0.0};
   double values{0.0};
@@ -126,7 +126,7 @@ struct Judged {
   bool helps{false};
 };
 
-/// What is left of a fold that a bank was not fitted to; without one the output itself.
+/// Residual of a left-out fold; without a bank the output itself.
 Eigen::VectorXd left_of(const MeasuredTests& tests, std::size_t f, const BankEquations* bank) {
   const identification::Fold& fold = tests.folds[f];
   const Eigen::Index count = fold.end - fold.begin;
@@ -135,9 +135,9 @@ Eigen::VectorXd left_of(const MeasuredTests& tests, std::size_t f, const BankEqu
   return y;
 }
 
-/// Of noise alone the first row's is left in all others, and a bank would carry that: so what is
-/// left must fall about each run's mean too.
-/// @param static_fit  what it must be better than; none: than nothing
+/// The noise of a run's first row is an offset of all others, which a bank could fit: so the
+/// residual must fall about each run's mean too.
+/// @param static_fit  the fit to compare with; none: no prediction
 Judged judged(const MeasuredTests& tests, const BankEquations& bank,
               const BankEquations* static_fit) {
   std::vector<double> gains;

@@ -1,5 +1,5 @@
-/// What may be wrong. All that is known of a cause stands in one function, in the file of its
-/// family, which ends with the list of its causes.
+/// Causes of a wrong prediction. One function defines all of a cause, in the file of its family,
+/// which ends with the list of its causes.
 #pragma once
 
 #include <functional>
@@ -16,7 +16,7 @@
 
 namespace thermocomp::diagnosis {
 
-/// What causes of a network are made of; all three outlive the hypotheses.
+/// Data for causes of a network; all three must outlive the hypotheses.
 struct NetworkMaterial {
   const ThermalPlant& plant;
   const ThermalRuns& runs;
@@ -33,7 +33,7 @@ enum class NetworkSubjectKind {
   sensor_in_run,  ///< and the run as `second`
 };
 
-/// One thing of a network that a cause may act on.
+/// Element of a network that a cause may act on.
 struct NetworkSubject {
   NetworkSubjectKind kind{NetworkSubjectKind::part};
   std::size_t index{0};
@@ -41,35 +41,34 @@ struct NetworkSubject {
 };
 
 struct NetworkHypothesis {
-  Hypothesis hypothesis{};  ///< without columns: they depend on what else was found
-  /// Changes the network; a gain of 0 changes nothing. Empty: a fault of a reading.
+  Hypothesis hypothesis{};  ///< without columns, which depend on the other findings
+  /// Changes the network in proportion to the gain. Empty: a fault of a reading.
   std::function<void(HeatNetwork&, const Shape&, double gain)> apply{};
-  std::function<Column(const Shape&)> fault{};  ///< its column, where nothing is simulated
-  double value{0.0};                            ///< of the file, that a factor multiplies
-  std::string key{};                            ///< of the file, for this value
-  double at{0.0};                               ///< signal at which a missing source has its heat
+  std::function<Column(const Shape&)> fault{};  ///< column of a fault of a reading
+  double value{0.0};                            ///< in the machine file; a factor multiplies it
+  std::string key{};                            ///< of this value in the machine file
+  double at{0.0};  ///< signal value at which a missing source has its heat
 };
 
-/// A parameter as the answer names it.
+/// A parameter in answers and reports.
 struct CauseParameter {
   std::string_view name;
-  std::string_view unit;  ///< "s": a duration; "1": none; "?" in it: that of the subject
-  /// What is physically possible, in this unit.
+  std::string_view unit;  ///< "s": a duration; "1": none; "?": the subject's unit
+  /// Physical range in this unit.
   double low{-std::numeric_limits<double>::infinity()};
   double high{std::numeric_limits<double>::infinity()};
-  std::string_view description;  ///< before the value
-  bool of_a_jump{false};  ///< recognised by a jump: nothing else that a machine does looks like it
+  std::string_view description;  ///< text in front of the value
+  bool of_a_jump{false};  ///< identified by a jump, which nothing else on a machine resembles
 };
 
-/// What it says to the machine's owner.
+/// Texts of the report.
 struct CauseTexts {
   std::string_view title;
   std::string_view description;  ///< continues "SUBJECT: "
   std::string_view to_do;
 };
 
-/// The experiment that tells a cause from another. Of two causes the one that stands first here
-/// says which.
+/// The experiment that separates a cause from another: the first in this list of the two causes'.
 enum class Experiment {
   of_a_network,    ///< steady state, the way there, the level
   another_run,     ///< a fault of one run does not come back
@@ -81,9 +80,8 @@ enum class Experiment {
   other_duty,      ///< anything else
 };
 
-/// What a finding changes that no term of the model file carries, in one output: a shift in time,
-/// or a sine of known period and size. The sine's phase is another one in every run and is taken
-/// from the run itself.
+/// Correction of one output for a cause without a term in the model file: a shift in time, or a
+/// sine of known period and amplitude, whose phase is fitted in each run.
 struct Correction {
   std::size_t output{0};
   double shift_s{0.0};
@@ -92,39 +90,38 @@ struct Correction {
 };
 
 struct Cause {
-  /// Fixed: in answers, and in model files where the estimator has a term of this kind.
+  /// Must not change: it is in answers, and in model files if the estimator has this term.
   std::string name;
-  std::string family;  ///< what belongs together for a person: structure, heat, datum, sensor
+  std::string family;                        ///< structure, heat, datum or sensor
   std::vector<CauseParameter> parameters{};  ///< in the order of the answer
   CauseTexts texts{};
-  /// Where the subject is a signal and a place of a thermal network; none: the same.
+  /// If the subject is a signal and a place of a thermal network; none: `texts`.
   std::optional<CauseTexts> texts_in_network{};
-  /// Where the subject is a signal without a unit; none: the same.
+  /// If the subject is a signal without a unit; none: `texts`.
   std::optional<CauseTexts> texts_without_unit{};
   Experiment experiment{Experiment::other_duty};
-  /// What it would do to the displacement, if the subject is one that it can have. Null: it is a
-  /// cause of the thermal layer alone.
+  /// Hypotheses of its effect on the displacement; empty if it cannot act on the subject. Null: a
+  /// cause of the thermal layer only.
   std::vector<Hypothesis> (*hypotheses)(const Material& material, const Subject& subject){nullptr};
-  /// Its gains as parameters; null: the first of each output, or the one that all share.
+  /// Converts its gains to parameters; null: one per gain.
   std::vector<Parameter> (*gains)(const FoundGains& found){nullptr};
-  /// Of a cause that acts in every run and that no term carries: what is corrected in its place,
-  /// from its parameters. Null: nothing.
+  /// Correction from its parameters, for a cause of all runs without a term. Null: none.
   Correction (*correction)(const std::vector<Parameter>& parameters){nullptr};
 
-  /// What it would do to the temperatures of a thermal network. Null: the thermal layer does not
-  /// have it.
+  /// Hypotheses of its effect on the temperatures of a thermal network. Null: not in the thermal
+  /// layer.
   std::vector<NetworkHypothesis> (*in_network)(const NetworkMaterial& material,
                                                const NetworkSubject& subject){nullptr};
-  /// Puts a finding into the machine's file. Null: no key of it carries the cause.
-  /// @return whether the file has what the finding is about
+  /// Writes a finding into the machine file. Null: the file has no key for this cause.
+  /// @return whether the file has the subject
   bool (*into_machine)(MachineFile& machine, const std::string& subject,
                        const std::vector<Parameter>& parameters){nullptr};
 };
 
-/// The parameter of this name; null: it has none.
+/// Null: the cause has no parameter of this name.
 [[nodiscard]] const CauseParameter* find_parameter(const Cause& cause, std::string_view name);
 
-/// In the order in which they are tried.
+/// All causes, in the order in which they are tried.
 [[nodiscard]] const std::vector<Cause>& all_causes();
 /// @pre there is one
 [[nodiscard]] const Cause& cause_named(std::string_view name);
@@ -135,7 +132,7 @@ std::vector<Cause> of_structure();
 std::vector<Cause> of_heat();
 std::vector<Cause> of_datum();
 std::vector<Cause> of_sensor();
-std::vector<Cause> of_network();  ///< of the thermal layer alone
+std::vector<Cause> of_network();  ///< of the thermal layer only
 
 }  // namespace causes
 

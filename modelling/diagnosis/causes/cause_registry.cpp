@@ -8,7 +8,7 @@
 namespace thermocomp::diagnosis {
 namespace {
 
-/// Of a run in which a fault of this run alone is sought.
+/// Least rows of a run in which faults of this run are sought.
 constexpr Eigen::Index fault_rows_min = 24;
 
 }  // namespace
@@ -46,7 +46,7 @@ std::vector<Hypothesis> hypotheses(const MeasuredData& data) {
       if (cause.hypotheses == nullptr) continue;
       for (Hypothesis& each : cause.hypotheses(*material, subject)) {
         each.cause = cause.name;
-        // The effect refers to the material, which the columns keep alive.
+        // `effect` refers to the material, which `columns` keeps alive.
         each.columns = [material, effect = each.effect, run = each.run](const Shapes& shapes,
                                                                         std::size_t output) {
           return stacked(

@@ -1,4 +1,4 @@
-/// What is wrong with the measured displacement, or acts on it from outside.
+/// Faults of the measured displacement, and disturbances from outside.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -25,7 +25,7 @@ std::vector<Hypothesis> time_shift_hypotheses(const Material& material, const Su
   Hypothesis late{material.name_of(subject), Form::no_gain, {{std::string(shift.name), shifts}}};
   late.output = subject.index;
   late.effect = [&material](const MeasuredRun& run, const Shapes& shapes, std::size_t output) {
-    // Interpolation averages two rows; both sides are smoothed, so that less noise is no gain.
+    // Interpolation averages two rows and so reduces noise; both sides are smoothed alike.
     const Column smooth_um = smoothed(run.time_s, run.model_um[output], 2.0 * material.step_s());
     Panel all(run.rows(), std::ssize(shapes));
     for (std::size_t i = 0; i < shapes.size(); ++i)
@@ -70,7 +70,7 @@ std::vector<double> periods_of(const Material& material) {
   return periods;
 }
 
-/// A sine and a cosine for each of so many runs, those of one period after those of another.
+/// A sine and a cosine per run, the columns of one period after those of another.
 Panel waves(const MeasuredRun& run, std::size_t runs, const Shapes& shapes) {
   Panel all = Panel::Zero(run.rows(), std::ssize(shapes) * 2 * static_cast<Eigen::Index>(runs));
   for (std::size_t i = 0; i < shapes.size(); ++i) {

@@ -1,4 +1,4 @@
-/// Heat or growth that follows an operating signal and no temperature.
+/// Heat or growth that depends on an operating signal and on no measured temperature.
 #include <algorithm>
 
 #include "config/text/units.hpp"
@@ -97,7 +97,7 @@ Cause missing_heat_source() {
       power,
       {.name = "gain_um_per_unit", .unit = "um/?", .description = "effect"},
       {.name = "gain_um_per_K", .unit = "um/K", .description = "effect of the room"},
-      // Of the thermal layer.
+      // In the thermal layer:
       {.name = "heat_W", .unit = "W", .low = 0.0, .description = "heat"},
       {.name = "at", .unit = "1", .low = 0.0, .description = "at a signal of"},
   };

@@ -1,4 +1,4 @@
-/// What a thermal network has otherwise than its machine.
+/// Errors of a thermal network.
 #include <algorithm>
 #include <initializer_list>
 
@@ -7,7 +7,7 @@
 namespace thermocomp::diagnosis::causes {
 namespace {
 
-/// A strength is sought between these shares of what the file says. None is 1.
+/// Range of the factor on a value of the machine file.
 constexpr CauseParameter factor_of_part{"factor", "1", 0.15, 7.0, "times what the model has:"};
 constexpr std::size_t factors = 14;
 
@@ -31,7 +31,7 @@ void scale(HeatNetwork& network, const NetworkPart& part, double factor) {
   }
 }
 
-/// Another strength of a part of one of these kinds.
+/// A wrong value of a part of one of these kinds.
 std::vector<NetworkHypothesis> of_wrong_part(const NetworkMaterial& material,
                                              const NetworkSubject& subject,
                                              std::initializer_list<PartKind> kinds) {
@@ -63,7 +63,7 @@ std::vector<NetworkHypothesis> wrong_heat_source_in_network(const NetworkMateria
   wrong.hypothesis.subject = material.plant.source_names[subject.index];
   wrong.hypothesis.form = Form::shared_gain;
   wrong.hypothesis.gains = {std::string(source_factor.name)};
-  // The gain is what the source_factor is beyond 1.
+  // The gain is source_factor - 1.
   wrong.hypothesis.bounds = [](std::size_t) {
     return Interval{source_factor.low - 1.0, source_factor.high - 1.0};
   };
@@ -81,7 +81,7 @@ bool wrong_heat_source_into_machine(MachineFile& machine, const std::string& sub
                                     shared_value(parameters, "factor"));
 }
 
-/// A source gives another heat for its signal.
+/// The heat of a source is wrong.
 Cause wrong_heat_source() {
   Cause cause{"wrong_heat_source", "heat"};
   cause.parameters = {source_factor, {.name = "heat_W", .unit = "W", .description = "heat"}};
@@ -102,7 +102,7 @@ bool wrong_film_coefficient_into_machine(MachineFile& machine, const std::string
                                   shared_value(parameters, "factor"));
 }
 
-/// The film to the air or to the coolant has another conductance.
+/// The conductance of a film to the air or to the coolant is wrong.
 Cause wrong_film_coefficient() {
   Cause cause{"wrong_film_coefficient", "structure"};
   cause.parameters = {
@@ -128,7 +128,7 @@ bool wrong_conductance_into_machine(MachineFile& machine, const std::string& sub
                                   shared_value(parameters, "factor"));
 }
 
-/// A joint of two places has another conductance.
+/// The conductance of a joint is wrong.
 Cause wrong_conductance() {
   Cause cause{"wrong_conductance", "structure"};
   cause.parameters = {
@@ -152,7 +152,7 @@ bool wrong_heat_capacity_into_machine(MachineFile& machine, const std::string& s
                                   shared_value(parameters, "factor"));
 }
 
-/// A place has another heat capacity.
+/// The heat capacity of a place is wrong.
 Cause wrong_heat_capacity() {
   Cause cause{"wrong_heat_capacity", "structure"};
   cause.parameters = {
@@ -178,7 +178,7 @@ NetworkHypothesis warmer(const std::string& subject, const Eigen::VectorXd& infl
   wrong.hypothesis.form = Form::shared_gain;
   wrong.hypothesis.gains = {std::string(offset.name)};
   wrong.hypothesis.bounds = [](std::size_t) { return Interval{offset.low, offset.high}; };
-  // Air that is warmer by so much brings in a constant heat.
+  // Warmer air adds a constant heat flow.
   wrong.apply = [inflow](HeatNetwork& network, const Shape&, double gain) {
     network.sources.push_back({"", gain, 1.0, 1.0, inflow});
   };
@@ -194,7 +194,7 @@ std::vector<NetworkHypothesis> wrong_ambient_in_network(const NetworkMaterial& m
   return {warmer(part.subject, part.inflow)};
 }
 
-/// The air around the machine, or around one part of it, is not what the room's reading says.
+/// The air around the machine, or around one part of it, differs from the room's reading.
 Cause wrong_ambient() {
   Cause cause{"wrong_ambient", "structure"};
   cause.parameters = {offset};

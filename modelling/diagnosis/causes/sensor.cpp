@@ -1,4 +1,4 @@
-/// What is wrong with a reading.
+/// Faults of readings.
 #include <algorithm>
 
 #include "config/runs/model_inputs.hpp"
@@ -8,21 +8,21 @@
 namespace thermocomp::diagnosis::causes {
 namespace {
 
-/// Share of the run before which nothing is sought to have begun.
+/// Latest onset of a fault, as a share of the run.
 constexpr double last_onset = 0.95;
 
-/// What the faults of one reading in one run have in common.
+/// Common properties of faults of one reading in one run.
 struct ReadingFault {
-  const char* onset;  ///< the shape's one parameter
+  const char* onset;  ///< name of the only shape parameter
   const char* gain;
-  double first;  ///< of the onsets, as a share of the run
+  double first;  ///< first onset, as a share of the run
   std::size_t onsets;
   /// Error of a reading with a fault of gain 1 over all rows of the run [K], shape (rows, onsets).
   Panel (*error)(const MeasuredData& data, const MeasuredRun& run, std::size_t input,
                  const std::vector<double>& onsets_s);
 };
 
-/// The model misses what it makes of the error of the reading.
+/// The effect is minus the model's answer to the error of the reading.
 /// @pre the subject is an input in one run
 Hypothesis of_reading_fault(const Material& material, const Subject& subject,
                             const ReadingFault& fault) {
@@ -45,8 +45,8 @@ Hypothesis of_reading_fault(const Material& material, const Subject& subject,
   return of;
 }
 
-/// A fault of a sensor of a thermal network in one run: a displacement of its reading alone.
-/// @param value  of gain 1, at a time
+/// A fault of a sensor of a thermal network in one run; it changes only this reading.
+/// @param value  error for a gain of 1 at a time
 /// @pre the subject is a sensor in one run
 NetworkHypothesis of_reading_in_network(
     const NetworkMaterial& material, const NetworkSubject& subject, const char* gain,
@@ -79,7 +79,7 @@ std::vector<Hypothesis> sensor_step_hypotheses(const Material& material, const S
   return {of_reading_fault(material, subject, {"at_s", "step_K", 0.02, 52, step_errors_K})};
 }
 
-/// A jump at any of many moments within the run.
+/// Onsets are evenly distributed over the run.
 std::vector<NetworkHypothesis> sensor_step_in_network(const NetworkMaterial& material,
                                                       const NetworkSubject& subject) {
   if (subject.kind != NetworkSubjectKind::sensor_in_run) return {};
@@ -151,7 +151,7 @@ Cause sensor_drift() {
   return cause;
 }
 
-/// 1 / gain - 1: what is lost of the motion, over what is left.
+/// Range of 1 / gain - 1, the lost over the remaining share of the motion.
 constexpr double lost_min = 0.02;
 constexpr double lost_max = 20.0;
 
@@ -160,7 +160,7 @@ double kept(double lost) {
 }
 
 /// reading = room + gain (T - room): the reading misses (1 / gain - 1) (reading - room),
-/// from the onset on. Without a column of the room, its first value stands for it.
+/// from the onset on. Without a column of the room, the reading's first value replaces it.
 Panel loose_errors_K(const MeasuredData& data, const MeasuredRun& run, std::size_t input,
                      const std::vector<double>& onsets_s) {
   const auto temps_degC = [&run](std::size_t place) -> Column {
@@ -182,7 +182,7 @@ std::vector<Hypothesis> sensor_loose_hypotheses(const Material& material, const 
   return {std::move(loose)};
 }
 
-/// Of what is lost, what is left.
+/// Converts the lost share to the gain.
 std::vector<Parameter> gain_left(const FoundGains& found) {
   const std::size_t output = first_output(found);
   const Interval& lost = found.ci95[output].front();
@@ -224,7 +224,7 @@ Hypothesis exchanged(const Material& material, std::size_t input, std::size_t ot
   return swap;
 }
 
-/// With each input that comes later in the alphabet.
+/// Pairs with each input that is later in the alphabet.
 std::vector<Hypothesis> sensor_swap_hypotheses(const Material& material, const Subject& subject) {
   if (subject.kind != SubjectKind::input) return {};
   const auto& inputs = material.data().model.inputs;

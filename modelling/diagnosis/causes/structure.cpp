@@ -1,4 +1,4 @@
-/// What a model of the machine's structure may lack: how it follows its temperatures.
+/// Errors of the relation between temperatures and displacement.
 #include <algorithm>
 
 #include "config/text/units.hpp"
@@ -18,7 +18,7 @@ std::vector<Hypothesis> wrong_coefficient_hypotheses(const Material& material,
   return {std::move(wrong)};
 }
 
-/// dK T: the coefficient of a place is off by dK.
+/// dK T: the coefficient of a place is wrong by dK.
 Cause wrong_coefficient() {
   Cause cause{"wrong_coefficient", "structure"};
   cause.parameters = {
@@ -33,10 +33,10 @@ Cause wrong_coefficient() {
 }
 
 constexpr CauseParameter lag_tau{"tau_s", "s", 60.0, 4 * 3600.0, "time constant"};
-/// The share of a place's effect that may be late: a fit settles it hardly better than this.
+/// Upper bound on the late share of a place's effect; above 1 since a fit has errors.
 constexpr double share_max = 1.1;
 
-/// Of gains, as a share of what the input or its whole group does in the end.
+/// Bounds of the gain, from the steady-state effect of the input or of its whole group.
 std::function<Interval(std::size_t output)> lag_shares_of(const Material& material,
                                                           std::size_t input) {
   return [&material, input](std::size_t output) {
@@ -148,7 +148,7 @@ Hypothesis along_axis(const Material& material, const Subject& place, const Subj
   return along;
 }
 
-/// With every position that the machine went to.
+/// One hypothesis per position that moves.
 std::vector<Hypothesis> position_dependence_hypotheses(const Material& material,
                                                        const Subject& subject) {
   if (subject.kind != SubjectKind::input && subject.kind != SubjectKind::other_temperature)
@@ -164,7 +164,7 @@ std::vector<Hypothesis> position_dependence_hypotheses(const Material& material,
   return all;
 }
 
-/// Where c (p - p0) T is none: p0 = -b / c of c p T + b T; over several outputs weighted by c^2.
+/// p0 of c (p - p0) T = c p T + b T, that is -b / c; mean over the outputs weighted by c^2.
 double pivot(const FoundGains& found) {
   double above = 0.0;
   double below = 0.0;
@@ -197,10 +197,10 @@ Cause position_dependence() {
 
 constexpr CauseParameter start_tau{"tau_s", "s", 0.0, 6 * 3600.0, "time constant"};
 constexpr CauseParameter at_start{"at_start", "1", 0.0, 1.0, "by the start (1) or by now (0):"};
-/// Runs that begin at so many temperatures, and so far apart.
+/// Least number and range of the runs' initial temperatures.
 constexpr std::size_t starts_min = 3;
 constexpr double starts_apart_K = 1.0;
-/// Gains are fitted about here, where a run begins.
+/// Gains are fitted about this initial temperature.
 constexpr double usual_degC = 20.0;
 
 bool starts_differ(const MeasuredData& data, std::size_t place) {
@@ -210,7 +210,7 @@ bool starts_differ(const MeasuredData& data, std::size_t place) {
   return starts_degC.size() >= starts_min && *most - *least >= starts_apart_K;
 }
 
-/// @param now  the place's rise, where that of now counts; empty: that at the start
+/// @param now  rise of the place if its present temperature counts; empty: that at the start
 Hypothesis by_start(const Material& material, const Subject& subject, std::size_t place,
                     const ColumnOf& now) {
   const bool is_signal = subject.kind == SubjectKind::signal;
@@ -242,7 +242,7 @@ Hypothesis by_start(const Material& material, const Subject& subject, std::size_
   return by;
 }
 
-/// By the place itself, for a signal the first of the model, and by the room.
+/// Depends on the place itself (for a signal: on the model's first input) or on the room.
 std::vector<Hypothesis> start_dependence_hypotheses(const Material& material,
                                                     const Subject& subject) {
   if (subject.kind != SubjectKind::input && subject.kind != SubjectKind::signal) return {};
@@ -278,7 +278,7 @@ Cause start_dependence() {
 }
 
 constexpr CauseParameter sensor_tau{"tau_s", "s", 20.0, 3600.0, "time constant"};
-/// A derivative is taken of readings smoothed with this share of the time constant that it is for.
+/// Time constant of smoothing before differentiation, as a share of the sensor's.
 constexpr double slope_smoothing = 0.25;
 
 std::vector<Hypothesis> slow_sensor_hypotheses(const Material& material, const Subject& subject) {
@@ -289,7 +289,7 @@ std::vector<Hypothesis> slow_sensor_hypotheses(const Material& material, const S
                     material.lag_times_s(sensor_tau.low, sensor_tau.high, 16), true}}};
   slow.effect = [&material, input = subject.index](const MeasuredRun& run, const Shapes& shapes,
                                                    std::size_t output) {
-    // A reading that is late misses sensor_tau times its slope.
+    // A late reading is too low by sensor_tau times its slope.
     Panel missed_K(run.rows(), std::ssize(shapes));
     for (std::size_t i = 0; i < shapes.size(); ++i)
       missed_K.col(static_cast<Eigen::Index>(i)) =
@@ -376,8 +376,7 @@ std::vector<Hypothesis> hysteresis_hypotheses(const Material& material, const Su
   return {};
 }
 
-/// Play of a joint, of one temperature's effect or of the whole output: a loop that does not depend
-/// on speed.
+/// Play of one temperature's effect or of the whole output: a loop that does not depend on speed.
 Cause hysteresis() {
   Cause cause{"hysteresis", "structure"};
   cause.parameters = {{.name = "width_K", .unit = "K", .low = 0.0, .description = "dead band"},

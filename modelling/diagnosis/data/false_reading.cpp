@@ -24,7 +24,7 @@ bool names_one_of(const TermSpec& term, const Names& readings) {
                      [&](const std::string& subject) { return readings.contains(subject); });
 }
 
-/// The input, and those that its reading goes to where channels are exchanged.
+/// The input and those that use its reading through exchanged channels.
 Names readings_beside(const ThermalModel& model, std::size_t input) {
   Names readings = {model.inputs[input]};
   for (std::size_t known = 0; known < readings.size();) {
@@ -37,7 +37,7 @@ Names readings_beside(const ThermalModel& model, std::size_t input) {
   return readings;
 }
 
-/// Keeps the subjects that are among the readings.
+/// Removes subjects that are not among the readings.
 void narrow(LagBankSpec& bank, const Names& readings) {
   for (std::size_t i = bank.subjects.size(); i-- > 0;) {
     if (readings.contains(bank.subjects[i])) continue;
@@ -48,8 +48,8 @@ void narrow(LagBankSpec& bank, const Names& readings) {
   }
 }
 
-/// The model without the terms that the reading does not go into, a play of an output among them;
-/// of a bank only what it goes into, which takes less time.
+/// The model without terms and bank subjects that do not use the reading; without a play of an
+/// output, too.
 ThermalModel part_of_reading(const ThermalModel& model, std::size_t input) {
   const Names readings = readings_beside(model, input);
   ThermalModel part = model;
@@ -79,7 +79,7 @@ Panel answer_to_errors(const MeasuredData& data, const MeasuredRun& run, std::si
 
 double settled_um_per_K(const MeasuredData& data, std::size_t output, std::size_t input) {
   const MeasuredRun& run = data.runs.front();
-  // Lags start as if their input had stood at its first value for long.
+  // Lags start in the steady state of their first value.
   return answer_to_errors(data, run, output, input, Panel::Ones(run.rows(), 1))(0, 0);
 }
 

@@ -15,7 +15,7 @@ namespace thermocomp::diagnosis {
 namespace {
 
 constexpr double missing_share_max = 0.2;
-/// A matrix that was fitted or calculated is right to a few per cent.
+/// Typical relative error of coefficients that were fitted or calculated.
 constexpr double coefficient_sd = 0.03;
 
 double missing_share(const std::vector<double>& values) {
@@ -24,7 +24,7 @@ double missing_share(const std::vector<double>& values) {
   return static_cast<double>(missing) / static_cast<double>(values.size());
 }
 
-/// The column at the rows; missing values are held at the last one, at the start at the first.
+/// The column at the rows; a missing value is replaced by the last one, at the start by the first.
 Column taken(const std::vector<double>& values, const std::vector<std::size_t>& rows) {
   Column column(static_cast<Eigen::Index>(rows.size()));
   double last = first_value(values).value_or(0.0);
@@ -131,7 +131,7 @@ std::vector<Column> model_over(const ThermalModel& model, const MeasuredRun& run
     signals.push_back(&run.signals[place]);
   }
   DisplacementModel displacement(model);
-  // Of the absolute temperatures that the model sees, the rise is all but the reference.
+  // The model takes absolute temperatures.
   std::vector<double> temps_degC(temperatures.size());
   std::vector<double> signal_values(signals.size());
   std::vector<double> out(model.outputs.size());

@@ -1,4 +1,4 @@
-/// Measured runs beside what the model says of them: the material of a diagnosis.
+/// Measured runs with the model's prediction.
 #pragma once
 
 #include <map>
@@ -14,7 +14,7 @@
 
 namespace thermocomp::diagnosis {
 
-/// Rows [begin, end) that are correlated with each other and with no other rows.
+/// Rows [begin, end), correlated only with each other.
 struct Block {
   Eigen::Index begin{0};
   Eigen::Index end{0};
@@ -23,12 +23,12 @@ struct Block {
 /// One run: its rows in which no input of the model is missing, from the file's first such row to
 /// the end of the selection. Missing values of other columns are held at the last one.
 struct MeasuredRun {
-  std::string name;       ///< the argument as given
+  std::string name;       ///< command line argument
   std::size_t number{0};  ///< among MeasuredData::runs
   Column time_s;
   Eigen::Index begin{0};               ///< first selected row
   std::vector<Column> temps_K;         ///< rises, order of MeasuredData::temperatures
-  std::vector<double> reference_degC;  ///< where the rises are 0
+  std::vector<double> reference_degC;  ///< reference of each rise
   std::vector<Column> denoised_K;      ///< temps_K without the noise of single values
   std::vector<Column> signals;         ///< order of MeasuredData::signals
   std::vector<Column> model_um;        ///< order of the outputs, relative to the output's first row
@@ -48,23 +48,23 @@ struct MeasuredData {
   std::vector<std::string> signals;       ///< operating signals and positions
   std::vector<MeasuredRun> runs;
   StackedRows rows{};
-  /// Least noise of a single value of each output, as the steps of its converter make it; empty:
-  /// nothing is known.
+  /// Least noise of a single value per output, from the resolution of its converter; empty:
+  /// unknown.
   std::vector<double> least_noise_um{};
-  /// How far every coefficient of the model may be wrong without being a cause of its own: standard
-  /// deviation, as a share of the coefficient. 0: they are never doubted.
+  /// Prior standard deviation of the relative errors of the model's coefficients; 0: they are
+  /// exact.
   double coefficient_sd{0.0};
 
-  /// Place of a temperature; the number of temperatures where there is none of this name.
+  /// Index of a temperature; the number of temperatures if there is none of this name.
   [[nodiscard]] std::size_t place_of(const std::string& temperature) const;
   /// Adds a run and its rows.
   void add(MeasuredRun run);
-  /// The model's coefficient of an input [um/K] in each row: matrix and guideways.
+  /// Coefficient of an input [um/K] in each row, from matrix and guideways.
   [[nodiscard]] Column coefficient(const MeasuredRun& run, std::size_t output,
                                    std::size_t input) const;
 };
 
-/// Columns that every one of the runs and of the further ones has, in the order of the first run.
+/// Columns that all runs have, in the order of the first run.
 struct SharedColumns {
   std::vector<std::string> temperatures;  ///< after the model's inputs
   std::vector<std::string> signals;
@@ -73,7 +73,7 @@ struct SharedColumns {
                                            const std::vector<RunFile>& runs,
                                            const std::vector<RunFile>& further = {});
 
-/// The model at every row of the run, in the estimator's own arithmetic; shape (outputs, rows).
+/// Prediction in every row of the run by the estimator's DisplacementModel; shape (outputs, rows).
 [[nodiscard]] std::vector<Column> model_over(const ThermalModel& model, const MeasuredRun& run,
                                              const MeasuredData& data);
 
@@ -85,13 +85,12 @@ struct SharedColumns {
                                          const std::vector<std::string>& names,
                                          const SharedColumns& columns);
 
-/// Place of the room's temperature: one that the model does not use, else one of its inputs;
-/// nullopt: none is called so.
+/// Index of the room's temperature by its name: one that the model does not use, else an input.
 [[nodiscard]] std::optional<std::size_t> room_among(const MeasuredData& data);
 
 /// Columns over the stacked rows.
-/// @param make  of a run: all its rows, a column or shape (rows, m)
-/// @param only  if given, the other runs are 0
+/// @param make  returns all rows of a run, a column or shape (rows, m)
+/// @param only  if given, rows of the other runs are 0
 /// @return shape (stacked rows, m)
 template <class Make>
 [[nodiscard]] Panel stacked(const MeasuredData& data, Make make,
@@ -112,7 +111,7 @@ template <class Make>
 /// is in its own group.
 using PlaceGroups = std::map<std::string, std::vector<std::string>>;
 [[nodiscard]] PlaceGroups place_groups(const MeasuredData& data);
-/// Whether two subjects are the same but for places of one group.
+/// Whether two subjects differ only by places of one group.
 [[nodiscard]] bool same_places(const PlaceGroups& groups, const std::string& subject,
                                const std::string& other);
 /// The group of every place of a subject, without repetition, the subject's own places first; then
@@ -121,17 +120,16 @@ using PlaceGroups = std::map<std::string, std::vector<std::string>>;
                                                 const std::string& subject,
                                                 const std::vector<std::string>& others = {});
 
-/// The displacement that the model predicts too much of an output because an input reads too high,
-/// f(T + e) - f(T) for each column e of errors [K] over all rows of the run, f being the
-/// estimator's own arithmetic with the terms that name the input: matrix, guideways, lags, banks of
-/// lags. A play of the whole output is left out. Where a term is not linear in the reading (its
-/// square, a play), the answer to a multiple of e is only nearly that multiple.
+/// Change of the prediction of an output by errors of an input, f(T + e) - f(T) for each column e
+/// of errors over all rows of the run. f is the estimator's DisplacementModel with matrix,
+/// guideways and the terms that use the input, without a play of the whole output. It is not linear
+/// in e if a term is not (square, play).
 /// @param errors_K  shape (rows, m)
 /// @return displacement [um], the same shape
 [[nodiscard]] Panel answer_to_errors(const MeasuredData& data, const MeasuredRun& run,
                                      std::size_t output, std::size_t input, Panel errors_K);
 
-/// The same of an input that has read 1 K too high since long before the first run [um/K].
+/// Steady-state change for an error of 1 K [um/K].
 /// @pre the model has no guideways
 [[nodiscard]] double settled_um_per_K(const MeasuredData& data, std::size_t output,
                                       std::size_t input);

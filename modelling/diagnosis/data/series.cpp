@@ -72,14 +72,14 @@ Column denoised(const Column& time_s, const Column& values) {
   const Eigen::Index last = values.size() - 1;
   Column best = values;
   if (last < 8) return best;
-  // Without smoothing a row is predicted from its two neighbours.
+  // Without smoothing a row is predicted by the mean of its neighbours.
   double least = 0.0;
   for (Eigen::Index row = 1; row < last; ++row)
     least += std::pow(values[row] - 0.5 * (values[row - 1] + values[row + 1]), 2);
   const double step_s = (time_s[last] - time_s[0]) / static_cast<double>(last);
   for (const double rows : {1.0, 2.0, 4.0, 8.0}) {
     const Column smooth = smoothed(time_s, values, rows * step_s);
-    // Weight of a value in its own smoothed one.
+    // Weight of a value in its smoothed value.
     const double share = -std::expm1(-1.0 / rows);
     const double own = share / (2.0 - share);
     const double left = ((values - smooth) / (1.0 - own)).segment(1, last - 1).squaredNorm();

@@ -7,7 +7,7 @@ namespace thermocomp::diagnosis {
 namespace {
 
 constexpr Eigen::Index eighths = 8;
-/// Of the products' trace: keeps what hardly differs solvable.
+/// Ridge as a share of the products' trace: keeps nearly dependent columns solvable.
 constexpr double ridge = 1e-9;
 
 }  // namespace

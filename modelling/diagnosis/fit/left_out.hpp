@@ -1,4 +1,4 @@
-/// What columns explain of rows that they were not fitted to.
+/// Cross-validation of columns.
 #pragma once
 
 #include <vector>
@@ -10,20 +10,20 @@
 
 namespace thermocomp::diagnosis {
 
-/// Each eighth of the rows is left out in turn: least squares on the others, of columns that are
-/// accepted already and those that are tried.
+/// Leaves out each eighth of the rows in turn; least squares of accepted and tried columns on the
+/// other rows.
 class LeftOut {
  public:
   /// @param accepted  shape (rows, p)
   LeftOut(Column values, Panel accepted);
 
-  /// Sum of the squares that are left of all eighths with the accepted columns alone.
+  /// Sum of squared residuals of all eighths with the accepted columns only.
   [[nodiscard]] double before() const { return before_; }
-  /// The same with groups of `width` columns, one a group.
-  /// @param bounds  of the gain where a group has one column
+  /// The same with each group of `width` columns in addition.
+  /// @param bounds  of the gain if a group has one column
   [[nodiscard]] std::vector<double> after(const Panel& columns, Eigen::Index width,
                                           const Interval& bounds) const;
-  /// What the accepted columns do not explain of columns, or of the values, over all rows.
+  /// Residual of columns, or of the values, from a fit of the accepted columns to all rows.
   [[nodiscard]] Panel beside_accepted(const Panel& columns) const;
   [[nodiscard]] const Column& values() const { return values_; }
 

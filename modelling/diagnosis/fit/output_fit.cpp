@@ -54,18 +54,18 @@ double whiten(const Background& background, const Column& time_s, const std::vec
 
 namespace {
 
-/// More rows tell hardly more of what lasts for minutes and hours.
+/// Enough rows for effects of minutes and hours.
 constexpr Eigen::Index rows_max = 480;
-/// Rows are not averaged over a gap that is so many times longer than a row shall be.
+/// Rows are not averaged over gaps longer than this multiple of an averaged row.
 constexpr double gap_factor = 3.0;
-/// Share of its own RMS by which a physical effect parts from its form: bodies without a sensor,
-/// joints and films of `tests/diagnosis/physical_effects.py` part by 5 to 20 %.
+/// Model discrepancy: deviation of a physical effect from its form as a share of its RMS. It is 5
+/// to 20 % for the bodies, joints and films of tests/diagnosis/physical_effects.py.
 constexpr double discrepancy = 0.1;
 constexpr double never_known = 1e-9;
 constexpr double least_variance = 1e-9;
 
-/// Standard deviation of the white noise, from second differences, which neither offsets nor slopes
-/// reach; 0 where there are none.
+/// Standard deviation of the white noise from second differences, which contain no offset or slope;
+/// 0 if there are none.
 double noise_of(const Column& values, const std::vector<Block>& runs) {
   std::vector<double> bends;
   for (const Block& run : runs)

@@ -1,4 +1,4 @@
-/// One output's remainder, and what columns explain of it under every background.
+/// Likelihood of one output's residual under several noise models, with and without an effect.
 #pragma once
 
 #include <vector>
@@ -16,23 +16,23 @@ namespace thermocomp::diagnosis {
 ///
 ///   s^2 (delta(t - t') + ratio^2 exp(-|t - t'| / tau))
 struct Background {
-  double ratio{0.0};  ///< of the wandering part's standard deviation to the white part's
+  double ratio{0.0};  ///< standard deviation of the correlated part over that of the white part
   double tau_s{1.0};
 };
 
-/// The columns with the mean of each run taken off.
+/// The columns minus their mean in each run.
 [[nodiscard]] Panel centred_in(const std::vector<Block>& runs, Panel columns);
 
-/// Those that are reckoned with; each as likely as another beforehand.
+/// The backgrounds considered, with equal prior probability.
 [[nodiscard]] const std::vector<Background>& backgrounds();
 
-/// Turns each column into innovations of standard deviation s (Kalman filter of each run), shape
-/// (rows, m), in place.
+/// Replaces each column by its innovations of standard deviation s (a Kalman filter per run), shape
+/// (rows, m).
 /// @return ln of the determinant of the covariance over s^2
 double whiten(const Background& background, const Column& time_s, const std::vector<Block>& runs,
               Panel& columns);
 
-/// The rows in which an output has a value; neighbours are averaged where there are many.
+/// The rows in which an output has a value; of many rows, neighbours are averaged.
 class OutputRows {
  public:
   /// @param present  over the stacked rows
@@ -51,12 +51,12 @@ class OutputRows {
   Eigen::SparseMatrix<double, Eigen::RowMajor> means_;
 };
 
-/// Normal equations of groups of columns, one group a shape, under each background.
+/// Normal equations of groups of columns, one group per shape, under each background.
 struct Equations {
   Eigen::Index width{1};
-  Eigen::MatrixXd right;   ///< columns' remainder, shape (width shapes, backgrounds)
+  Eigen::MatrixXd right;   ///< columns' residual, shape (width shapes, backgrounds)
   Eigen::MatrixXd square;  ///< columns' columns within a group, shape (width^2 shapes, backgrounds)
-  Eigen::MatrixXd size;    ///< mean square within a group, means of the runs off: (width^2, shapes)
+  Eigen::MatrixXd size;    ///< mean square of centred columns, shape (width^2, shapes)
 
   [[nodiscard]] auto right_of(Eigen::Index shape, Eigen::Index under) const {
     return right.col(under).segment(width * shape, width);
@@ -70,13 +70,12 @@ struct Equations {
   }
 };
 
-/// Remainder = common columns b + columns g + background, b known beforehand to a standard
-/// deviation each, or not at all.
+/// Residual = common columns b + columns g + background, b with a normal prior of mean 0.
 class OutputFit {
  public:
   /// @param remainder  one value a row
-  /// @param common     shape (rows, p): what every hypothesis has to compete with
-  /// @param sd         of their factors; infinite: nothing is known
+  /// @param common     shape (rows, p): part of every hypothesis
+  /// @param sd         prior standard deviation of b; infinite: no prior
   /// @param least_noise  of a single value
   OutputFit(OutputRows rows, Column remainder, const Panel& common, const Eigen::VectorXd& sd,
             double least_noise);
@@ -85,28 +84,28 @@ class OutputFit {
   [[nodiscard]] const Column& remainder() const { return remainder_; }
   /// Standard deviation of a row's white noise, from second differences.
   [[nodiscard]] double noise() const { return noise_; }
-  /// The same beside an effect, which may be quick itself.
+  /// The same after subtraction of an effect, which may change quickly.
   [[nodiscard]] double noise_beside(const Column& effect) const;
   /// @param columns  of the output's rows, `width` neighbours a group
   [[nodiscard]] Equations equations(const Panel& columns, Eigen::Index width) const;
-  /// ln L under a background when `explained` is taken from the squares, of an effect of this mean
-  /// square. An effect is never quite of its form: what is nearly it is worth as much, so the
-  /// background holds at least `discrepancy` of the effect's RMS.
+  /// ln L under a background with an effect that reduces the squares by `explained` and has this
+  /// mean square. The variance is at least that of the model discrepancy, a share of the effect, so
+  /// that an approximate form of a large effect is not rejected.
   [[nodiscard]] double log_likelihood(Eigen::Index under, double explained,
                                       double effect_square) const;
-  /// ln of the mean over all backgrounds, nothing explained.
+  /// ln of the mean likelihood over all backgrounds without an effect.
   [[nodiscard]] double log_likelihood_of_none() const { return none_; }
-  /// Variance of the white part under a background, `explained` taken from the squares.
+  /// Variance of the white part under a background with an effect that explains so much.
   [[nodiscard]] double variance(Eigen::Index under, double explained) const;
-  /// The common columns' factors under the background that is likeliest.
+  /// Estimate of b under the likeliest background.
   [[nodiscard]] Eigen::VectorXd common_factors() const;
 
  private:
   struct Under {
-    Panel white;                       ///< remainder, common columns
-    Eigen::LLT<Eigen::MatrixXd> root;  ///< of the common columns' products and prior
-    Eigen::VectorXd common_remainder;  ///< root^-1 common' remainder
-    double squares{0.0};               ///< of the remainder, the common columns taken out
+    Panel white;                       ///< residual, common columns
+    Eigen::LLT<Eigen::MatrixXd> root;  ///< of the common columns' products plus prior
+    Eigen::VectorXd common_remainder;  ///< root^-1 common' residual
+    double squares{0.0};               ///< of the residual after the fit of the common columns
     double log_determinant{0.0};
   };
 

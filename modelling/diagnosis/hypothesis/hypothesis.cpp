@@ -66,7 +66,7 @@ std::vector<double> firsts_of(const Shapes& shapes) {
 
 namespace {
 
-/// Moments of largest jumps that are tried beside a grid.
+/// Number of largest jumps whose times are tried in addition to a grid.
 constexpr std::ptrdiff_t jumps_max = 12;
 
 double median_step_s(const MeasuredData& data) {
@@ -90,7 +90,7 @@ Material::Material(const MeasuredData& data) : data_(data), step_s_(median_step_
     for (std::size_t input = 0; input < inputs.size(); ++input)
       settled_(static_cast<Eigen::Index>(output), static_cast<Eigen::Index>(input)) =
           diagnosis::settled_um_per_K(data, output, input);
-  // Of places that move alike a fit settles the sum, hardly each coefficient.
+  // A fit determines the sum of the coefficients of similar places, hardly each of them.
   const PlaceGroups groups = place_groups(data);
   for (std::size_t input = 0; input < inputs.size(); ++input)
     for (std::size_t other = 0; other < inputs.size(); ++other)

@@ -1,5 +1,5 @@
-/// Hypotheses of what is wrong: a cause with a subject, and the displacement that it would explain;
-/// its parameters with intervals; what causes make their columns of.
+/// Hypotheses: a cause with a subject and the displacement it would explain; parameters with
+/// intervals; the data from which causes compute their columns.
 #pragma once
 
 #include <algorithm>
@@ -22,39 +22,39 @@ struct Interval {
   double high{0.0};
 };
 
-/// A parameter of a cause: one number, or one an output.
+/// A parameter of a cause: one number, or one per output.
 struct Parameter {
   std::string name;
-  std::map<std::string, double> values;  ///< by output; one of the name "" where it is shared
+  std::map<std::string, double> values;  ///< by output; key "" if all outputs share it
   std::map<std::string, Interval> ci95;  ///< the same keys; may be empty
 };
 
-/// The value that all outputs share; 0 where there is no such parameter.
+/// The value that all outputs share; 0 if there is no such parameter.
 [[nodiscard]] double shared_value(const std::vector<Parameter>& parameters,
                                   const std::string& name);
 
-/// The gains of a finding as the search leaves them.
+/// The gains of a finding in the form of the search.
 struct FoundGains {
-  const std::vector<std::string>& names;           ///< one a column of the hypothesis
+  const std::vector<std::string>& names;           ///< one per column of the hypothesis
   const std::vector<std::string>& outputs;         ///< of the model
-  const std::vector<Eigen::VectorXd>& gains;       ///< one an output; empty: it does not act on it
+  const std::vector<Eigen::VectorXd>& gains;       ///< one per output; empty: no effect on it
   const std::vector<std::vector<Interval>>& ci95;  ///< the same
 };
 
-/// Gain number `index` of every output that the finding acts on.
+/// Gain number `index` of every affected output.
 [[nodiscard]] Parameter gain_table(const FoundGains& found, Eigen::Index index);
-/// The first output that it acts on.
+/// The first affected output.
 [[nodiscard]] std::size_t first_output(const FoundGains& found);
 
-/// The shape parameters' values, in their order.
+/// Values of the shape parameters, in their order.
 using Shape = std::vector<double>;
 using Shapes = std::vector<Shape>;
 
 /// How the columns of a hypothesis enter the displacement.
 enum class Form {
-  own_gains,    ///< each output has gains of its own
-  shared_gain,  ///< one gain for all outputs; the column of an output carries its coefficient
-  no_gain,      ///< nothing is free but the shape
+  own_gains,    ///< each output has its own gains
+  shared_gain,  ///< one gain for all outputs; their columns include their coefficients
+  no_gain,      ///< only the shape is free
 };
 
 /// One shape parameter of a hypothesis, searched over a grid.
@@ -69,48 +69,46 @@ struct Hypothesis {
   std::string subject{};
   Form form{Form::own_gains};
   std::vector<ShapeParameter> shape{};
-  std::vector<std::string> gains{};     ///< names of the gains, one a column
-  std::optional<std::size_t> output{};  ///< acts on this output alone
-  std::optional<std::size_t> run{};     ///< a fault of this run alone
+  std::vector<std::string> gains{};     ///< names of the gains, one per column
+  std::optional<std::size_t> output{};  ///< acts only on this output
+  std::optional<std::size_t> run{};     ///< a fault in this run only
   /// Displacement of an output over all rows of a run, the columns of one shape after those of
   /// another: shape (rows, width() shapes).
   std::function<Panel(const MeasuredRun& run, const Shapes& shapes, std::size_t output)> effect{};
-  /// The same over the stacked rows, 0 in runs in which it does not act. Set by the catalogue.
+  /// The same over the stacked rows; 0 in other runs than `run`. Set by the catalogue.
   std::function<Panel(const Shapes& shapes, std::size_t output)> columns{};
-  /// What is physically possible of a gain; empty: everything is.
+  /// Physical range of a gain; empty: unbounded.
   std::function<Interval(std::size_t output)> bounds{};
 
   std::string cause{};  ///< set by the catalogue
 
-  /// Cause that explains, at the subject `simpler_subject`, all that this one does where what it
-  /// adds is nothing; empty: none.
+  /// Special case of this hypothesis: this cause at the subject `simpler_subject`; empty: none.
   std::string simpler_cause{};
   std::string simpler_subject{};
 
-  /// ln of its prior probability over that of the simpler form of the same cause.
+  /// ln of its prior probability relative to the simpler form of the same cause.
   double log_prior{0.0};
 
-  // Of a fault of one reading:
+  // Only for a fault of one reading:
   std::optional<std::size_t> sensor{};  ///< the input
-  /// Its error for a gain of 1 [K] over all rows of the run, one column a shape.
+  /// Error for a gain of 1 [K] over all rows of the run, one column per shape.
   std::function<Panel(const MeasuredRun& run, const Shapes& shapes)> errors_K{};
-  bool shrinks_reading{false};  ///< the error is in proportion to the reading
+  bool shrinks_reading{false};  ///< the error is proportional to the reading
 
-  /// Columns for one shape: as many as gains, or one.
+  /// Number of columns for one shape: that of the gains, at least 1.
   [[nodiscard]] Eigen::Index width() const { return std::max<Eigen::Index>(1, std::ssize(gains)); }
 };
 
-/// Parameters that are fitted: of its shape those that are not discrete, and the gains of an
-/// output.
+/// Number of fitted parameters: non-discrete shape parameters and gains of an output.
 [[nodiscard]] std::size_t free_parameters(const Hypothesis& hypothesis);
 
-/// Every point of the grid of its shape; one without values where it has no shape.
+/// All points of its grid; without shape parameters one empty point.
 [[nodiscard]] Shapes grid_of(const Hypothesis& hypothesis);
 
 /// The first parameter of each shape.
 [[nodiscard]] std::vector<double> firsts_of(const Shapes& shapes);
 
-/// Every cause (causes/cause.hpp) with every subject that it can have in these data.
+/// Every cause (causes/cause.hpp) with every possible subject in these data.
 [[nodiscard]] std::vector<Hypothesis> hypotheses(const MeasuredData& data);
 
 enum class SubjectKind {
@@ -122,11 +120,11 @@ enum class SubjectKind {
   input_in_run,   ///< a temperature of the model in one run
 };
 
-/// One thing of the data that a cause may act on.
+/// Element of the data that a cause may act on.
 struct Subject {
   SubjectKind kind{SubjectKind::input};
   std::size_t index{0};  ///< among MeasuredData's temperatures, signals, or the model's outputs
-  std::size_t run{0};    ///< of those in one run
+  std::size_t run{0};    ///< for kinds in one run
 };
 
 /// A column of each run.
@@ -151,20 +149,19 @@ class Material {
   }
 
   [[nodiscard]] const std::string& name_of(const Subject& subject) const;
-  /// The subject's values: rises calmed of the noise of single values, a signal as it is.
+  /// The subject's values: denoised rises, or the signal as recorded.
   /// @pre a temperature or a signal
   [[nodiscard]] ColumnOf values_of(const Subject& subject) const;
-  /// The room's temperature: one that the model does not use, else one of its inputs; none: not
-  /// recorded.
+  /// The room's temperature: one that the model does not use, else an input; nullopt: not recorded.
   [[nodiscard]] std::optional<Subject> room() const;
   [[nodiscard]] bool moves_anywhere(const ColumnOf& of) const;
-  /// The largest distance of two values within a run.
+  /// Largest range of the values within a run.
   [[nodiscard]] double range(const ColumnOf& of) const;
 
-  /// Time constants within the range that these rows can tell of.
+  /// Time constants within the range that step and length of the runs allow.
   [[nodiscard]] std::vector<double> lag_times_s(double low_s, double high_s,
                                                 std::size_t count) const;
-  /// Moments between two shares of a run, and those at which its values jump most; ascending.
+  /// Times between two shares of a run, and those of the largest jumps of its values; ascending.
   /// @param values  of all rows of the run; NaN: missing
   [[nodiscard]] std::vector<double> onsets_s(std::size_t run, double first, double last,
                                              std::size_t count, const Column& values) const;
@@ -177,7 +174,7 @@ class Material {
   double length_s_{0.0};
 };
 
-/// 1 from each of the moments on, else 0, shape (rows, moments).
+/// 1 from each onset on, else 0; shape (rows, onsets).
 [[nodiscard]] Panel since(const Column& time_s, const std::vector<double>& onsets_s);
 
 }  // namespace thermocomp::diagnosis

@@ -15,16 +15,16 @@ namespace thermocomp::diagnosis {
 namespace {
 
 constexpr double unknown = std::numeric_limits<double>::infinity();
-/// An output with fewer values is not compared.
+/// Least values of an output.
 constexpr Eigen::Index values_min = 12;
-/// Temperatures that predict a reading: those that go with it most.
+/// Number of temperatures that predict a reading: those with the largest covariance.
 constexpr std::size_t neighbours = 8;
 constexpr double neighbour_sd_K = 30.0;  ///< for a column whose largest value is 1
 constexpr double reading_noise_K = 1e-3;
-/// RMS that a model may leave, over that of a fit of its inputs, and count as fitted to the rows.
+/// A model counts as fitted if its residual RMS is at most this multiple of that of a fit.
 constexpr double fitted_factor = 1.1;
-/// By which the cosine of two lists in proportion may miss 1, for each of their numbers: few
-/// numbers are so by accident.
+/// Tolerance of the cosine of two proportional vectors, per element: short vectors are
+/// proportional by chance.
 constexpr double ridge_angle = 0.0015;
 constexpr int zooms = 2;
 constexpr int points_of_zoom = 9;
@@ -51,15 +51,15 @@ Column left_by(const Column& values, const Panel& columns) {
   return values - columns * Eigen::VectorXd(columns.colPivHouseholderQr().solve(values));
 }
 
-/// RMS of what no sum of the columns explains.
+/// RMS of the residual of a fit of the columns.
 double rms_beside(const Column& values, const Panel& columns) {
   return std::sqrt(left_by(values, columns).squaredNorm() / static_cast<double>(values.size()));
 }
 
-/// Coefficients that were fitted to these very rows, with free offsets of the runs or without,
-/// leave nothing for a fit of the same columns: a cause may have gone into them.
-/// Those of a ridge on standardised inputs leave of each input's share c a product with the
-/// remainder that is in proportion to the variance of c.
+/// Whether the coefficients were fitted to these rows, with free offsets of the runs or without,
+/// and so may have absorbed a cause: then another fit of the same columns gains nothing. After a
+/// ridge regression on standardised inputs, the product of each input's displacement c with the
+/// residual is proportional to the variance of c.
 bool fitted_to(const Column& remainder, const Panel& free, const Panel& coefficients) {
   const Eigen::VectorXd variances =
       (coefficients.rowwise() - coefficients.colwise().mean()).colwise().squaredNorm();
@@ -77,7 +77,7 @@ bool fitted_to(const Column& remainder, const Panel& free, const Panel& coeffici
          (variances.size() > 2 && (is_ridge(free) || is_ridge(nothing)));
 }
 
-/// Gains of least squares, kept within their bounds where there is one gain.
+/// Least-squares gains, clamped to the bounds if there is one gain.
 Eigen::VectorXd gains_of(const Equations& equations, Eigen::Index shape, Eigen::Index under,
                          const Interval& bounds) {
   Eigen::MatrixXd square = equations.square_of(shape, under);
@@ -120,7 +120,7 @@ const OutputFit& Readings::of(std::size_t input) {
   };
   const Column own = mean(stacked(data_, rise_K(input)));
   const Column centred_own = centred_in(rows.runs(), own).col(0);
-  std::vector<std::pair<double, Panel>> others;  // how closely it goes with the reading
+  std::vector<std::pair<double, Panel>> others;  // minus covariance with the reading
   for (std::size_t i = 0; i < data_.temperatures.size(); ++i) {
     if (i == input) continue;
     Panel both(rows.size(), 2);
@@ -168,7 +168,7 @@ Fits::Fits(const MeasuredData& data, Readings& readings, const std::vector<Expla
       else
         free = joined(free, of.means_of(columns));
     }
-    // The coefficients may be a little wrong without being a cause of their own.
+    // Small errors of the coefficients are part of every hypothesis.
     Panel coefficients(of.size(), data.coefficient_sd > 0 ? std::ssize(data.model.inputs) : 0);
     for (Eigen::Index i = 0; i < coefficients.cols(); ++i)
       coefficients.col(i) = of.means_of(stacked(data, [&](const MeasuredRun& run) -> Column {
@@ -181,7 +181,7 @@ Fits::Fits(const MeasuredData& data, Readings& readings, const std::vector<Expla
     sd.tail(coefficients.cols()).setConstant(fitted ? 1.0 : data.coefficient_sd);
     const double least = data.least_noise_um.empty() ? 1e-3 : data.least_noise_um[output];
     const std::vector<Block> runs = of.runs();
-    // What was fitted to these rows is fitted anew without those that are left out.
+    // Coefficients of these rows are fitted again without the left-out ones.
     Panel beside = free.rightCols(free.cols() - std::ssize(runs));
     if (fitted) beside = joined(beside, coefficients);
     outputs_[output] = {OutputFit(std::move(of), means, joined(free, coefficients), sd, least),
@@ -226,7 +226,7 @@ void Fits::fit_own_gains(const std::vector<Equations>& equations, Eigen::Index s
     const double with = log_mean_exp(of_background) - none -
                         0.5 * static_cast<double>(hypothesis.gains.size()) *
                             std::log(static_cast<double>(fit.rows().size()));
-    // An output on which a cause does not act is as likely as one on which it does.
+    // Prior: acting and not acting on an output are equally likely.
     trial.score += may_spare ? log_mean_exp(Eigen::Vector2d(with, 0.0)) : with;
     const double variance =
         fit.variance(best_under, explained_by(equations[output], shape, best_under, best_gains));
@@ -245,7 +245,7 @@ void Fits::fit_own_gains(const std::vector<Equations>& equations, Eigen::Index s
     most_of = output;
   }
   for (const std::size_t output : spared) {
-    if (output == most_of) continue;  // it acts somewhere
+    if (output == most_of) continue;  // it must act on one output
     trial.gains[output].resize(0);
     trial.gain_sd[output].resize(0);
   }
@@ -298,7 +298,7 @@ void Fits::fit_shared_gain(const std::vector<Equations>& equations, const Equati
     trial.score += gained;
     if (part.equations == of_reading) trial.witness = gained;
   }
-  // What is left of a loose sensor's motion is smaller than the motion was.
+  // Jacobian of the scaling of a loose sensor's motion.
   if (of_reading != nullptr && shrunk_rows > 0) {
     const double grown = shrunk_rows * std::log1p(gain[0]);
     trial.score += grown;
@@ -345,7 +345,7 @@ std::vector<Explanation> Fits::trials(const Hypothesis& hypothesis, const Shapes
 
 namespace {
 
-/// Of the trials that are about as good as the best by `first` the best by `second`.
+/// The best by `second` among the trials that are nearly the best by `first`.
 template <class First, class Second>
 std::size_t best_of(const std::vector<Explanation>& trials, First first, Second second) {
   double most = -unknown;
@@ -362,8 +362,8 @@ double score_of(const Explanation& explanation) {
   return explanation.score;
 }
 
-/// An effect that is only nearly of its form makes several values about as likely: the one counts
-/// that leaves least.
+/// An effect of approximate form makes several values about equally likely; the one with the least
+/// cross-validated residual is taken.
 std::size_t likeliest_of(const std::vector<Explanation>& trials) {
   return best_of(trials, score_of, [](const Explanation& each) { return each.left_out; });
 }
@@ -414,9 +414,9 @@ void Fits::judge_left_out(const Hypothesis& hypothesis, std::size_t output, cons
   const Eigen::Index width = hypothesis.width();
   const Column before = left_out.beside_accepted(left_out.values());
   const Panel own = left_out.beside_accepted(centred);
-  // What has no gain of its own, or acts in one run alone, is settled by few numbers. Other gains
-  // are fitted to the other rows, or are those under its likeliest background, where that leaves
-  // less: what wanders besides does not bend these.
+  // Few parameters determine a hypothesis without own gains, or of one run: its rows are not left
+  // out. Otherwise the smaller residual counts of gains fitted to the other rows and of those under
+  // the likeliest background, which slow disturbances do not bias.
   const bool as_fitted = hypothesis.run || hypothesis.form != Form::own_gains;
   const Block rows = hypothesis.run ? runs[*hypothesis.run] : Block{0, before.size()};
   std::vector<double> left;

@@ -18,7 +18,7 @@ struct Weights {
   double one_run;
 };
 constexpr Weights weights{2.11, 2.66, 3.27, 12.04, -0.54, -0.27};
-/// Weights of the odds that there is any effect, for the figures of the likeliest hypothesis.
+/// Weights of the log odds of any effect, for the figures of the likeliest hypothesis.
 struct Presence {
   double constant;
   double score;
@@ -26,15 +26,15 @@ struct Presence {
   double share;
 };
 constexpr Presence of_first{-2.69, 0.54, 0.49, 9.10};
-/// In later rounds, and with coefficients fitted to the rows, the model's own misfit resembles an
-/// effect more often. Set so that no more untouched machines are named than in the first round.
-/// Datum causes are exempt: a fit cannot leave a line, a jump or a shift.
+/// In later rounds, and with coefficients fitted to the rows, the model's misfit resembles an
+/// effect more often. Set for the same rate of false findings on untouched machines as in the first
+/// round. Not for datum causes: a fit does not leave a line, a jump or a shift.
 constexpr Presence of_later{-5.70, 0.54, 0.49, 9.10};
 constexpr Presence of_fitted{-7.70, 0.54, 0.49, 9.10};
 constexpr double left_out_min = -0.5;
 constexpr double left_out_max = 3.0;
-/// Neighbouring rows are correlated, so that ln L counts in proportion up to this value and by its
-/// logarithm above.
+/// Since neighbouring rows are correlated, ln L counts linearly up to about this value and
+/// logarithmically above.
 constexpr double score_scale = 20.0;
 constexpr double score_min = -50.0;
 
@@ -42,16 +42,16 @@ double compressed(double score) {
   return std::copysign(std::log1p(std::abs(score) / score_scale), score);
 }
 
-/// Least probability of another subject that is listed, as a share of the likeliest one's.
+/// Least probability of other subjects in the group, as a share of the likeliest one's.
 constexpr double as_likely_min = 0.1;
 constexpr double likelier_than_not = 0.5;
 
-/// Figures from which the utility and the odds are computed.
+/// Inputs of the utility and of the odds.
 struct Figures {
   double score;
   double witness;
   double left_out;  ///< ln of the RMS before over after, over the root of all outputs
-  double share;     ///< of the RMS, of the output that gains most
+  double share;     ///< reduction of the RMS, of the output with the largest
 };
 
 Figures figures_of(const Explanation& explanation) {
@@ -79,7 +79,7 @@ double utility(const Explanation& explanation) {
 
 namespace {
 
-/// Whether a simpler hypothesis is as likely, or explains as much: then this one is no rival of it.
+/// Whether a special case of this hypothesis is about as likely, or explains as much.
 bool adds_nothing(const Explanation& explanation, const std::vector<Explanation>& all) {
   const Hypothesis& of = *explanation.hypothesis;
   if (of.simpler_cause.empty()) return false;
@@ -125,7 +125,7 @@ Posterior weigh_against_each_other(std::vector<Explanation>& explanations, Round
 
 namespace {
 
-/// The likeliest of the explanations that `accept` takes, and the sum of their probabilities.
+/// The likeliest of the accepted explanations, and the sum of their probabilities.
 template <class Accept>
 Choice sum_of(const std::vector<Explanation>& explanations, Accept accept) {
   Choice choice;

@@ -13,7 +13,7 @@ namespace {
 constexpr double probability_min = 0.5;
 constexpr std::size_t findings_max = 4;
 constexpr std::size_t refined = 24;
-/// A remainder is structure if it exceeds the noise by this factor and this share of the motion.
+/// A residual is large if it exceeds this multiple of the noise and this share of the motion.
 constexpr double structure_over_noise = 1.5;
 constexpr double structure_of_motion = 0.03;
 
@@ -34,11 +34,11 @@ double motion_of(const MeasuredData& data, std::size_t output) {
 }
 
 constexpr double normal_95 = 1.96;
-/// A machine's effect is only nearly of the column's form, so the error of a shape parameter is
-/// this many times its deviation. Jumps need no factor.
+/// The form of a column is approximate, so the error of a shape parameter is this many times its
+/// standard deviation. Jumps need no factor.
 constexpr double wider_on_machines = 4.5;
-/// For the same reason the error of a gain is a multiple of its deviation and a share of the gain.
-/// Set so that the interval holds 93 % of 112 planted gains (seeds of research/README.md).
+/// For the same reason the error of a gain is a multiple of its standard deviation plus a share of
+/// the gain, set for a coverage of 93 % of 112 planted gains (seeds of research/README.md).
 constexpr double gain_wider = 2.0;
 constexpr double gain_share = 0.2;
 constexpr std::size_t fine_points = 33;
@@ -56,15 +56,14 @@ double wider(const Hypothesis& hypothesis, const std::string& parameter) {
   return of_a_jump(hypothesis, parameter) ? 1.0 : wider_on_machines;
 }
 
-/// Standard deviation of a gain on a machine.
+/// Standard deviation of a gain with model discrepancy.
 double gain_deviation(const Hypothesis& hypothesis, std::size_t number, double gain, double sd) {
   return of_a_jump(hypothesis, hypothesis.gains[number])
              ? sd
              : std::hypot(gain_wider * sd, gain_share * gain);
 }
 
-/// The grid, three points in each of its intervals, and many points about the value found;
-/// ascending.
+/// The grid, three points in each of its intervals, and many points near the estimate; ascending.
 std::vector<double> values_of(const ShapeParameter& of, double found) {
   std::vector<double> values = {found, of.grid.front()};
   for (std::size_t i = 1; i < of.grid.size(); ++i)
@@ -81,8 +80,8 @@ std::vector<double> values_of(const ShapeParameter& of, double found) {
   return values;
 }
 
-/// Sets the 95 % intervals. That of a shape parameter holds every value whose likelihood, with
-/// gains fitted anew, is close enough to the best; that of a gain holds the gains at these values.
+/// Sets the 95 % intervals: of a shape parameter by its profile likelihood, of a gain also over the
+/// shapes within these intervals.
 /// @return whether the interval of any gain at the best shape excludes 0; true without gains
 bool set_spread(const Fits& fits, Finding& finding) {
   Explanation& found = finding.explanation;
@@ -119,7 +118,7 @@ bool set_spread(const Fits& fits, Finding& finding) {
     const double limit = best.score - 0.5 * std::pow(normal_95 * wider(hypothesis, of.name), 2);
     for (std::size_t i = 0; i < trials.size(); ++i) {
       if (trials[i].score < limit) continue;
-      // Up to half of the way to the next value, which is out of reach.
+      // Up to the middle between it and the next value, which may be outside.
       Interval& shape = finding.shape_ci[parameter];
       shape = hull(shape, 0.5 * (values[i] + values[i == 0 ? 0 : i - 1]),
                    0.5 * (values[i] + values[std::min(i + 1, values.size() - 1)]));
@@ -187,12 +186,12 @@ class Search {
     return Fits(data_, readings_, accepted);
   }
 
-  /// What is left of an output.
+  /// Residual of an output.
   struct Remainder {
     double structure{0.0};    ///< variance above that of the noise
     double noise_share{1.0};  ///< of the variance
-    bool is_large{false};     ///< the structure, against noise and motion
-    bool fitted{false};       ///< by coefficients of these rows
+    bool is_large{false};     ///< the structure, relative to noise and motion
+    bool fitted{false};       ///< the coefficients to these rows
   };
 
   std::vector<Remainder> remainders(const Fits& fits, bool corrected) const {
@@ -233,7 +232,7 @@ class Search {
       if (all.empty() || !same_name(*all.back().hypothesis, each))
         all.push_back(std::move(next));
       else if (utility(next) > utility(all.back()) + as_much)
-        all.back() = std::move(next);  // a form with one gain more, where that is likelier
+        all.back() = std::move(next);  // the form with one gain more is likelier
     }
     if (all.empty()) return false;
     const auto likelier = [](const Explanation& a, const Explanation& b) {
@@ -279,8 +278,8 @@ class Search {
     });
   }
 
-  /// Fits each finding beside the others and sets its intervals. Erases those that the others now
-  /// explain, and those whose gain may be 0.
+  /// Fits each finding jointly with the others and sets its intervals. Erases findings that the
+  /// others now explain, and those whose gain may be 0.
   void settle_together(std::vector<Finding>& findings) {
     for (std::size_t i = 0; i < findings.size();) {
       Finding& finding = findings[i];

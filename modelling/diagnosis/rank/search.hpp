@@ -1,4 +1,4 @@
-/// One finding after another: fit every hypothesis, rank them, accept the likeliest.
+/// Greedy search: fits and ranks all hypotheses, accepts the likeliest, and repeats.
 #pragma once
 
 #include <functional>
@@ -13,15 +13,15 @@ namespace thermocomp::diagnosis {
 
 struct SearchResult {
   std::vector<Finding> findings;  ///< in order of gain
-  /// Share of an output's remaining variance, noise taken out, that is left.
+  /// Residual variance of an output after over before all findings, without that of the noise.
   std::vector<double> unexplained_share;
-  /// Of each output's coefficients, beside all findings: by what share they are wrong.
+  /// Relative errors of each output's coefficients, fitted jointly with all findings.
   std::vector<Eigen::VectorXd> coefficient_errors{};
-  std::vector<double> noise_share;  ///< of an output's remaining variance before any finding
+  std::vector<double> noise_share;  ///< of an output's residual variance before any finding
   std::vector<bool> fitted;         ///< whether an output's coefficients were fitted to these rows
-  /// Structure is left that is large against noise and motion, and nothing is named.
+  /// The residual is large relative to noise and motion, and there is no finding.
   bool unexplained{false};
-  std::map<std::string, double> families{};  ///< for the first finding, and `none`
+  std::map<std::string, double> families{};  ///< for the first finding, with `none`
   std::vector<Explanation> weighed;          ///< for the first finding, likeliest first
 };
 

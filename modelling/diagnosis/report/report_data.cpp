@@ -11,7 +11,7 @@ namespace {
 
 constexpr double change_lasts_s = 600.0;
 constexpr double slope_smoothing_s = 300.0;
-/// A slope below this share of the steepest is none.
+/// A slope below this share of the largest counts as steady.
 constexpr double slope_share_min = 0.08;
 
 }  // namespace
@@ -65,7 +65,7 @@ double correlation_time_s(const Column& time_s, const Column& residual) {
 
 namespace {
 
-/// Places of the model's inputs and of the other temperatures that a finding names.
+/// Indices of the model's inputs and of other temperatures in findings.
 std::vector<std::size_t> places_shown(const Diagnosis& diagnosis, const MeasuredData& data) {
   std::vector<std::size_t> shown;
   for (std::size_t place = 0; place < data.temperatures.size(); ++place) {
@@ -81,7 +81,7 @@ std::vector<std::size_t> places_shown(const Diagnosis& diagnosis, const Measured
   return shown;
 }
 
-/// Whether the model was made from rows of the run. The folder may have changed since.
+/// Whether the model was made from rows of the run; folders are ignored.
 bool is_of_the_model(const ThermalModel& model, const std::string& run) {
   if (!model.made_from) return false;
   const RunSelection of = parse_selection(run);

@@ -10,10 +10,10 @@ namespace thermocomp::diagnosis {
 namespace {
 
 constexpr double support_reported_min = 0.05;
-/// A share of what the model leaves that is worth an advice.
+/// Least share of the model's error that leads to an advice.
 constexpr double share_reported_min = 0.25;
 
-/// Beside what every page has.
+/// Styles in addition to those of every page.
 constexpr const char* own_style =
     "<style>svg .share{fill:#fff}.dots{stroke:#2b6cb0;stroke-width:2}.few{display:flex;"
     "flex-wrap:wrap}.few svg{width:32%;min-width:240px}summary{cursor:pointer;margin:.4em "
@@ -39,7 +39,7 @@ std::string unit_text(const Diagnosis& diagnosis, const std::string& output) {
   return output.ends_with("_urad") ? "µrad" : "µm";
 }
 
-/// RMS of an output over the test runs, from each run's first value.
+/// RMS of an output over the test runs, relative to each run's first value.
 double motion_rms(const ReportData& report, const std::string& output) {
   const auto at = static_cast<std::size_t>(
       std::find(report.outputs.begin(), report.outputs.end(), output) - report.outputs.begin());
@@ -89,7 +89,7 @@ std::string gains_table(const Diagnosis& diagnosis) {
   return html_table(rows);
 }
 
-/// What can be done, and by how much the largest gain of an output makes the error smaller.
+/// An advice, and the largest reduction of an output's error by it.
 struct Advice {
   double gain_um{0.0};
   std::string text;
@@ -107,7 +107,7 @@ std::string by(const Diagnosis& diagnosis, double gain_um) {
   return " (up to " + figure(gain_um) + " " + unit_text(diagnosis, "") + " RMS less)";
 }
 
-/// Outputs of which a share of the error is above the least that is reported, by name.
+/// Names of the outputs with at least the reported share of the error.
 template <class Share>
 std::string outputs_with(const Diagnosis& diagnosis, Share share) {
   std::string names;
@@ -142,7 +142,7 @@ std::vector<Advice> next_steps(const Diagnosis& diagnosis) {
   }
   std::stable_sort(all.begin(), all.end(),
                    [](const Advice& a, const Advice& b) { return a.gain_um > b.gain_um; });
-  if (diagnosis.verdict == "none") return all;  // too little is left to record anything for
+  if (diagnosis.verdict == "none") return all;  // the error is too small for more recordings
   const std::string predictable =
       outputs_with(diagnosis, [](const Headroom& of) { return of.predictable; });
   if (!predictable.empty() && !diagnosis.remainder)
@@ -215,7 +215,7 @@ std::string finding_html(const NamedFinding& finding, std::size_t number, const 
   return html + folded("Gain, and what else it could be", more) + "</details>\n";
 }
 
-/// What was weighed where nothing is named.
+/// The likeliest candidates if there is no finding.
 std::string candidates_html(const Diagnosis& diagnosis) {
   if (!diagnosis.findings.empty()) return "";
   Table rows{{"cause", "probability", "of the error on left-out rows", "error on the test rows",
@@ -277,7 +277,7 @@ std::string whiteness_table(const ReportRun& run, const ReportData& report) {
   return html_table(rows);
 }
 
-/// A picture that can be made wider: no script is needed for that.
+/// A picture with buttons for its width, without a script.
 std::string zoomed(const std::string& picture, const std::string& group) {
   std::string html = "<div>wider:";
   for (const std::string times : {"1", "4", "16"}) {
@@ -306,7 +306,7 @@ std::string closer_look(const ReportRun& run, const Diagnosis& diagnosis,
   return html + phases_table(run, report) + whiteness_table(run, report);
 }
 
-/// The first test run in sight, all others folded.
+/// The first test run visible, all others folded.
 std::string runs_html(const Diagnosis& diagnosis, const ReportData& report) {
   std::vector<std::string> units;
   for (const std::string& output : report.outputs) units.push_back(unit_text(diagnosis, output));
@@ -329,7 +329,7 @@ std::string runs_html(const Diagnosis& diagnosis, const ReportData& report) {
   return html + others;
 }
 
-/// Test runs that the model was fitted to.
+/// Warning about test runs to which the model was fitted.
 std::string fitted_text(const ReportData& report) {
   std::string names;
   for (const ReportRun& run : report.runs)

@@ -49,7 +49,7 @@ PlotPanel temperatures_panel(const ReportRun& run, const ReportData& report) {
 std::string course_picture(const ReportRun& run, const ReportData& report,
                            const std::vector<std::string>& units) {
   std::vector<Column> models;
-  models.reserve(2 * report.outputs.size());  // the panels look into them
+  models.reserve(2 * report.outputs.size());  // panels refer to its elements
   std::vector<PlotPanel> panels;
   for (std::size_t output = 0; output < report.outputs.size(); ++output) {
     const std::string name = name_of_column(report.outputs[output]);

@@ -20,7 +20,7 @@ std::string words_of(double value, double scale, bool is_duration) {
   return is_duration ? duration(value) : figure(scale * value);
 }
 
-/// " (47 min to 59 min)"; empty where the ends are the value, to the printed digits.
+/// " (47 min to 59 min)"; empty if both ends are printed like the value.
 std::string interval_words(const Interval& interval, double value, double scale, bool is_duration) {
   const std::string low = words_of(interval.low, scale, is_duration);
   const std::string high = words_of(interval.high, scale, is_duration);
@@ -29,7 +29,7 @@ std::string interval_words(const Interval& interval, double value, double scale,
   return " (" + low + " to " + high + ")";
 }
 
-/// As a divisor; a signal without unit stands for itself.
+/// Unit as a divisor; of a signal without a unit its name.
 std::string unit_of_column(const std::string& column) {
   const std::string_view suffix = unit_of(column).suffix;
   if (suffix == "_mm_per_min") return "(mm/min)";
@@ -120,7 +120,7 @@ constexpr std::array<std::string_view, 8> experiment_texts{
     "Hold three different temperatures of the place until nothing moves any more.",
     "Repeat the run with another sequence of speeds and another room temperature."};
 
-/// How the effects of two subjects are told apart: one moves, the other does not.
+/// Separates two subjects: one changes, the other does not.
 std::string one_alone(const std::string& one, const std::string& other) {
   const bool can_warm = is_temperature(one) && !is_called_like_a_room(one);
   const std::string& warmed = can_warm ? one : other;

@@ -1,4 +1,4 @@
-/// Hypotheses of what is wrong in a thermal network, and the readings that each would explain.
+/// Hypotheses for a thermal network, and the readings that each would explain.
 #pragma once
 
 #include <deque>
@@ -11,8 +11,8 @@
 
 namespace thermocomp::diagnosis {
 
-/// A cause's column is what the changed network says less what the unchanged one does, the causes
-/// that were accepted before it already in both.
+/// The column of a cause is the difference of the readings of the changed and of the unchanged
+/// network, both with the causes accepted before it.
 class NetworkHypotheses {
  public:
   /// @param rows  of the training runs. All three outlive this.
@@ -21,14 +21,14 @@ class NetworkHypotheses {
   /// The hypotheses keep `self` alive.
   [[nodiscard]] static std::vector<Hypothesis> all(const std::shared_ptr<NetworkHypotheses>& self);
   void accept(const std::vector<Explanation>& found);
-  /// Makes the change that a finding stands for.
+  /// Applies a finding to the network.
   void apply(const Finding& finding, HeatNetwork& network) const;
   [[nodiscard]] std::vector<Parameter> parameters_of(const Finding& finding) const;
 
  private:
   struct Base {
     NetworkSimulation simulation;
-    std::vector<Column> stacked;  ///< readings, one column a sensor
+    std::vector<Column> stacked;  ///< readings, one column per sensor
   };
   struct Known {
     std::size_t cause{0};
@@ -45,8 +45,8 @@ class NetworkHypotheses {
   const NetworkMaterial material_;
   std::vector<NetworkHypothesis> causes_;
   std::vector<std::size_t> accepted_;  ///< causes, in their order
-  std::vector<Base> bases_;            ///< before each accepted one; the last: with all of them
-  std::deque<Known> known_;            ///< the newest columns: several outputs ask for the same
+  std::vector<Base> bases_;            ///< before each accepted cause; the last: with all
+  std::deque<Known> known_;            ///< cache of the newest columns, for several outputs
 };
 
 }  // namespace thermocomp::diagnosis

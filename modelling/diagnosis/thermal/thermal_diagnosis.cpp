@@ -15,10 +15,10 @@ namespace thermocomp::diagnosis {
 namespace {
 
 constexpr double least_step_K = 1e-9;
-/// Lumps are right to some per cent of a sensor's motion at best: less is not named.
+/// Least share of a sensor's motion: a lumped network has errors of some per cent.
 constexpr double motion_share_min = 0.05;
 
-/// Readings held over missing ones, relative to the first.
+/// Readings relative to the first; a missing one is replaced by the last.
 Column rise_of(const Column& measured_degC) {
   Column rise = measured_degC;
   double first = not_a_number;
@@ -33,7 +33,7 @@ Column rise_of(const Column& measured_degC) {
   return rise;
 }
 
-/// Noise that the smallest step between two readings stands for.
+/// Quantisation noise, from the smallest step between two readings.
 double step_noise_K(const ThermalRuns& runs, std::size_t sensor) {
   double least = std::numeric_limits<double>::infinity();
   for (const ThermalRun& run : runs.runs) {
@@ -46,7 +46,7 @@ double step_noise_K(const ThermalRuns& runs, std::size_t sensor) {
   return std::isfinite(least) ? least / std::sqrt(12.0) : 0.0;
 }
 
-/// The runs as the search sees them: sensors are the outputs.
+/// The runs as input of the search: sensors are the outputs.
 MeasuredData data_of(const ThermalPlant& plant, const ThermalRuns& runs) {
   MeasuredData data;
   data.signals = runs.signals;
