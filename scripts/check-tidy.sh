@@ -11,6 +11,7 @@ source scripts/common.sh
 build=build/tidy
 mkdir -p "$build"
 sed -e 's/ -Winvalid-pch//; s/ -fpch-preprocess//; s/ --param [^ ]*//; s/ -include [^ ]*cmake_pch\.hxx//' \
+  -e 's/ -flto//; s/ -ffat-lto-objects//; s/ -fno-lto//' \
   build/release/compile_commands.json >"$build/compile_commands.json"
 
 folders=("$@")
