@@ -7,7 +7,7 @@ folder=${1:-build/release}
 result=$(mktemp --suffix=.o)
 trap 'rm -f "$result"' EXIT
 
-mapfile -t libraries < <(find "$folder" -name 'lib*.a' -not -path '*/tests/*')
+mapfile -t libraries < <(find "$folder" -name 'lib*.a' -not -path '*/tests/*' -not -path '*/service/*')
 if ((${#libraries[@]} == 0)); then
   echo "check-odr.sh: no library below $folder: build it first (./test.sh --build-only)" >&2
   exit 2
