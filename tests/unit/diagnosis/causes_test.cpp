@@ -97,7 +97,7 @@ RunFile machine_run(int rows, double start_degC = 20.0) {
 
 }  // namespace
 
-TEST_CASE("every cause is complete, and none is there twice", "[diagnosis][causes]") {
+TEST_CASE("every cause is complete and unique", "[diagnosis][causes]") {
   const Names families = {"structure", "heat", "datum", "sensor"};
   Names names;
   for (const Cause& cause : all_causes()) {
@@ -155,7 +155,7 @@ TEST_CASE("causes and their parameters are those of the documentation", "[diagno
   for (const auto& [cause, parameters] : expected) FAIL_CHECK(cause << " is no cause");
 }
 
-TEST_CASE("what a cause is tried with lies within its physical range", "[diagnosis][causes]") {
+TEST_CASE("shape grids lie within the physical range of their parameters", "[diagnosis][causes]") {
   ThermalModel model;
   model.inputs = {"t1_degC", "t2_degC"};
   model.outputs = {"z_um"};

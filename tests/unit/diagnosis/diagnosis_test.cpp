@@ -254,8 +254,7 @@ TEST_CASE("growth with the squared speed is named, with its size and its gain", 
   CHECK_NOTHROW(parse_model(write_model(answer.extended), "extended"));
 }
 
-TEST_CASE("a cycle that is probed rarely has an interval that holds the periods it may have",
-          "[diagnosis]") {
+TEST_CASE("the interval of a rarely sampled period covers the true period", "[diagnosis]") {
   const double period_s = 1500.0;
   const auto hidden = [&](double, double, int row) {
     return 8.0 * std::sin(2.0 * std::numbers::pi * 60.0 * row / period_s);
@@ -279,8 +278,7 @@ TEST_CASE("a cycle that is probed rarely has an interval that holds the periods 
   if (each == 1) CHECK(period.high - period.low < 0.1 * period_s);
 }
 
-TEST_CASE("of many sensors that one output cannot tell apart the faulty one is named",
-          "[diagnosis]") {
+TEST_CASE("readings identify the faulty one of many sensors of one output", "[diagnosis]") {
   const std::size_t sensor = GENERATE(4U, 15U, 22U, 29U);
   CAPTURE(sensor);
   SECTION("it jumps") {
@@ -300,7 +298,7 @@ TEST_CASE("of many sensors that one output cannot tell apart the faulty one is n
   }
 }
 
-TEST_CASE("a gain errs by two deviations and a fifth of itself, a jump by its deviation",
+TEST_CASE("a gain's interval includes a fifth of the gain, that of a jump does not",
           "[diagnosis]") {
   const FoundGain wrong = found_gain([](double, double rise_K, int) { return 1.0 * rise_K; });
   CHECK(wrong.value == Approx(1.0).margin(0.1));
@@ -320,7 +318,8 @@ TEST_CASE("a jump of the datum in one run is a fault of that run and no term", "
   CHECK(answer.extended.terms.empty());
 }
 
-TEST_CASE("a cause is named with its size beside small errors of all coefficients", "[diagnosis]") {
+TEST_CASE("a cause is found with its size despite small errors of all coefficients",
+          "[diagnosis]") {
   MeasuredMachine machine{
       {0.2, 0.05, 0.02, 0.01}, {9.0, -12.0, 10.0, 7.0}, {1.03, 0.96, 1.02, 0.97}};
   machine.heat_um = 30.0;
@@ -330,7 +329,7 @@ TEST_CASE("a cause is named with its size beside small errors of all coefficient
   CHECK(effect.findings[0].parameters.at(0).values.at("") == Approx(6000.0).epsilon(0.2));
 }
 
-TEST_CASE("a body that a signal heats follows the room too", "[diagnosis]") {
+TEST_CASE("a body heated by a signal also follows the room", "[diagnosis]") {
   MeasuredMachine machine{{0.05, 0.02}, {9.0, -12.0}, {1.0, 1.0}};
   machine.heat_um = 30.0;
   const Diagnosis effect = diagnosis_in_a_room(machine, 5.0);
@@ -349,7 +348,7 @@ TEST_CASE("a body that a signal heats follows the room too", "[diagnosis]") {
   CHECK(alone.findings[0].parameters.size() == 3);  // nothing of the room
 }
 
-TEST_CASE("a cause that errors of all coefficients could take most of is the first candidate",
+TEST_CASE("a cause that coefficient errors could largely explain is the first candidate",
           "[diagnosis]") {
   MeasuredMachine machine = six_readings({0.99, 1.007, 0.981, 0.993, 1.007, 0.986});
   machine.heat_um = 12.0;
@@ -360,7 +359,7 @@ TEST_CASE("a cause that errors of all coefficients could take most of is the fir
   CHECK(effect.weighed[0].probability > 10.0 * effect.weighed[1].probability);
 }
 
-TEST_CASE("a small cause beside errors of all coefficients is left to them or named as it is",
+TEST_CASE("a small cause beside coefficient errors is left to them or named correctly",
           "[diagnosis]") {
   MeasuredMachine machine = six_readings({0.989, 0.993, 1.001, 0.982, 1.002, 0.992});
   machine.heat_um = 3.0;
@@ -371,7 +370,7 @@ TEST_CASE("a small cause beside errors of all coefficients is left to them or na
   }
 }
 
-TEST_CASE("an effect along an axis is no rival of a wrong coefficient where no axis matters",
+TEST_CASE("position dependence gets no weight if a wrong coefficient explains as much",
           "[diagnosis]") {
   const auto weighed = [](const Diagnosis& answer, const std::string& cause) {
     return std::any_of(answer.weighed.begin(), answer.weighed.end(), [&](const Candidate& each) {
@@ -420,7 +419,7 @@ TEST_CASE(
   CHECK(fitted(model) == std::vector<bool>{true});
 }
 
-TEST_CASE("a temperature that is named is shown beside those of the model", "[diagnosis]") {
+TEST_CASE("the report shows temperatures of findings beside those of the model", "[diagnosis]") {
   const MeasuredMachine machine{{0.05, 0.02, 0.01}, {9.0, -12.0, 10.0}, {1.0, 1.0, 1.0}};
   ThermalModel model = machine.model();
   model.inputs = {"t1_degC", "t3_degC"};
@@ -445,14 +444,14 @@ TEST_CASE("a temperature that is named is shown beside those of the model", "[di
   for (const ReportRun& run : report.runs) CHECK(run.inputs_K.size() == 3);
 }
 
-TEST_CASE("nothing is said where there is nothing", "[diagnosis]") {
+TEST_CASE("an undisturbed machine has no finding", "[diagnosis]") {
   const Diagnosis answer = diagnosis_of([](double, double, int) { return 0.0; });
   CHECK(answer.verdict == "none");
   CHECK(answer.findings.empty());
   CHECK(answer.outputs.at("z_um").test_rms_um == answer.outputs.at("z_um").extended_test_rms_um);
 }
 
-TEST_CASE("what lies in the test runs changes no finding and no parameter", "[diagnosis]") {
+TEST_CASE("test runs change no finding and no parameter", "[diagnosis]") {
   const auto hidden = [](double rpm, double, int) { return 4e-7 * rpm * rpm; };
   const RunFile train = run_with(1, 600, hidden);
   const RunFile same = run_with(2, 400, hidden);
@@ -507,7 +506,7 @@ TEST_CASE("the likeliest candidates stand in the JSON, all of them where they ar
   CHECK(count(diagnosis_json(answer, true)) == answer.weighed.size());
 }
 
-TEST_CASE("the answer as JSON has the parts that others read", "[diagnosis]") {
+TEST_CASE("the JSON has the documented keys", "[diagnosis]") {
   const std::string json =
       diagnosis_json(diagnosis_of([](double rpm, double, int) { return 4e-7 * rpm * rpm; }));
   for (const char* key :

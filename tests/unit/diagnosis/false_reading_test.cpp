@@ -75,7 +75,7 @@ MeasuredData data_of(const ThermalModel& model, int rows) {
 
 }  // namespace
 
-TEST_CASE("a false reading acts through every term as the prediction does", "[diagnosis]") {
+TEST_CASE("an error of a reading acts through every term as in the prediction", "[diagnosis]") {
   const auto [name, model] = GENERATE(values<std::pair<const char*, ThermalModel>>(
       {{"lag", model_with_lag()}, {"bank of lags", model_with_bank()}}));
   INFO(name);
@@ -95,7 +95,7 @@ TEST_CASE("a false reading acts through every term as the prediction does", "[di
   CHECK(answers_um(299, 0) > 4.9);
 }
 
-TEST_CASE("faults of a reading have the columns that a prediction with them has", "[diagnosis]") {
+TEST_CASE("columns of reading faults equal the change of the prediction", "[diagnosis]") {
   const ThermalModel model = model_with_bank();
   const MeasuredData data = data_of(model, 300);
   const MeasuredRun& run = data.runs.front();
@@ -115,7 +115,7 @@ TEST_CASE("faults of a reading have the columns that a prediction with them has"
   CHECK(faults == 3);  // step, drift, loose
 }
 
-TEST_CASE("exchanged readings and play of one act through a bank of lags", "[diagnosis]") {
+TEST_CASE("exchanged readings and play of a reading act through a bank of lags", "[diagnosis]") {
   const ThermalModel model = model_with_bank();
   const MeasuredData data = data_of(model, 300);
   MeasuredRun denoised = data.runs.front();
@@ -135,7 +135,7 @@ TEST_CASE("exchanged readings and play of one act through a bank of lags", "[dia
   }
 }
 
-TEST_CASE("the lag of a place may take what coefficient and bank give it in the end",
+TEST_CASE("the gain of a lag is bounded by the steady-state effect of coefficient and bank",
           "[diagnosis]") {
   const MeasuredData data = data_of(model_with_bank(), 300);
   CHECK(settled_um_per_K(data, 0, 0) == Approx(5.0));

@@ -56,7 +56,8 @@ TEST_CASE("whitened columns have the products that the covariance gives", "[diag
   }
 }
 
-TEST_CASE("equations beside common columns are those of columns freed of them", "[diagnosis]") {
+TEST_CASE("equations with common columns equal those of columns projected off them",
+          "[diagnosis]") {
   const Rows rows;
   OutputRows of(rows.stacked, Eigen::Array<bool, Eigen::Dynamic, 1>::Constant(n, true));
   REQUIRE(of.size() == n);
@@ -77,7 +78,7 @@ TEST_CASE("equations beside common columns are those of columns freed of them", 
   }
 }
 
-TEST_CASE("an effect that is nearly of its form counts as one that is", "[diagnosis]") {
+TEST_CASE("the discrepancy limits the likelihood lost by an approximate form", "[diagnosis]") {
   const Rows rows;
   OutputRows of(rows.stacked, Eigen::Array<bool, Eigen::Dynamic, 1>::Constant(n, true));
   const OutputFit fit(of, rows.values.col(0), Panel(n, 0), Eigen::VectorXd(0), 1e-3);

@@ -33,7 +33,7 @@ double none_beside(std::vector<Explanation> all, Round round = Round::first) {
 
 }  // namespace
 
-TEST_CASE("probabilities of explanations, families and nothing add to one", "[diagnosis]") {
+TEST_CASE("probabilities of explanations, families and none add up to one", "[diagnosis]") {
   const Hypothesis lag = hypothesis("thermal_lag", "t1_degC");
   const Hypothesis heat = hypothesis("missing_heat_source", "spindle_rpm");
   std::vector<Explanation> all = {explanation(heat, 100.0, 0.9), explanation(lag, 45.0, 0.5)};
@@ -45,21 +45,20 @@ TEST_CASE("probabilities of explanations, families and nothing add to one", "[di
   CHECK(all[0].probability > all[1].probability);
 }
 
-TEST_CASE("what takes nothing of rows left out is no explanation", "[diagnosis]") {
+TEST_CASE("an explanation without cross-validated gain is unlikely", "[diagnosis]") {
   const Hypothesis lag = hypothesis("thermal_lag", "t1_degC");
   CHECK(none_beside({}) == 1.0);
   CHECK(none_beside({explanation(lag, 5.0, 0.02)}) > 0.9);
   CHECK(none_beside({explanation(lag, 500.0, 1.5)}) < 0.1);
 }
 
-TEST_CASE("beside what is named already the same evidence makes a cause less likely",
-          "[diagnosis]") {
+TEST_CASE("the same evidence gives a lower probability in later rounds", "[diagnosis]") {
   const Hypothesis heat = hypothesis("missing_heat_source", "spindle_rpm");
   const std::vector<Explanation> alone = {explanation(heat, 60.0, 0.8)};
   CHECK(none_beside(alone, Round::later) > none_beside(alone));
 }
 
-TEST_CASE("beside fitted coefficients a line of the datum is as likely, a lag less",
+TEST_CASE("fitted coefficients lower the probability of a lag, not of a datum cause",
           "[diagnosis]") {
   const Hypothesis line = hypothesis("periodic_disturbance", "x_um");
   const Hypothesis lag = hypothesis("thermal_lag", "t1_degC");
@@ -71,7 +70,7 @@ TEST_CASE("beside fitted coefficients a line of the datum is as likely, a lag le
   CHECK(none_of(lag, true) > none_of(lag, false));
 }
 
-TEST_CASE("what the reading itself says of its fault counts", "[diagnosis]") {
+TEST_CASE("evidence of the reading itself changes the utility of its fault", "[diagnosis]") {
   const Hypothesis step = hypothesis("sensor_step", "t1_degC");
   const auto utility_of = [&](double witness) {
     Explanation each = explanation(step, 50.0 + witness, 0.3);
@@ -82,7 +81,7 @@ TEST_CASE("what the reading itself says of its fault counts", "[diagnosis]") {
   CHECK(utility_of(-500.0) < utility_of(0.0));
 }
 
-TEST_CASE("a cause with one gain more needs more to be as likely", "[diagnosis]") {
+TEST_CASE("one gain more lowers the utility", "[diagnosis]") {
   Hypothesis wrong = hypothesis("wrong_coefficient", "t1_degC");
   wrong.gains = {"delta_um_per_K"};
   Hypothesis along = hypothesis("position_dependence", "t1_degC|x_mm");
@@ -90,8 +89,7 @@ TEST_CASE("a cause with one gain more needs more to be as likely", "[diagnosis]"
   CHECK(utility(explanation(along, 100.0, 0.8)) < utility(explanation(wrong, 100.0, 0.8)));
 }
 
-TEST_CASE("a cause that adds hardly anything to one that it contains is no rival of it",
-          "[diagnosis]") {
+TEST_CASE("a cause gets no weight if its special case explains nearly as much", "[diagnosis]") {
   Hypothesis room = hypothesis("missing_temperature", "room_degC");
   room.gains = {"gain_um_per_K"};
   Hypothesis heat = hypothesis("missing_heat_source", "spindle_rpm");
@@ -109,7 +107,7 @@ TEST_CASE("a cause that adds hardly anything to one that it contains is no rival
   CHECK(share_of_heat(200.0, 1.2) > 0.5);
 }
 
-TEST_CASE("places that move alike are one group, whose probabilities add", "[diagnosis]") {
+TEST_CASE("the probabilities of indistinguishable places add up", "[diagnosis]") {
   const PlaceGroups groups = {{"t1_degC", {"t1_degC", "t2_degC"}},
                               {"t2_degC", {"t2_degC", "t1_degC"}},
                               {"t3_degC", {"t3_degC"}}};
@@ -129,7 +127,7 @@ TEST_CASE("places that move alike are one group, whose probabilities add", "[dia
   CHECK(choice.probability == Approx(0.55));
 }
 
-TEST_CASE("a place between two others is not named in their place", "[diagnosis]") {
+TEST_CASE("a place between two likelier ones is not named instead of them", "[diagnosis]") {
   const PlaceGroups groups = {{"t1_degC", {"t1_degC", "t2_degC"}},
                               {"t2_degC", {"t2_degC", "t1_degC", "t3_degC"}},
                               {"t3_degC", {"t3_degC", "t2_degC"}}};
@@ -144,7 +142,7 @@ TEST_CASE("a place between two others is not named in their place", "[diagnosis]
   CHECK(likeliest(all, groups).index == 0);
 }
 
-TEST_CASE("a cause that is clear at places that are not is named with them", "[diagnosis]") {
+TEST_CASE("a likely cause at ambiguous places is named with all of them", "[diagnosis]") {
   const Hypothesis first = hypothesis("missing_temperature", "t1_degC");
   const Hypothesis other = hypothesis("missing_temperature", "t3_degC");
   const Hypothesis unlikely = hypothesis("missing_temperature", "t4_degC");

@@ -91,18 +91,18 @@ constexpr double half_s = step_s * rows / 2;
 
 }  // namespace
 
-TEST_CASE("a loosened reading is confirmed by the others, its neighbour's is not", "[diagnosis]") {
+TEST_CASE("other readings support a loose sensor, not its neighbour", "[diagnosis]") {
   const MeasuredData data = data_of({run_of("a.csv", 1, loose), run_of("b.csv", 2, untouched)});
   CHECK(support(data, "sensor_loose", t2, half_s) > 50.0);
   CHECK(support(data, "sensor_loose", t1, half_s) < 0.0);
 }
 
-TEST_CASE("a fastened sensor is not called loose", "[diagnosis]") {
+TEST_CASE("other readings do not support a loose sensor without the fault", "[diagnosis]") {
   const MeasuredData data = data_of({run_of("a.csv", 1, untouched), run_of("b.csv", 2, untouched)});
   CHECK(support(data, "sensor_loose", t2, half_s) < 3.0);
 }
 
-TEST_CASE("a run without the fault says what a creeping reading should be", "[diagnosis]") {
+TEST_CASE("a run without the fault adds support for a creeping reading", "[diagnosis]") {
   const RunFile faulty = run_of("a.csv", 1, creeping);
   const double alone = support(data_of({faulty}), "sensor_drift", t2, 0.0);
   const double beside =

@@ -71,7 +71,7 @@ double left_um(const ThermalModel& model, const RunFile& run) {
 
 }  // namespace
 
-TEST_CASE("what several lags at once leave is carried over to another run", "[diagnosis]") {
+TEST_CASE("a bank of several lags predicts another run", "[diagnosis]") {
   const auto bank = bank_of(machine(1, 3.0, 0.1));
   REQUIRE(bank);
   const LeftOutRms gain = bank->left_out.at("z_um");
@@ -82,7 +82,7 @@ TEST_CASE("what several lags at once leave is carried over to another run", "[di
   CHECK(left_um(longer, other) < 0.3 * left_um(one_input(), other));
 }
 
-TEST_CASE("a bank of what is left is written and read as any term", "[diagnosis]") {
+TEST_CASE("a bank survives writing and reading of the model file", "[diagnosis]") {
   const auto bank = bank_of(machine(1, 3.0, 0.1));
   REQUIRE(bank);
   ThermalModel longer = one_input();
@@ -111,7 +111,7 @@ TEST_CASE("a displacement probed every half hour is enough for a bank", "[diagno
   CHECK(left_um(longer, other) < 0.7 * left_um(one_input(), other));
 }
 
-TEST_CASE("a matrix fitted to the rows is fitted anew to be judged", "[diagnosis]") {
+TEST_CASE("a matrix fitted to the rows is fitted again in cross-validation", "[diagnosis]") {
   // Two speeds of one reading: what a static fit leaves of its own rows is little, and less of it
   // can be predicted than of what it leaves of others.
   const RunFile run = machine(1, 3.0, 0.1);

@@ -77,7 +77,7 @@ bool has(const std::string& text, const std::string& what) {
 
 }  // namespace
 
-TEST_CASE("a finding that the test runs do not bear out is not recommended", "[diagnosis]") {
+TEST_CASE("a finding that the test runs contradict is not recommended", "[diagnosis]") {
   Diagnosis diagnosis = with_findings();
   NamedFinding& finding = diagnosis.findings.front();
   const std::string usual = what_to_do(finding);
@@ -93,7 +93,7 @@ TEST_CASE("a finding that the test runs do not bear out is not recommended", "[d
   CHECK(what_to_do(finding) == usual);
 }
 
-TEST_CASE("the report needs nothing but itself", "[diagnosis][report]") {
+TEST_CASE("the report is self-contained", "[diagnosis][report]") {
   for (const Diagnosis& diagnosis : {none(), with_findings()}) {
     const std::string html = report_html(diagnosis, one_run());
     for (const char* outside : {"http", "src=", "href=", "@import", "url(", "<script", "<link"})
@@ -107,8 +107,7 @@ TEST_CASE("the report needs nothing but itself", "[diagnosis][report]") {
   }
 }
 
-TEST_CASE("each finding is a sentence with its figures, what to do and what would tell",
-          "[diagnosis][report]") {
+TEST_CASE("the report has sentence, advice and experiment of each finding", "[diagnosis][report]") {
   const Diagnosis diagnosis = with_findings();
   const std::string html = report_html(diagnosis, one_run());
   for (const NamedFinding& finding : diagnosis.findings) {
@@ -126,7 +125,7 @@ TEST_CASE("each finding is a sentence with its figures, what to do and what woul
                       diagnosis.findings[0].alternatives[0]))));
 }
 
-TEST_CASE("names are shown as they are, whatever is in them", "[diagnosis][report]") {
+TEST_CASE("names are escaped in the report", "[diagnosis][report]") {
   const std::string html = report_html(with_findings(), one_run());
   CHECK_FALSE(has(html, "<b>&"));
   CHECK_FALSE(has(html, "a<b&c"));
@@ -150,7 +149,7 @@ TEST_CASE("the plots are there with and without a finding", "[diagnosis][report]
   CHECK(count(named, "<h3>") == 2);
 }
 
-TEST_CASE("numbers are reported with two digits, three after a 1, and times in a fitting unit",
+TEST_CASE("numbers have two digits, three if the first is 1, and durations a suitable unit",
           "[diagnosis][report]") {
   CHECK(figure(0.0039628) == "0.0040");
   CHECK(figure(5.653) == "5.7");
@@ -199,7 +198,7 @@ TEST_CASE("an axis has round ticks within its range", "[diagnosis][report]") {
   CHECK(round_ticks(24.1, 32.2, 10).front() == Approx(25.0));
 }
 
-TEST_CASE("what to do stands first, the largest gain on top", "[diagnosis][report]") {
+TEST_CASE("advice is first and sorted by gain", "[diagnosis][report]") {
   Diagnosis diagnosis = with_findings();
   diagnosis.remainder.emplace();
   diagnosis.remainder->test["z_um"] = {12.0, 2.0, 0.83, {0.7, 0.9}};
@@ -258,7 +257,7 @@ TEST_CASE("a test run that the model was fitted to is not called unseen", "[diag
   CHECK(read.runs[3].of_the_model);
 }
 
-TEST_CASE("nothing is to be done where nothing is worth saying", "[diagnosis][report]") {
+TEST_CASE("there is no advice for the verdict none", "[diagnosis][report]") {
   Diagnosis diagnosis = none();
   diagnosis.outputs["z_um"].headroom = Headroom{0.1, 0.0, 0.0, 0.9};
   CHECK_FALSE(has(report_html(diagnosis, one_run()), "What to do"));
@@ -268,7 +267,7 @@ TEST_CASE("nothing is to be done where nothing is worth saying", "[diagnosis][re
   CHECK_FALSE(has(html, "Nothing worth saying"));
 }
 
-TEST_CASE("what is all but ruled out is not listed as what it may be", "[diagnosis][report]") {
+TEST_CASE("unlikely candidates are not listed", "[diagnosis][report]") {
   Diagnosis diagnosis = none();
   diagnosis.weighed = {{"speed_growth", "spindle_rpm", {}, 0.3, 0.1},
                        {"thermal_lag", "t1_degC", {}, 0.04, 0.1}};
@@ -279,8 +278,7 @@ TEST_CASE("what is all but ruled out is not listed as what it may be", "[diagnos
   CHECK_FALSE(has(report_html(diagnosis, one_run()), "What it may be"));
 }
 
-TEST_CASE("the experiment that parts two places names them and warms no room",
-          "[diagnosis][report]") {
+TEST_CASE("the experiment for two places names both and warms no room", "[diagnosis][report]") {
   const auto between = [](const char* one, const char* other) {
     return experiment_between({"missing_temperature", one, 1.0},
                               {"missing_temperature", other, 0.5});
@@ -319,7 +317,7 @@ TEST_CASE("each of many curves has its name and a stroke of its own", "[diagnosi
   }
 }
 
-TEST_CASE("only what has the unit of a speed is called one", "[diagnosis][report]") {
+TEST_CASE("only signals in units of speed are called speed", "[diagnosis][report]") {
   NamedFinding finding;
   finding.cause = "speed_growth";
   for (const char* speed : {"spindle_rpm", "x_mm_per_min"}) {
@@ -335,7 +333,7 @@ TEST_CASE("only what has the unit of a speed is called one", "[diagnosis][report
   CHECK_FALSE(what_to_do(finding).empty());
 }
 
-TEST_CASE("every cause that can be named has words of its own", "[diagnosis][report]") {
+TEST_CASE("every cause has its own texts", "[diagnosis][report]") {
   for (const Cause& each : all_causes()) {
     const std::string& cause = each.name;
     const NamedFinding finding{cause, "spindle_rpm", {}, {}, {}, {}, {}, {}};

@@ -37,7 +37,7 @@ nanoseconds at(double time_s) {
 
 }  // namespace
 
-TEST_CASE("lags of many time constants are those of the estimator", "[diagnosis]") {
+TEST_CASE("lags of many time constants equal the estimator's", "[diagnosis]") {
   const Series series = uneven();
   const std::vector<double> taus_s = {0.0, 5.0, 60.0, 333.0, 1e4};
   const Panel all = lagged(series.time_s, series.values, taus_s);
@@ -49,7 +49,7 @@ TEST_CASE("lags of many time constants are those of the estimator", "[diagnosis]
   }
 }
 
-TEST_CASE("plays of many widths are those of the estimator", "[diagnosis]") {
+TEST_CASE("plays of many widths equal the estimator's", "[diagnosis]") {
   const Series series = uneven();
   const std::vector<double> widths = {0.0, 0.5, 3.0, 100.0};
   const Panel all = played_less_values(series.values, widths);
@@ -61,7 +61,7 @@ TEST_CASE("plays of many widths are those of the estimator", "[diagnosis]") {
   }
 }
 
-TEST_CASE("slopes are central differences of what is smoothed to and fro", "[diagnosis]") {
+TEST_CASE("slopes are central differences of the smoothed values", "[diagnosis]") {
   const Series series = uneven();
   const double tau_s = GENERATE(0.0, 30.0, 400.0);
   const Column smooth = smoothed(series.time_s, series.values, tau_s);
@@ -75,7 +75,7 @@ TEST_CASE("slopes are central differences of what is smoothed to and fro", "[dia
   }
 }
 
-TEST_CASE("a reading is calmed of its noise, and left alone where it has none", "[diagnosis]") {
+TEST_CASE("denoising removes noise and keeps a reading without noise", "[diagnosis]") {
   const Eigen::Index n = 400;
   std::mt19937 random(5);
   std::normal_distribution<double> noise(0.0, 0.05);

@@ -97,7 +97,7 @@ RunFile run_of(unsigned seed, int rows) {
 
 }  // namespace
 
-TEST_CASE("steps that the converter makes are noise, not structure", "[diagnosis][thermal]") {
+TEST_CASE("quantisation steps are noise, not structure", "[diagnosis][thermal]") {
   const TemporaryFolder folder;
   const ThermalPlant plant = load_thermal_plant(folder.file(network + room));
   RunFile train = run_of(1, 600);
@@ -108,7 +108,7 @@ TEST_CASE("steps that the converter makes are noise, not structure", "[diagnosis
   CHECK(diagnose_thermal(plant, {train}, {"a"}, {test}, {"b"}).verdict == "none");
 }
 
-TEST_CASE("a thermal network without what it needs is refused", "[diagnosis][thermal]") {
+TEST_CASE("runs without columns of the thermal network are refused", "[diagnosis][thermal]") {
   const TemporaryFolder folder;
   CHECK_THROWS_AS(load_thermal_plant(folder.file(network)), ConfigurationError);
   CHECK_THROWS_AS(load_thermal_plant(folder.file("format = 1\n")), ConfigurationError);
@@ -127,7 +127,7 @@ TEST_CASE("a thermal network without what it needs is refused", "[diagnosis][the
   CHECK_THROWS_AS(diagnose_thermal(plant, {blind}, {"a"}, {good}, {"b"}), ConfigurationError);
 }
 
-TEST_CASE("the corrected machine file has what was found, and says what it cannot have",
+TEST_CASE("the corrected machine file has the findings, and comments for the others",
           "[diagnosis][thermal]") {
   const auto found = [](const char* cause, const char* subject,
                         const std::map<std::string, double>& values) {
