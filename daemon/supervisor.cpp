@@ -174,7 +174,7 @@ void Supervisor::look_at_health() {
 
 void Supervisor::note_history() {
   if (parts_.history != nullptr)
-    events_.note_history(parts_.history->statistics(), parts_.history->take_news());
+    events_.note_history(parts_.history->statistics(), parts_.history->take_messages());
 }
 
 void Supervisor::ramp_to_zero() {

@@ -69,7 +69,7 @@ class Supervisor {
   void wait_until_ready(Cycle& running);
   /// Runs until a signal ends it; then, if so configured, ramps the offsets to zero.
   void run();
-  /// Logs news of the history; to be called once more after its end.
+  /// Logs new messages of the history; to be called once more after its end.
   void note_history();
 
   [[nodiscard]] StatusView view();

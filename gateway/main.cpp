@@ -21,11 +21,11 @@
 #include "daemon/socket/status_client.hpp"
 #include "gateway/alarms/alarm_watch.hpp"
 #include "gateway/alarms/hook_runner.hpp"
+#include "gateway/api/gateway_server.hpp"
 #include "gateway/command_line.hpp"
-#include "gateway/door/page_files.hpp"
-#include "gateway/door/password_file.hpp"
 #include "gateway/feed/daemon_feed.hpp"
-#include "gateway/http/http_server.hpp"
+#include "gateway/http/page_files.hpp"
+#include "gateway/http/password_file.hpp"
 #include "gateway/mqtt/mqtt_publisher.hpp"
 #include "gateway/settings/gateway_settings.hpp"
 #include "gateway/shdr/shdr_adapter.hpp"
@@ -103,7 +103,8 @@ class Gateway {
       alarm.since_s += snapshot.wall_s - now_s;
       return alarm;
     };
-    std::vector<AlarmChange> changes = alarms_.update(now_s, wrong_now(snapshot), snapshot.is_here);
+    std::vector<AlarmChange> changes =
+        alarms_.update(now_s, active_conditions(snapshot), snapshot.is_here);
     if (changes.empty() && alarms_published_) return;
     std::vector<Alarm> active = alarms_.active();
     for (Alarm& alarm : active) alarm = with_time_of_day(alarm);
@@ -125,7 +126,7 @@ class Gateway {
   std::optional<ShdrAdapter> shdr_;
   std::optional<HookRunner> hooks_;
   std::optional<PageFiles> files_;
-  std::optional<HttpServer> http_;
+  std::optional<GatewayServer> http_;
 };
 
 /// Device file for the MTConnect agent, from the running daemon.

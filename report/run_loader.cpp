@@ -10,7 +10,7 @@ RunLoader::RunLoader(const std::string& columns)
 
 RunFile RunLoader::load(const std::string& argument) {
   RunFile run = load_run(parse_selection(argument), has_map_ ? &map_ : nullptr);
-  tell(run);
+  print_interpretation(run);
   return run;
 }
 
@@ -21,13 +21,13 @@ std::vector<RunFile> RunLoader::load(const std::vector<std::string>& arguments) 
   return runs;
 }
 
-void RunLoader::tell(const RunFile& run) {
+void RunLoader::print_interpretation(const RunFile& run) {
   if (run.understood.empty()) return;
   const auto is_reported = [this](const std::string& line) {
     return std::find(reported_.begin(), reported_.end(), line) != reported_.end();
   };
   std::fprintf(stderr, "%s: read as follows%s\n", run.name.c_str(),
-               reported_.empty() ? "" : ", and what is said above");
+               reported_.empty() ? "" : " and above");
   for (const std::string& line : run.understood) {
     if (is_reported(line)) continue;
     std::fprintf(stderr, "  %s\n", line.c_str());

@@ -26,7 +26,7 @@ class RunLoader {
   [[nodiscard]] std::vector<RunFile> load(const std::vector<std::string>& arguments);
 
  private:
-  void tell(const RunFile& run);
+  void print_interpretation(const RunFile& run);
 
   bool has_map_;
   ColumnMap map_;

@@ -73,7 +73,7 @@ void Progress::update(double fraction) {
   std::fflush(stderr);
 }
 
-void ProgressLines::say(std::string_view what) const {
+void ProgressLines::print(std::string_view what) const {
   const double seconds = std::chrono::duration<double>(steady_clock::now() - began_).count();
   std::fprintf(stderr, "%7.1f s  %.*s\n", seconds, static_cast<int>(what.size()), what.data());
 }

@@ -38,7 +38,7 @@ class Progress {
 /// Progress of long work in steps: one line per step on stderr, with the time since the start.
 class ProgressLines {
  public:
-  void say(std::string_view what) const;
+  void print(std::string_view what) const;
 
  private:
   std::chrono::steady_clock::time_point began_{std::chrono::steady_clock::now()};

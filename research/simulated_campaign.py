@@ -194,7 +194,7 @@ def main():
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--keep", help="folder that keeps the files")
     parser.add_argument("--show", action="store_true")
-    parser.add_argument("--answers", help="file that receives what was said and weighed")
+    parser.add_argument("--answers", help="file that receives findings and weights")
     options = parser.parse_args()
     examine, catalogue, numbers, unit = HEAT if options.thermal else DISPLACEMENT
     for name, number in zip(("cases", "null", "outside", "double"), numbers):

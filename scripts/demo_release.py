@@ -127,15 +127,15 @@ class Mill:
     def admit(self):
         """Runs uplink and `admit`, as timers do every few minutes; returns their output."""
         self.daemon.committed()
-        said = ""
+        printed = ""
         for command, good in ((["thermocomp-uplink", "--once", "uplink.toml"], (0,)),
                               (["thermocomp", "admit", "releases.toml"], (0, 1)),
                               (["thermocomp-uplink", "--once", "uplink.toml"], (0,))):
             done = subprocess.run([str(self.programs / command[0]), *command[1:]], cwd=self.folder, text=True,
                                   stdin=subprocess.DEVNULL, capture_output=True)
             assert done.returncode in good, done.stderr
-            said += done.stdout
-        return said
+            printed += done.stdout
+        return printed
 
     def offer(self, model, note):
         offered = self.folder / "offered.toml"

@@ -171,7 +171,7 @@ double peak_error_um(Sent sent, double rate_um_per_s) {
       estimator.step(now, {&reading, 1}, read, command);
     }
     cnc.step(now_s, {});
-    if (sent != Sent::number) cnc.stand_at(0, now_s, at_mm);
+    if (sent != Sent::number) cnc.set_position(0, now_s, at_mm);
     if (now >= settled) peak_um = std::max(peak_um, std::abs(curve_um(at_mm) + cnc.applied_um(0)));
   }
   return peak_um;

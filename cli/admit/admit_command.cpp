@@ -136,7 +136,7 @@ class Admission {
                                 offer_.order.release, steps_.release()));
     if (offer_.order.release > steps_.release()) receive();
     if (steps_.last() == "checked") {
-      run_beside(config_.socket.path, candidate_file());
+      start_candidate(config_.socket.path, candidate_file());
       steps_.add("candidate", score_text({}));
     }
     if (steps_.last() == "candidate") look_at_candidate();
@@ -191,7 +191,7 @@ class Admission {
     const std::string name = signer(takes_back);
     return name.empty() ? "by an operator at the machine" : "as ordered by " + name;
   }
-  [[nodiscard]] std::string signed_by_nobody(const char* what) const {
+  [[nodiscard]] std::string missing_signature(const char* what) const {
     return fmt::format("the {} is not signed by a key in {}", what, settings_.approvers.string());
   }
 
@@ -202,12 +202,12 @@ class Admission {
     const auto status =
         part_from<Status>(ask_daemon(config_.socket.path, "status", json::object()));
     if (!status.candidate || status.candidate->file != candidate_file())
-      run_beside(config_.socket.path, candidate_file());
+      start_candidate(config_.socket.path, candidate_file());
     else if (const std::string score = score_text(*status.candidate); score != steps_.last_detail())
       steps_.add("candidate", score);  // the score on which it is approved
     if (settings_.approvers.empty() || offer_.approval.empty()) return;
     const std::string name = signer(false);
-    if (name.empty()) return end_candidate(signed_by_nobody("approval"));
+    if (name.empty()) return end_candidate(missing_signature("approval"));
     constexpr double worse_probability_max = 0.5;
     if (status.candidate && status.candidate->worse_probability > worse_probability_max)
       return end_candidate(fmt::format("is worse at {} probings here with {:.0f} %",
@@ -218,7 +218,7 @@ class Admission {
   }
 
   void end_candidate(const std::string& why) {
-    run_beside(config_.socket.path, {});
+    start_candidate(config_.socket.path, {});
     steps_.add("refused", why);
   }
 
@@ -226,7 +226,7 @@ class Admission {
     if (checksum_in_use() != offer_.order.checksum) return steps_.add("rolled_back", done_by(true));
     if (settings_.approvers.empty() || offer_.rollback.empty()) return;
     const std::string name = signer(true);
-    if (name.empty()) throw Failure(signed_by_nobody("order to take the release back"));
+    if (name.empty()) throw Failure(missing_signature("order to take the release back"));
     static_cast<void>(take_back(config_.socket.path, offer_.order.checksum));
     steps_.add("rolled_back", "as ordered by " + name);
   }

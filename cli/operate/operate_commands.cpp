@@ -190,7 +190,7 @@ int run_promote(const GlobalOptions& global, bool back) {
 
 int run_candidate(const GlobalOptions& global, const std::string& file) {
   const bool is_none = file == "none";
-  run_beside(global.socket, is_none ? fs::path() : fs::absolute(file));
+  start_candidate(global.socket, is_none ? fs::path() : fs::absolute(file));
   if (is_none) {
     std::cout << "no candidate is running\n";
     return exit_success;

@@ -55,7 +55,7 @@ void reload_with(const fs::path& socket, const fs::path& model, const std::strin
 
 }  // namespace
 
-void run_beside(const fs::path& socket, const fs::path& file) {
+void start_candidate(const fs::path& socket, const fs::path& file) {
   static_cast<void>(ask_daemon(socket, "candidate", {{"file", file.string()}}));
   if (file.empty()) return;
   const json status = status_at(socket);

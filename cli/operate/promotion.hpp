@@ -8,7 +8,7 @@ namespace thermocomp::cli {
 
 /// @param file  absolute; empty: ends the candidate
 /// @throws Failure if it does not run, or is the model in use
-void run_beside(const std::filesystem::path& socket, const std::filesystem::path& file);
+void start_candidate(const std::filesystem::path& socket, const std::filesystem::path& file);
 
 struct Promotion {
   std::string model;   ///< file of the model in use

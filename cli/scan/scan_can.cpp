@@ -204,8 +204,8 @@ ScanBus scan_bus(const CanBusConfig& config, const ScanSensors& sensors, const S
   bus.where = config.interface;
   const std::vector<const CanSignal*> signals = signals_of(config);
   CanSocket socket(config.interface, {});
-  socket.also_want({{0, false}, 0});  // all frames, to list those not configured
-  socket.also_want({{0, true}, 0});
+  socket.add_filter({{0, false}, 0});  // all frames, to list those not configured
+  socket.add_filter({{0, true}, 0});
   ReceivedFrames received;
   received.of_signal.resize(signals.size());
   if (!socket.open()) {
@@ -264,8 +264,8 @@ ScanController scan_can_controller(const DaemonConfig& config,
     add(signal.value, name, std::string(unit_of(name).symbol));
   }
   CanSocket socket(controller.interface, {});
-  socket.also_want({{0, false}, 0});  // all frames, including those too short for a signal
-  socket.also_want({{0, true}, 0});
+  socket.add_filter({{0, false}, 0});  // all frames, including those too short for a signal
+  socket.add_filter({{0, true}, 0});
   ReceivedFrames received;
   received.of_signal.resize(signals.size());
   if (socket.open()) {

@@ -102,8 +102,8 @@ ScanBus scan_protocol(ProtocolBus what, CanProtocol& protocol, const ScanSensors
   bus.kind = what.outline.kind;
   bus.where = what.outline.interface;
   CanSocket socket(bus.where, {});
-  socket.also_want({{0, false}, 0});  // all frames, to list those not configured
-  socket.also_want({{0, true}, 0});
+  socket.add_filter({{0, false}, 0});  // all frames, to list those not configured
+  socket.add_filter({{0, true}, 0});
   Worked worked;
   if (socket.open()) {
     task.progress("bus " + what.name + ": working it as the daemon would, for " +

@@ -255,9 +255,9 @@ void EventLog::note_writes(const ControllerHealth& controller) {
 }
 
 void EventLog::note_history(const HistoryStatistics& history,
-                            const std::vector<std::string>& news) {
+                            const std::vector<std::string>& messages) {
   const Subject subject{SubjectKind::history, ""};
-  for (const std::string& what : news) {
+  for (const std::string& what : messages) {
     spdlog::warn("history: {}", what);
     journal_.daemon("history", what);
   }

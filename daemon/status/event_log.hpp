@@ -31,8 +31,8 @@ class EventLog {
                       const std::vector<std::string>& columns);
   void note_bus(const BusHealth& bus);
   void note_controller(const ControllerHealth& controller);
-  /// @param news  HistoryWriter::take_news()
-  void note_history(const HistoryStatistics& history, const std::vector<std::string>& news);
+  /// @param messages  HistoryWriter::take_messages()
+  void note_history(const HistoryStatistics& history, const std::vector<std::string>& messages);
   void note_missed(std::uint64_t missed);
   void note_failed_sleeps(std::uint64_t failed);
   /// Refused or cut-off clients and missed notifications: at most one line per minute, so that

@@ -41,16 +41,16 @@ ServiceManager::~ServiceManager() {
   if (fd_ >= 0) close(fd_);
 }
 
-void ServiceManager::send(const std::string& news, bool is_kept) noexcept {
+void ServiceManager::send(const std::string& text, bool is_kept) noexcept {
   if (fd_ < 0) return;
-  const std::string all = unsent_ + news;
+  const std::string all = unsent_ + text;
   const auto sent = sendto(fd_, all.data(), all.size(), MSG_NOSIGNAL,
                            reinterpret_cast<const sockaddr*>(&address_), address_bytes_);
   const bool is_full = sent < 0 && (errno == EAGAIN || errno == ENOBUFS);
   if (!is_full)
     unsent_.clear();
   else if (is_kept)
-    unsent_ = all.size() <= unsent_bytes_max ? all : news;
+    unsent_ = all.size() <= unsent_bytes_max ? all : text;
 }
 
 void ServiceManager::ready(const std::string& status) noexcept {

@@ -30,7 +30,7 @@ class ServiceManager {
 
  private:
   static constexpr std::size_t unsent_bytes_max = 2048;
-  void send(const std::string& news, bool is_kept = true) noexcept;
+  void send(const std::string& text, bool is_kept = true) noexcept;
 
   int fd_{-1};  ///< -1: not a service
   sockaddr_un address_{};

@@ -134,16 +134,16 @@ CanSocket::CanSocket(std::string interface, std::vector<CanId> wanted)
   received_.reserve(batch_max);
 }
 
-void CanSocket::also_want(const CanFilter& filter) {
-  also_wanted_.push_back(filter);
-  require(wanted_.size() + also_wanted_.size() <= filters_max, "id",
-          static_cast<double>(wanted_.size() + also_wanted_.size()),
+void CanSocket::add_filter(const CanFilter& filter) {
+  filters_.push_back(filter);
+  require(wanted_.size() + filters_.size() <= filters_max, "id",
+          static_cast<double>(wanted_.size() + filters_.size()),
           "at most 512 different identifiers can be received on one interface");
 }
 
 void CanSocket::watch_own(const std::vector<CanId>& ids) {
   watches_own_ = true;
-  for (const CanId& id : ids) also_want({id});
+  for (const CanId& id : ids) add_filter({id});
 }
 
 CanSocket::~CanSocket() {
@@ -228,8 +228,7 @@ bool CanSocket::configure() {
 
   std::vector<can_filter> filters(wanted_.size());
   std::transform(wanted_.begin(), wanted_.end(), filters.begin(), filter_for);
-  std::transform(also_wanted_.begin(), also_wanted_.end(), std::back_inserter(filters),
-                 masked_filter);
+  std::transform(filters_.begin(), filters_.end(), std::back_inserter(filters), masked_filter);
   const auto bytes = static_cast<socklen_t>(filters.size() * sizeof(can_filter));
   const can_err_mask_t every_error = CAN_ERR_MASK;
   const int on = 1;

@@ -94,7 +94,7 @@ class CanSocket {
   CanSocket(std::string interface, std::vector<CanId> wanted);
   /// Adds identifiers to receive, from the next open() on.
   /// @throws InvalidValue for more than filters_max filters in all
-  void also_want(const CanFilter& filter);
+  void add_filter(const CanFilter& filter);
   /// Sent frames with these identifiers count as sent_out() once they have left the interface, from
   /// the next open() on.
   /// @throws InvalidValue for more than filters_max filters in all
@@ -144,7 +144,7 @@ class CanSocket {
 
   std::string interface_;
   std::vector<CanId> wanted_;
-  std::vector<CanFilter> also_wanted_;
+  std::vector<CanFilter> filters_;
   bool watches_own_{false};
   std::uint64_t sent_out_{0};
   int socket_{-1};

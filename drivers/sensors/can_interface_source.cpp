@@ -112,7 +112,7 @@ CanProtocolSource::CanProtocolSource(std::string name, std::string kind, std::st
           {std::move(name), std::move(kind), std::move(interface), reconnect_s, tick, {}}, {},
           protocol->sensors(), protocol->health(nanoseconds{0})),
       protocol_(std::move(protocol)) {
-  for (const CanFilter& filter : protocol_->wanted()) socket().also_want(filter);
+  for (const CanFilter& filter : protocol_->wanted()) socket().add_filter(filter);
 }
 
 CanProtocolSource::~CanProtocolSource() {

@@ -36,7 +36,7 @@ class CanInterfaceSource : public SensorSource {
     nanoseconds patience;  ///< work() is called at least this often while the interface is open
     nanoseconds gather{};  ///< pause after work(), so that frames come in batches
   };
-  /// @param wanted   identifiers to receive; more by socket().also_want()
+  /// @param wanted   identifiers to receive; more by socket().add_filter()
   /// @param sensors  index in the whole configuration of each reading
   /// @param units    before the start
   /// @throws InvalidValue for an impossible interface or number of identifiers

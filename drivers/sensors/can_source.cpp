@@ -65,7 +65,7 @@ CanSource::CanSource(const CanBusConfig& config, std::vector<Channel> channels)
                                    [](const Channel& each) { return is_group(each.signal); });
   groups_begin_ = static_cast<std::size_t>(groups - channels_.begin());
   for (auto each = groups; each != channels_.end(); ++each) {
-    socket().also_want({each->id, each->signal.id_mask});
+    socket().add_filter({each->id, each->signal.id_mask});
   }
 }
 

@@ -42,7 +42,7 @@ void AxisBank::step(const StepTime& time, const Targets& targets, const Signals&
       input.target_um = targets.axis_um[i];
       if (targets.stand_where_unknown && !std::isfinite(input.target_um))
         input.target_um = axes_[i].offset_um();
-      moves ? axes_[i].move(input) : axes_[i].stand(time.now);
+      moves ? axes_[i].move(input) : axes_[i].hold(time.now);
       command.offset_um[i] = axes_[i].offset_um();
       command.valid[i] = moves;
     }

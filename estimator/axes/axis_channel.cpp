@@ -72,7 +72,7 @@ void AxisChannel::observe(const AxisInput& input) noexcept {
     compare(input);
 }
 
-void AxisChannel::stand(nanoseconds now) noexcept {
+void AxisChannel::hold(nanoseconds now) noexcept {
   end_prove();
   if (driven()) check_.sent(now, limiter_.offset_um());
 }

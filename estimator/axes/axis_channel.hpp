@@ -77,7 +77,7 @@ class AxisChannel {
   /// Compares the controller's report with the offsets sent.
   void observe(const AxisInput& input) noexcept;
   /// Step without sending: the offset stays, and the window of sent offsets narrows to it.
-  void stand(nanoseconds now) noexcept;
+  void hold(nanoseconds now) noexcept;
   /// Steps towards the target. @pre driven(), and the offset is sent
   void move(const AxisInput& input) noexcept;
   /// Moves by `move_um` and back; the compensation of this axis pauses meanwhile. Ignored if not

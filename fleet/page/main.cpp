@@ -18,7 +18,7 @@
 #include "config/toml/toml_reader.hpp"
 #include "fleet/page/command_line.hpp"
 #include "fleet/store/store.hpp"
-#include "gateway/door/http_door.hpp"
+#include "gateway/http/http_server.hpp"
 #include "report/command.hpp"
 
 namespace thermocomp::fleet {
@@ -47,9 +47,9 @@ PageSettings load_settings(const std::filesystem::path& file) {
 }
 
 /// Queries the store on its own thread over its own read-only connection.
-class Asker {
+class StoreReader {
  public:
-  explicit Asker(std::string conninfo) : conninfo_(std::move(conninfo)) {}
+  explicit StoreReader(std::string conninfo) : conninfo_(std::move(conninfo)) {}
 
   /// @param call  function of the schema, with $1, $2, ... for `values`
   void ask(HttpExchange& exchange, const char* call, std::vector<std::string> values) {
@@ -97,10 +97,10 @@ class Page {
       : tables_(settings.store),
         curves_(settings.store),
         files_(gateway::page_folder("fleet/page"), {}, {}),
-        door_(settings.http, files_, [this](HttpExchange& exchange) { serve(exchange); }) {}
+        http_(settings.http, files_, [this](HttpExchange& exchange) { serve(exchange); }) {}
 
-  [[nodiscard]] std::uint16_t port() const { return door_.port(); }
-  void tick() { door_.end_slow_connections(); }
+  [[nodiscard]] std::uint16_t port() const { return http_.port(); }
+  void tick() { http_.end_slow_connections(); }
 
  private:
   void serve(HttpExchange& exchange) {
@@ -127,10 +127,10 @@ class Page {
                  std::to_string(now_s - *seconds), std::to_string(now_s)});
   }
 
-  Asker tables_;
-  Asker curves_;  ///< separate, so that curves do not delay the table
+  StoreReader tables_;
+  StoreReader curves_;  ///< separate, so that curves do not delay the table
   gateway::PageFiles files_;
-  gateway::HttpDoor door_;  ///< last, since its handler uses the others
+  gateway::HttpServer http_;  ///< last, since its handler uses the others
 };
 
 /// Runs until a signal.

@@ -63,7 +63,7 @@ void add_sensors(const SensorsAnswer& answer, const std::set<std::string>& away,
 
 }  // namespace
 
-std::vector<AlarmCondition> wrong_now(const Snapshot& snapshot) {
+std::vector<AlarmCondition> active_conditions(const Snapshot& snapshot) {
   std::vector<AlarmCondition> wrong;
   if (!snapshot.is_here) {
     wrong.push_back({"daemon", "the daemon does not answer: " + snapshot.why,

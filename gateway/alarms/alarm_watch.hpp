@@ -19,7 +19,7 @@ struct AlarmCondition {
 };
 
 /// Conditions present in a snapshot. While the daemon is away: that condition only.
-[[nodiscard]] std::vector<AlarmCondition> wrong_now(const Snapshot& snapshot);
+[[nodiscard]] std::vector<AlarmCondition> active_conditions(const Snapshot& snapshot);
 
 struct Alarm {
   AlarmCondition condition;

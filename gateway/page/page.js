@@ -379,9 +379,9 @@ function showEvents(events) {
 async function post(body) {
   const answer = await fetch(api('command'), {method: 'POST', body: JSON.stringify(body),
                                               headers: {'Content-Type': 'application/json'}});
-  const told = await answer.json();
-  if (!answer.ok) throw new Error(told.error);
-  return told;
+  const result = await answer.json();
+  if (!answer.ok) throw new Error(result.error);
+  return result;
 }
 
 function confirmed(text) {

@@ -117,7 +117,7 @@ Diagnosis thermal_diagnosis_of(const Options& options, const std::vector<RunFile
 Diagnosis diagnosis_with_body(const Options& options, const std::vector<RunFile>& train,
                               const std::vector<RunFile>& test, ReportData* report) {
   const cli::ProgressLines lines;
-  ThermalBody body(options.structure, [&](std::string_view what) { lines.say(what); });
+  ThermalBody body(options.structure, [&](std::string_view what) { lines.print(what); });
   const Diagnosis diagnosis = thermal_diagnosis_of(
       options, train, test, load_thermal_plant(options.thermal, &body.body()), report,
       [&body](const ThermalRuns& runs, const HeatNetwork& before, const HeatNetwork& after) {

@@ -54,7 +54,7 @@ void write_pictures(const Options& options, const structure::StructureSpec& spec
 
 int run(const Options& options) {
   const cli::ProgressLines lines;
-  const structure::Progress progress = [&](std::string_view what) { lines.say(what); };
+  const structure::Progress progress = [&](std::string_view what) { lines.print(what); };
   const structure::StructureSpec spec = structure::load_structure(options.structure);
   const structure::Structure structure = structure::build_structure(spec, progress);
   const structure::HeatModel heat = structure::build_heat_model(spec, structure);

@@ -72,7 +72,7 @@ std::vector<BlockShape> block_shapes(const Structure& structure, const Statics& 
                                      const cli::ProgressLines& progress) {
   std::vector<BlockShape> shapes;
   for (Index block = 0; block < structure.block_names.size(); ++block) {
-    progress.say("shape with block " + structure.block_names[block] + " warm");
+    progress.print("shape with block " + structure.block_names[block] + " warm");
     shapes.push_back(
         {structure.block_names[block], statics.displacement_m(one_warm(structure, block))});
   }
@@ -143,12 +143,12 @@ int run(const Options& options) {
   const cli::ProgressLines progress;
   const StructureSpec spec = load_structure(options.structure);
   const Structure structure =
-      build_structure(spec, [&](std::string_view what) { progress.say(what); });
-  progress.say("stiffness of " + std::to_string(structure.mesh.nodes_m.size()) +
-               " nodes, assembly and factorisation");
+      build_structure(spec, [&](std::string_view what) { progress.print(what); });
+  progress.print("stiffness of " + std::to_string(structure.mesh.nodes_m.size()) +
+                 " nodes, assembly and factorisation");
   const Statics statics(structure.mesh, structure.material_of_part, structure.reduction,
                         structure.springs, options.solver);
-  progress.say(std::to_string(structure.rows.size()) + " rows, one solve each");
+  progress.print(std::to_string(structure.rows.size()) + " rows, one solve each");
   const ThermalModel model = block_model(spec, structure, statics.sensitivities(structure.rows));
   if (!options.vtu.empty() || !options.picture.empty() || !options.page.empty()) {
     const auto shapes = block_shapes(structure, statics, progress);
@@ -158,7 +158,7 @@ int run(const Options& options) {
     if (!options.picture.empty()) cli::write_file(options.picture, svg_picture(structure, shapes));
   }
   if (!options.plant.empty()) {
-    progress.say("reduction to a state-space model for the simulator");
+    progress.print("reduction to a state-space model for the simulator");
     const HeatModel heat = build_heat_model(spec, structure);
     cli::write_file(
         options.plant,
@@ -166,7 +166,7 @@ int run(const Options& options) {
                   reduce_body(spec, structure, heat, statics, options.plant_parts).body));
   }
   cli::write_file(options.model, write_model(model));
-  progress.say("done");
+  progress.print("done");
   std::string report = structure_report(structure, statics, model, options.all);
   if (options.all) report += line("peak memory %.0f MB\n", peak_memory_MB());
   if (options.model != "-") report.append(options.model).append(": written\n");

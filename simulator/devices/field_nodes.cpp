@@ -40,7 +40,7 @@ struct FieldNodes::Node {
         columns(std::move(shown)),
         temps_degC(columns.size()),
         socket(interface, {}) {
-    for (const bool extended : {false, true}) socket.also_want({{0, extended}, 0});
+    for (const bool extended : {false, true}) socket.add_filter({{0, extended}, 0});
     socket.open();
   }
 

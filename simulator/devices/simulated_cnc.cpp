@@ -107,7 +107,7 @@ void SimulatedCnc::step_axis(std::size_t axis, double dt_s, double misapplied_um
   if (piezos_[axis]) piezos_[axis]->step(applied_um_[first_[axis]]);
 }
 
-void SimulatedCnc::stand_at(std::size_t axis, double now_s, double position_mm) {
+void SimulatedCnc::set_position(std::size_t axis, double now_s, double position_mm) {
   const double dt_s = std::max(0.0, now_s - looked_at_s_.at(axis));
   looked_at_s_[axis] = now_s;
   const double rate = config_.axes[axis].travel->interpolation_um_per_s_max;

@@ -55,7 +55,7 @@ class SimulatedCnc {
 
   /// Interpolates at the slide's position, also without a heartbeat. @pre now_s does not decrease;
   /// the axis has a travel
-  void stand_at(std::size_t axis, double now_s, double position_mm);
+  void set_position(std::size_t axis, double now_s, double position_mm);
 
   /// Offset at the tool.
   [[nodiscard]] double applied_um(std::size_t axis) const {

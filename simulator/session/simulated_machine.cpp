@@ -175,16 +175,16 @@ struct SimulatedMachine::Parts {
 
   [[nodiscard]] std::vector<CanId> wanted_by_controller() const {
     std::vector<CanId> wanted;
-    const auto want = [&wanted](const CanSignal& signal) {
+    const auto subscribe = [&wanted](const CanSignal& signal) {
       wanted.push_back({signal.id, signal.extended_id});
     };
     for (const SimulatedAxis& axis : controller->config.axes) {
-      if (!axis.travel) want(axis.can_offset);
+      if (!axis.travel) subscribe(axis.can_offset);
       if (axis.travel && axis.travel->frames)
-        for (const CanSignal& number : axis.travel->frames->sent.numbers) want(number);
+        for (const CanSignal& number : axis.travel->frames->sent.numbers) subscribe(number);
     }
     for (const auto& signal : {controller->config.can_valid_bits, controller->config.can_heartbeat})
-      if (signal) want(*signal);
+      if (signal) subscribe(*signal);
     return wanted;
   }
 
@@ -431,7 +431,7 @@ struct SimulatedMachine::Parts {
     if (can) take_frames(seconds_of(now));
     for (std::size_t i = 0; i < from.axes.size(); ++i)
       if (controller->positions[i])
-        controller->cnc.stand_at(i, seconds_of(now), row[*controller->positions[i]]);
+        controller->cnc.set_position(i, seconds_of(now), row[*controller->positions[i]]);
     step_controller(seconds_of(now));
     const UnitEffect& effect = effects.controller_unit;
     if (can && now >= controller->next_frame && !effect.silent && !effect.down) {

@@ -66,17 +66,17 @@ def start_try(name, link, seed, given):
     process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                                stderr=subprocess.PIPE, text=True, start_new_session=True)
     try:
-        out, said = process.communicate(timeout=limit_s)
+        out, output = process.communicate(timeout=limit_s)
     except subprocess.TimeoutExpired:
-        out, said = "", f"not done after {limit_s:.0f} s"
+        out, output = "", f"not done after {limit_s:.0f} s"
     finally:
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)
     lines = [line for line in out.splitlines() if line.startswith("RESULT ")]
     if not lines:
-        tail = said.strip().splitlines()[-1:] or ["it said nothing"]
-        return failed_try("the attack itself failed: " + tail[0]), said
-    return json.loads(lines[-1][len("RESULT "):]), said
+        tail = output.strip().splitlines()[-1:] or ["no output"]
+        return failed_try("the attack itself failed: " + tail[0]), output
+    return json.loads(lines[-1][len("RESULT "):]), output
 
 
 def failed_try(why):
@@ -189,7 +189,7 @@ def run_try(name, link, seed, first, end, given):
         return None
     with one_bus if link.startswith("can") else contextlib.nullcontext():
         began = time.monotonic()
-        result, said = start_try(name, link, seed, given)
+        result, output = start_try(name, link, seed, given)
     result["seed"] = seed
     verdict = "held" if not result["broken"] else "BROKEN: " + "; ".join(result["broken"])
     print(f"{name} ({link}), seed {seed}, {time.monotonic() - began:.0f} s: {verdict}", flush=True)
@@ -197,7 +197,7 @@ def run_try(name, link, seed, first, end, given):
         print(f"  again: {sys.argv[0]} --bin {given.bin} --links {link} --only '{name}' "
               f"--exact --seed {seed}", flush=True)
     if given.verbose:
-        print(said, flush=True)
+        print(output, flush=True)
     return result
 
 
@@ -216,7 +216,7 @@ def read_options():
                          help="what broke is tried N times more, alone, and counts if it breaks again")
     options.add_argument("--list", action="store_true")
     options.add_argument("--keep", action="store_true", help="leaves the files of each try")
-    options.add_argument("--verbose", action="store_true", help="what each try said")
+    options.add_argument("--verbose", action="store_true", help="print the output of each try")
     options.add_argument("--one", help=argparse.SUPPRESS)
     given = options.parse_args()
     given.links = given.links.split(",")

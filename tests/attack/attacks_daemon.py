@@ -119,6 +119,6 @@ def sleeps_that_fail(rig):
     clocks.set()
     rig.must("sleep" in rig.daemon.log_text() or
              any("sleep" in warning for warning in rig.daemon.status()["warnings"]),
-             "nobody is told")
+             "nothing is reported")
     rig.follows_again()
     rig.note_rows()

@@ -53,11 +53,11 @@ def late_answers(rig):
 def answers_before_the_question(rig):
     """An unsolicited answer with another position is in the buffer when the request is sent."""
     def spoil(frame_of, request, answer):
-        lie = struct.pack(">BB2H", 4, 4, *struct.unpack(">2H", struct.pack(
+        false_answer = struct.pack(">BB2H", 4, 4, *struct.unpack(">2H", struct.pack(
             ">i", rig.random.choice((-40000, 30000, 0)))))
         if rig.random.random() > 0.2:
             return [answer]
-        return [answer, Hold(0.004), frame_of(lie, frame_of.transaction + 1)]
+        return [answer, Hold(0.004), frame_of(false_answer, frame_of.transaction + 1)]
     return spoil
 
 
@@ -66,7 +66,7 @@ def answers_twice(rig):
 
 
 def answers_of_another_question(rig):
-    rig.axis.lied = True  # some contain another position
+    rig.axis.had_read_error = True  # some contain another position
 
     def other(frame_of, request, _answer):
         pdu = rig.random.choice((struct.pack(">BB2H", 4, 4, 0, 7000), bytes([4, 200]) + bytes(200),
@@ -132,11 +132,11 @@ def noise_on_the_thermocouples(rig):
 @attack(links=("tcp",))
 def greets_before_it_is_asked(rig):
     """Every new connection begins with an unsolicited answer."""
-    lie = struct.pack(">BB2H", 4, 4, 0xFFFF, 0x63C0)  # -40 um
+    false_answer = struct.pack(">BB2H", 4, 4, 0xFFFF, 0x63C0)  # -40 um
 
     def greet(link):
         for transaction in range(4):
-            link.sendall(struct.pack(">HHHB", transaction, 0, len(lie) + 1, 1) + lie)
+            link.sendall(struct.pack(">HHHB", transaction, 0, len(false_answer) + 1, 1) + false_answer)
     if not rig.start(BEFORE_UM):
         return
     rig.machine.slave.greet = greet

@@ -5,7 +5,7 @@ import math
 import threading
 import time
 
-import axis as lies
+import axis as read_errors
 from process import eventually
 from registry import attack
 
@@ -40,13 +40,13 @@ def must_latch(rig, likely):
     if not rig.must(status and status is not True, "a mismatch is not latched"):
         return
     rig.must(not_driven_from_now_on(rig), "driven although the mismatch is latched")
-    told = status["axes"][0].get("mismatch")
-    said = str(told.get("likely", "")) if isinstance(told, dict) else ""
-    rig.must(said and any(word in said for word in likely or [said]),
-             f'the likely reason is "{said}", with none of {", ".join(likely)} in it')
-    if isinstance(told, dict):
-        rig.must(None not in (told.get("sent_um"), told.get("read_um")),
-                 "what was sent and read is not told")
+    mismatch = status["axes"][0].get("mismatch")
+    likely_text = str(mismatch.get("likely", "")) if isinstance(mismatch, dict) else ""
+    rig.must(likely_text and any(word in likely_text for word in likely or [likely_text]),
+             f'the likely reason is "{likely_text}", with none of {", ".join(likely)} in it')
+    if isinstance(mismatch, dict):
+        rig.must(None not in (mismatch.get("sent_um"), mismatch.get("read_um")),
+                 "sent and read values are not reported")
 
 
 def must_not_drive(rig):
@@ -58,7 +58,7 @@ def must_not_drive(rig):
 
 
 def release_is_needed(rig):
-    rig.axis.lie = None
+    rig.axis.read_error = None
     rig.must(not_driven_from_now_on(rig), "driven again without an operator's release")
 
 
@@ -67,7 +67,7 @@ def run_wrong_read_back(rig, make, likely):
     axis moves: then a factor cannot be distinguished from an additive error."""
     from_the_start = rig.random.random() < 0.5 and rig.machine.link != "piezo"
     if from_the_start:
-        rig.axis.lie = make(rig)
+        rig.axis.read_error = make(rig)
         if not rig.must(rig.daemon.start(), "the daemon does not start"):
             return
         if hasattr(rig.machine.slave, "report_to"):
@@ -76,35 +76,35 @@ def run_wrong_read_back(rig, make, likely):
     elif not rig.start(BEFORE_UM):
         return
     rig.machine.wants_um(WANTED_UM)
-    rig.axis.lie = rig.axis.lie or make(rig)
+    rig.axis.read_error = rig.axis.read_error or make(rig)
     began = time.monotonic()
-    if from_the_start and likely and abs(rig.axis.lie(rig.axis, began)) > rig.axis.bound_um:
+    if from_the_start and likely and abs(rig.axis.read_error(rig.axis, began)) > rig.axis.bound_um:
         must_not_drive(rig)
-        rig.axis.lie = None
+        rig.axis.read_error = None
     elif likely and rig.machine.link != "piezo":
         must_latch(rig, likely if from_the_start else ())
         time.sleep(max(0.0, LOOKED_AT_S - (time.monotonic() - began)))
         release_is_needed(rig)
     else:
         time.sleep(LOOKED_AT_S)
-        rig.axis.lie = None
+        rig.axis.read_error = None
     rig.follows_again()
 
 
 LIES = {  # name: (constructor, words of which the reason must contain one; None: not latched)
-    "reads back twice what is sent": (lambda rig: lies.factor(2.0), ("twice", "scale")),
-    "reads back half of what is sent": (lambda rig: lies.factor(0.5), ("half", "scale")),
-    "reads back the opposite sign": (lambda rig: lies.factor(-1.0), ("sign",)),
-    "reads back 3 um more": (lambda rig: lies.constant(3.0), ("constant",)),
-    "reads back millimetres": (lambda rig: lies.factor(0.001), ("scale",)),
-    "reads back a jump of 1 mm": (lambda rig: lies.constant(rig.random.choice((1000, -1000))),
+    "reads back twice what is sent": (lambda rig: read_errors.factor(2.0), ("twice", "scale")),
+    "reads back half of what is sent": (lambda rig: read_errors.factor(0.5), ("half", "scale")),
+    "reads back the opposite sign": (lambda rig: read_errors.factor(-1.0), ("sign",)),
+    "reads back 3 um more": (lambda rig: read_errors.constant(3.0), ("constant",)),
+    "reads back millimetres": (lambda rig: read_errors.factor(0.001), ("scale",)),
+    "reads back a jump of 1 mm": (lambda rig: read_errors.constant(rig.random.choice((1000, -1000))),
                                   ("constant", "writer")),
-    "reads back a drift": (lambda rig: lies.drift(rig.random.choice((3.0, -3.0, 0.5))), None),
-    "reads back what it was": (lambda rig: lies.frozen(rig.axis.position_um), None),
-    "jumps by 1 mm for a moment": (lambda rig: lies.jumps(1000.0, rig.random.randint(1, 6)), None),
-    "jumps by 4 um every other time": (lambda rig: lies.jumps(4.0, 1), None),
-    "reads back anything": (lambda rig: lies.anything(rig.random, 60.0), None),
-    "reads back what was a second ago": (lambda rig: lies.late(1.0), None),
+    "reads back a drift": (lambda rig: read_errors.drift(rig.random.choice((3.0, -3.0, 0.5))), None),
+    "reads back what it was": (lambda rig: read_errors.frozen(rig.axis.position_um), None),
+    "jumps by 1 mm for a moment": (lambda rig: read_errors.jumps(1000.0, rig.random.randint(1, 6)), None),
+    "jumps by 4 um every other time": (lambda rig: read_errors.jumps(4.0, 1), None),
+    "reads back anything": (lambda rig: read_errors.anything(rig.random, 60.0), None),
+    "reads back what was a second ago": (lambda rig: read_errors.late(1.0), None),
 }
 for _name, (_make, _likely) in LIES.items():
     attack(links=(*BUSES, "piezo"), name=_name)(
@@ -119,7 +119,7 @@ def takes_nothing(rig):
     rig.axis.obeys = False
     rig.machine.wants_um(WANTED_UM)
     rig.must(eventually(lambda: set(rig.daemon.status()["reasons"]) &
-                        {"mismatch", "mismatch_latched"}, 10.0), "no mismatch is told")
+                        {"mismatch", "mismatch_latched"}, 10.0), "no mismatch is reported")
     rig.axis.reports_position(rig.axis.position_um)
     rig.axis.obeys = True
     rig.follows_again()
@@ -132,9 +132,9 @@ def reads_back_no_numbers(rig):
         return
     rig.machine.wants_um(WANTED_UM)
     values = (math.nan, math.inf, -math.inf, 3.4e38, -3.4e38, 1e-40, 0.0)
-    rig.axis.lie = lies.numbers(rig.random, values[:rig.random.randint(1, len(values))])
+    rig.axis.read_error = read_errors.numbers(rig.random, values[:rig.random.randint(1, len(values))])
     time.sleep(LOOKED_AT_S)
-    rig.axis.lie = None
+    rig.axis.read_error = None
     rig.follows_again()
 
 
@@ -150,10 +150,10 @@ def two_daemons_on_one_controller(rig):
     second.start(may_refuse=True)
     time.sleep(0.5)
     rig.machine.wants_um(WANTED_UM)
-    told = eventually(lambda: any(
+    reported = eventually(lambda: any(
         daemon.alive() and latched(daemon) for daemon in (rig.daemon, second)) or
         not second.alive(), seen_within_s(rig))
-    rig.must(told, "neither says that somebody else writes")
+    rig.must(reported, "neither reports another writer")
     began = time.monotonic()
     time.sleep(1.0)
     writers = {write.writer for write in rig.axis.written_since(began)}
@@ -167,7 +167,7 @@ def late_on_a_link_that_is_lost(rig):
     """A correct controller with readings half a second old, on a link lost while the axis moves."""
     if not rig.start(BEFORE_UM):
         return
-    rig.axis.lie = lies.late(0.5)
+    rig.axis.read_error = read_errors.late(0.5)
     for attempt in range(6):
         rig.tries += 1
         rig.machine.wants_um(WANTED_UM if attempt % 4 < 2 else -WANTED_UM)
@@ -176,7 +176,7 @@ def late_on_a_link_that_is_lost(rig):
             rig.machine.slave.session += 1
         else:
             rig.machine.slave.drop_links()
-    rig.axis.lie = None
+    rig.axis.read_error = None
     rig.follows_again()
 
 
@@ -211,20 +211,20 @@ def wrong_read_back_at_release(rig):
         return
     for _ in range(3):
         rig.tries += 1
-        rig.axis.lie = lies.constant(rig.random.choice((9.0, -9.0, 400.0)))
+        rig.axis.read_error = read_errors.constant(rig.random.choice((9.0, -9.0, 400.0)))
         rig.machine.wants_um(rig.random.uniform(WANTED_UM, -WANTED_UM))
         rig.must(eventually(lambda: latched(rig.daemon), 8.0), "a mismatch is not latched")
-        rig.axis.lie = None
+        rig.axis.read_error = None
         time.sleep(rig.random.uniform(0.0, 0.6))
         rig.release()
         time.sleep(rig.random.uniform(0.0, 0.06))
-        rig.axis.lie = rig.random.choice((lies.constant(rig.random.uniform(-12.0, 12.0)),
-                                          lies.factor(0.5), lies.factor(-1.0)))
+        rig.axis.read_error = rig.random.choice((read_errors.constant(rig.random.uniform(-12.0, 12.0)),
+                                          read_errors.factor(0.5), read_errors.factor(-1.0)))
         for _ in range(rig.random.randint(0, 4)):
             time.sleep(rig.random.uniform(0.0, 0.1))
             rig.release()
         time.sleep(rig.random.choice((0.02, 0.2, 1.0)))
-    rig.axis.lie = None
+    rig.axis.read_error = None
     rig.follows_again()
 
 
@@ -235,7 +235,7 @@ def adds_from_now_on_and_is_released(rig):
     if not rig.start(BEFORE_UM):
         return
     stood_um, added_um = rig.axis.position_um, rig.random.choice((6.0, -6.0))
-    rig.axis.lie = lies.constant(added_um)
+    rig.axis.read_error = read_errors.constant(added_um)
     rig.must(eventually(lambda: latched(rig.daemon), 8.0), "a mismatch is not latched")
     for _ in range(5):
         rig.tries += 1
@@ -245,7 +245,7 @@ def adds_from_now_on_and_is_released(rig):
     # The axis also moves towards its target until it is latched again.
     rig.must(abs(rig.axis.position_um - stood_um) < 1.5 * abs(added_um),
              f"walks from {stood_um:.1f} to {rig.axis.position_um:.1f} um, release by release")
-    rig.axis.lie = None
+    rig.axis.read_error = None
     rig.follows_again()
 
 
@@ -293,7 +293,7 @@ def home_when_read(axis):
         axis.before_shown = lambda: None
         axis.reports_position(0.0)
     axis.before_shown = home
-    eventually(lambda: axis.told, 5.0)
+    eventually(lambda: axis.mismatch, 5.0)
 
 
 @attack(links=("tcp", "rtu", "can", "can_travel"))
@@ -323,7 +323,7 @@ def applied_cannot_be_read(rig):
     time.sleep(2.0)
     rig.must(not rig.axis.writes, "driven without ever having been read")
     rig.must(rig.daemon.status()["mode"] != "compensating" or not rig.daemon.axis()["driven"],
-             "says that it compensates")
+             "reports that it compensates")
     registers.refused = lambda function, *_: 0
     rig.daemon.wait_for("compensating")
     rig.follows_again()

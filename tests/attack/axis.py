@@ -42,7 +42,7 @@ class Writer:
 
 
 class Axis:
-    """`shown_um()` is the read-back: the position, unless `lie` is set."""
+    """`shown_um()` is the read-back: the position, unless `read_error` is set."""
 
     def __init__(self, bound_um, rate_um_per_s):
         self.lock = threading.RLock()
@@ -50,11 +50,11 @@ class Axis:
         self.rate_um_per_s = rate_um_per_s
         self.position_um = 0.0
         self.obeys = True
-        self.lie = None
-        self.lied = False
+        self.read_error = None
+        self.had_read_error = False
         self.writes = []
         self.writers = {}
-        self.told = {}  # before the first write; writer: (time of the first read, last readings)
+        self.first_reads = {}  # before the first write; writer: (time of the first read, last readings)
         self.under_way = set()  # writers with possibly one value in transit from before a restart
         self.before_shown = lambda: None
 
@@ -63,17 +63,17 @@ class Axis:
         with self.lock:
             last = self.writers.get(writer)
             if last is None:
-                if writer in self.under_way and writer not in self.told:
+                if writer in self.under_way and writer not in self.first_reads:
                     self.under_way.discard(writer)
                     return
-                told_at, readings_um = self.told.get(writer, (now, [self.position_um]))
-                if now < told_at:
+                read_at, readings_um = self.first_reads.get(writer, (now, [self.position_um]))
+                if now < read_at:
                     return  # sent before the restart, which drops the controller's queue
                 # The first write starts from one of the readings.
                 stood_um = min(readings_um, key=lambda um: abs(value_um - um))
                 if abs(value_um - self.position_um) < abs(value_um - stood_um):
                     stood_um = self.position_um  # a variable error: the true position is right too
-                last = Writer(stood_um, told_at, told_at)
+                last = Writer(stood_um, read_at, read_at)
             self.under_way.discard(writer)
             self.writes.append(Write(now, last.since_s, last.value_um, value_um, writer,
                                      self.bound_um, self.rate_um_per_s))
@@ -90,10 +90,10 @@ class Axis:
         with self.lock:
             self.before_shown()
             now = time.monotonic()
-            self.lied = self.lied or self.lie is not None
-            shown_um = self.position_um if self.lie is None else self.lie(self, now)
+            self.had_read_error = self.had_read_error or self.read_error is not None
+            shown_um = self.position_um if self.read_error is None else self.read_error(self, now)
             if writer not in self.writers and math.isfinite(shown_um):
-                self.told.setdefault(writer, (now, collections.deque(maxlen=64)))[1].append(shown_um)
+                self.first_reads.setdefault(writer, (now, collections.deque(maxlen=64)))[1].append(shown_um)
             return shown_um
 
     def reports_position(self, position_um):
@@ -101,7 +101,7 @@ class Axis:
         compared with the position at its next read. A writer of this value continues."""
         with self.lock:
             self.position_um = position_um
-            for writer in {**self.writers, **self.told}:
+            for writer in {**self.writers, **self.first_reads}:
                 last = self.writers.get(writer)
                 if last is None or last.value_um != position_um:
                     self.begin_anew(writer)
@@ -109,7 +109,7 @@ class Axis:
     def begin_anew(self, writer=None):
         with self.lock:
             self.under_way |= self.writers.keys() if writer is None else {writer}
-            for each in (self.writers, self.told):
+            for each in (self.writers, self.first_reads):
                 for one in [writer] if writer is not None else list(each):
                     each.pop(one, None)
 

@@ -87,11 +87,11 @@ class PiezoAmplifier:
     def show(self, function, address, count):
         if function == 4 and address <= APPLIED < address + count:
             volts = self.volts[-1] if self.volts else 0.0
-            if self.axis.lie is not None:
-                self.axis.lied = True
+            if self.axis.read_error is not None:
+                self.axis.had_read_error = True
                 with self.axis.lock:
                     stands, self.axis.position_um = self.axis.position_um, volts
-                    volts = self.axis.lie(self.axis, 0.0)
+                    volts = self.axis.read_error(self.axis, 0.0)
                     self.axis.position_um = stands
             self.registers.put(4, APPLIED, [max(0, min(65535, round(100 * volts)))])
 

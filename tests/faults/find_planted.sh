@@ -25,15 +25,15 @@ while read -r _ bug; do
   printf '%-34s %-30s %5s %14s\n' "$bug" "$invariant" "$seed" "$hours"
 done < <("$program" --list | grep '^planted ')
 # Each kind of false read-back alone must find a bug in the check against it.
-while read -r lie bug; do
-  out=$("$program" --planted "$bug" --only "$lie" --expect-found --seeds 0:200 "${lives[@]}" \
+while read -r fault bug; do
+  out=$("$program" --planted "$bug" --only "$fault" --expect-found --seeds 0:200 "${lives[@]}" \
     2>/dev/null) || true
   if ! read -r _ invariant seed hours < <(grep '^FOUND' <<<"$out"); then
-    printf '%-34s NOT FOUND by %s alone\n' "$bug" "$lie"
+    printf '%-34s NOT FOUND by %s alone\n' "$bug" "$fault"
     missed=1
     continue
   fi
-  printf '%-34s %-30s %5s %14s  %s alone\n' "$bug" "$invariant" "$seed" "$hours" "$lie"
+  printf '%-34s %-30s %5s %14s  %s alone\n' "$bug" "$invariant" "$seed" "$hours" "$fault"
 done <<'END'
 read_back_scaled read_back_is_a_command
 read_back_negated read_back_is_a_command

@@ -373,9 +373,9 @@ class Case:
         for name, fault in self.faults.items():  # as used by the daemon
             if fault == "unconfirmed":  # the daemon stopped within its settle_s; a scan has no history
                 continue
-            said = shown.get(name, "nothing")
-            said = "none" if re.fullmatch(r"-?\d.*", said) else said
-            self.compare("scan", name + " beside the daemon", fault, said)
+            output = shown.get(name, "nothing")
+            output = "none" if re.fullmatch(r"-?\d.*", output) else output
+            self.compare("scan", name + " beside the daemon", fault, output)
 
     def daemon(self):
         wanted = self.expected["daemon"]
@@ -467,9 +467,9 @@ class Case:
         self.is_well = exit_status == 0 or (status["mode"] == "dry_run" and not status["reasons"])
         if "status_exit" in wanted:
             self.compare("daemon", "exit status of `status`", wanted["status_exit"], exit_status)
-        said = log.read_text() + json.dumps(status, ensure_ascii=False) + text
-        self.words("daemon", wanted, said)
-        self.said = said
+        output = log.read_text() + json.dumps(status, ensure_ascii=False) + text
+        self.words("daemon", wanted, output)
+        self.output = output
         found, self.wrong = self.wrong, kept
         return found
 
@@ -480,7 +480,7 @@ class Case:
         for line in self.wrong:
             print("WRONG", line)
         if self.wrong and "daemon" in self.expected:
-            print("---- status\n" + getattr(self, "said", ""))
+            print("---- status\n" + getattr(self, "output", ""))
         shutil.rmtree(self.room, ignore_errors=True)
         return 1 if self.wrong else 0
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "common/fuzz.hpp"
-#include "gateway/door/request_rules.hpp"
+#include "gateway/http/request_rules.hpp"
 
 using namespace thermocomp;
 using namespace thermocomp::gateway;

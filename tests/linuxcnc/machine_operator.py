@@ -115,23 +115,23 @@ class Operator:
 
     def messages(self):
         """Messages of LinuxCNC since the last call."""
-        said = []
+        output = []
         while True:
             one = self.errors.poll()
             if not one:
-                return said
-            said.append(str(one[1]))
+                return output
+            output.append(str(one[1]))
 
     def pins(self, *names):
         return [hal.get_value(name) for name in names]
 
     def halcmd(self, *arguments):
         """[status, output]. Output to a file: processes of loadusr would keep a pipe open."""
-        with tempfile.TemporaryFile("w+") as said:
-            status = subprocess.run(["halcmd", *arguments], stdout=said, stderr=said,
+        with tempfile.TemporaryFile("w+") as output:
+            status = subprocess.run(["halcmd", *arguments], stdout=output, stderr=output,
                                     timeout=PATIENCE_S, check=False).returncode
-            said.seek(0)
-            return [status, said.read()]
+            output.seek(0)
+            return [status, output.read()]
 
     def end_bridge(self, how, name):
         """Sends a signal to the process of this HAL component, found from within the namespaces."""

@@ -112,6 +112,6 @@ def test_lost_data_in_mid_program_hold_the_offset_and_warn(mill):
         assert np.abs(seen.applied_um - held_um).max() <= 0.1
     print(f"\n{WAY}: without thermocouples, then without the daemon, the drives keep their offsets"
           f" within {max(np.abs(s.applied_um - held_um).max() for s in held + alone):.3f} um")
-    said = "".join(mill.cnc.messages())
-    assert "they are held" in said, said
+    output = "".join(mill.cnc.messages())
+    assert "they are held" in output, output
     mill.cnc.abort()

@@ -278,7 +278,7 @@ int main(int argc, char** argv) {
     return 3;
   }
   if (!probe.with_wrong_sensor.was_weighed_down()) {
-    std::printf("a sensor that lies was not weighed down\n");
+    std::printf("the weight of a faulty sensor was not reduced\n");
     return 3;
   }
   return counts.allocations + counts.locks + counts.system_calls == 0 && counts.page_faults == 0

@@ -31,8 +31,8 @@ std::string gap_line(const HistoryClock& clock, const SegmentInfo& before, const
 }
 
 /// Whether the whole segment is outside [from, to), as far as seconds tell.
-bool is_beside(const HistoryClock& clock, const SegmentInfo& segment,
-               const std::optional<HistoryTime>& from, const std::optional<HistoryTime>& to) {
+bool is_outside(const HistoryClock& clock, const SegmentInfo& segment,
+                const std::optional<HistoryTime>& from, const std::optional<HistoryTime>& to) {
   const auto end = static_cast<std::uint64_t>(segment.last_cycle + 1);
   const bool is_before_it =
       from && from->seconds && clock.seconds_at(segment, end) < *from->seconds;
@@ -94,7 +94,7 @@ class RunExport {
   ExportSummary run(const Progress& progress) {
     std::size_t done = 0;
     for (const SegmentInfo& segment : reader_.segments()) {
-      if (!is_beside(clock_, segment, from_, to_)) take(segment);
+      if (!is_outside(clock_, segment, from_, to_)) take(segment);
       ++done;
       if (progress) {
         progress(static_cast<double>(done) / static_cast<double>(reader_.segments().size()));
@@ -110,7 +110,7 @@ class RunExport {
     std::map<std::int64_t, std::vector<bool>> probed;
     for (const SegmentInfo& segment : reader_.segments()) {
       const auto setup = setups_.all().find(segment.setup);
-      if (setup == setups_.all().end() || is_beside(clock_, segment, from_, to_)) continue;
+      if (setup == setups_.all().end() || is_outside(clock_, segment, from_, to_)) continue;
       const std::size_t axes = setup->second.estimator.axes.size();
       std::vector<bool>& all = probed[segment.setup];
       all.resize(axes, false);

@@ -193,8 +193,8 @@ void HistoryStore::rescue(const std::string& changed) {
       std::filesystem::remove(config_.file.string() + end, ignored);
   }
   ++replaced_;
-  news_.push_back(changed + " was removed, replaced or cut while the history was written; " +
-                  (has_database ? "reopened" : "a new history begins"));
+  messages_.push_back(changed + " was removed, replaced or cut while the history was written; " +
+                      (has_database ? "reopened" : "a new history begins"));
 }
 
 /// Held until the end, also while the file is closed, moved aside or missing.
@@ -237,8 +237,8 @@ void HistoryStore::forget_lost_tokens() {
   const std::int64_t chunks = database_->number("SELECT count(*) FROM chunk");
   if (chunks < chunks_before_) {
     tokens_.clear();
-    news_.push_back(fmt::format("{} of {} committed parts are lost with it",
-                                chunks_before_ - chunks, chunks_before_));
+    messages_.push_back(fmt::format("{} of {} committed parts are lost with it",
+                                    chunks_before_ - chunks, chunks_before_));
   }
   chunks_before_ = 0;
   std::erase_if(tokens_, [this](const Tokens::value_type& token) {
@@ -271,14 +271,14 @@ void HistoryStore::move_aside(const std::string& why) noexcept {
       to = from + ".damaged-" + utc_stamp() + "-" + std::to_string(i);
     }
     ++replaced_;
-    news_.push_back(why + "; moved to " + to + ", a new history begins");
+    messages_.push_back(why + "; moved to " + to + ", a new history begins");
     std::error_code ignored;
     std::filesystem::rename(from, to, ignored);
     for (const char* end : {"-wal", "-shm"}) {
       std::filesystem::rename(from + end, to + end, ignored);
     }
   } catch (const std::exception& error) {
-    news_.push_back(std::string("a damaged file could not be moved aside: ") + error.what());
+    messages_.push_back(std::string("a damaged file could not be moved aside: ") + error.what());
   }
 }
 
@@ -456,7 +456,7 @@ void HistoryStore::report_deleted(std::int64_t count, std::int64_t records,
                                   const std::string& why) {
   if (count == 0) return;
   deleted_ += static_cast<std::uint64_t>(count);
-  news_.push_back(
+  messages_.push_back(
       fmt::format("the oldest {} segments ({} records) deleted: {}", count, records, why));
 }
 

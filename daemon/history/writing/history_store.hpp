@@ -106,7 +106,9 @@ class HistoryStore {
   void keep_within_bounds(std::int64_t current_token);
 
   /// Deleted segments and replaced or moved files since the last call, one sentence each.
-  [[nodiscard]] std::vector<std::string> take_news() noexcept { return std::exchange(news_, {}); }
+  [[nodiscard]] std::vector<std::string> take_messages() noexcept {
+    return std::exchange(messages_, {});
+  }
   [[nodiscard]] std::uint64_t deleted() const noexcept { return deleted_; }    ///< segments
   [[nodiscard]] std::uint64_t replaced() const noexcept { return replaced_; }  ///< times
   [[nodiscard]] std::uint64_t bytes() const noexcept { return bytes_; }
@@ -160,7 +162,7 @@ class HistoryStore {
   std::uint64_t segments_{0};
   std::uint64_t deleted_{0};
   std::uint64_t replaced_{0};
-  std::vector<std::string> news_;
+  std::vector<std::string> messages_;
 };
 
 }  // namespace thermocomp

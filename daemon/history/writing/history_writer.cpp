@@ -28,7 +28,7 @@ constexpr double commit_s_max = 9.5;
 constexpr std::size_t chunk_bytes_max = std::size_t{512} * 1024;
 constexpr double backoff_s_max = 60.0;
 /// More than a client that polls every second can miss.
-constexpr std::ptrdiff_t news_max = 100;
+constexpr std::ptrdiff_t messages_max = 100;
 /// SQLite needs little; the default of 8 MB would be locked completely.
 constexpr std::size_t stack_bytes = std::size_t{512} * 1024;
 
@@ -79,7 +79,7 @@ struct HistoryWriter::Parts {
   std::vector<Event> events;  ///< not yet committed
   std::uint16_t next_session{1};
   HistoryStatistics statistics;
-  std::vector<std::string> news;
+  std::vector<std::string> messages;
   std::optional<nanoseconds> last_commit;
 
   // The writer's thread only (and start() before it runs).
@@ -282,10 +282,11 @@ bool HistoryWriter::Parts::write() {
 }
 
 void HistoryWriter::Parts::take_from_store() {
-  std::vector<std::string> fresh = store.take_news();
+  std::vector<std::string> fresh = store.take_messages();
   const std::lock_guard lock(mutex);
-  std::move(fresh.begin(), fresh.end(), std::back_inserter(news));
-  if (std::ssize(news) > news_max) news.erase(news.begin(), news.end() - news_max);
+  std::move(fresh.begin(), fresh.end(), std::back_inserter(messages));
+  if (std::ssize(messages) > messages_max)
+    messages.erase(messages.begin(), messages.end() - messages_max);
   statistics.segments = store.segments();
   statistics.bytes = store.bytes();
   statistics.deleted = store.deleted();
@@ -444,9 +445,9 @@ void HistoryWriter::ask_to_stop() noexcept {
   parts_->wake.notify_all();
 }
 
-std::vector<std::string> HistoryWriter::take_news() {
+std::vector<std::string> HistoryWriter::take_messages() {
   const std::lock_guard lock(parts_->mutex);
-  return std::exchange(parts_->news, {});
+  return std::exchange(parts_->messages, {});
 }
 
 HistoryStatistics HistoryWriter::statistics() const {

@@ -65,8 +65,8 @@ class HistoryWriter {
                                                              const Estimator& estimator);
   /// Adds an event to the next commit. Any ordinary thread.
   void note(Event event);
-  /// Opens the file and starts the thread. A damaged file is moved aside, with an entry in the
-  /// news; a failing disk is retried without limit.
+  /// Opens the file and starts the thread. A damaged file is moved aside, with a
+  /// message; a failing disk is retried without limit.
   /// @throws HistoryError when the file is of a newer version or another program, or in use
   void start();
   /// For callers with their own clock and without the thread: start() without the thread, and the
@@ -80,7 +80,7 @@ class HistoryWriter {
   [[nodiscard]] bool stop_within(std::chrono::seconds at_most) noexcept;
   [[nodiscard]] HistoryStatistics statistics() const;
   /// News about rows or files since the last call, one sentence each. Any ordinary thread.
-  [[nodiscard]] std::vector<std::string> take_news();
+  [[nodiscard]] std::vector<std::string> take_messages();
 
  private:
   void ask_to_stop() noexcept;

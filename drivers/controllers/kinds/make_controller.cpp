@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::uint32_t only_epoch = 1;
 
-std::array<double, axes_max> none_known() noexcept {
+std::array<double, axes_max> all_unknown() noexcept {
   std::array<double, axes_max> values{};
   values.fill(not_a_number);
   return values;
@@ -25,8 +25,8 @@ DryRunController::DryRunController(DryRunControllerConfig config,
                                    std::unique_ptr<ControllerLink> read)
     : config_(std::move(config)),
       read_(std::move(read)),
-      applied_um_(none_known()),
-      shown_um_(none_known()) {
+      applied_um_(all_unknown()),
+      shown_um_(all_unknown()) {
   require(config_.axes <= axes_max, "axes", static_cast<double>(config_.axes),
           "a controller has at most 16 axes");
   for (std::size_t axis = 0; axis < config_.axes; ++axis) applied_um_[axis] = 0.0;

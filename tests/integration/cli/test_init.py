@@ -153,11 +153,11 @@ def test_nothing_answered_is_lost_to_a_mistake_or_a_step_back(foreign, folder):
                "Z"]
     status, shown = converse(["init", config], answers)
     assert status == 0, shown
-    for said in ("    wago_750_464: WAGO, 750-464, two or four RTD", "wago_750 is not a preset",
+    for output in ("    wago_750_464: WAGO, 750-464, two or four RTD", "wago_750 is not a preset",
                  "bed: the names of sensors must be unique",
                  f"Module of unit 4 on bus1 (127.0.0.1:{modules})", "In word order CDAB all give",
                  "is left out: it has no module"):
-        assert said in shown, (said, shown)
+        assert output in shown, (output, shown)
     assert "pixsys" not in shown  # does not match "Wago"
     text = config.read_text()
     assert text.count('\n[[bus]]\n') == 1 and 'word_order = "CDAB"' in text
@@ -220,14 +220,14 @@ def test_what_a_model_needs_is_asked_for(foreign, folder):
     arguments = ["init", config, "--bus", f"tcp:127.0.0.1:{modules}", "--module",
                  "3=wago_750_458:1-2", "--model", folder / "mill.toml"]
     plc_there = ["--controller", f"tcp:127.0.0.1:{plc}"]
-    for more, said in ((["--names", "bed,x", "--controller", "none"], "give it by --controller"),
+    for more, output in ((["--names", "bed,x", "--controller", "none"], "give it by --controller"),
                        (["--names", "bed,x", *plc_there], "--signal spindle_rpm=TABLE:ADDRESS"),
                        (["--names", "x", *plc_there, "--signal", "spindle_rpm=input:26:uint16"],
                         "1 names for 2 sensors: m3_1 m3_2"),
                        (["--names", "x,y", *plc_there, "--signal", "spindle_rpm=input:26:uint16"],
                         "name a sensor bed (--names)")):
         answer = run(*arguments, *more)
-        assert answer.returncode == 2 and said in answer.stderr, answer.stdout + answer.stderr
+        assert answer.returncode == 2 and output in answer.stderr, answer.stdout + answer.stderr
         assert answer.stderr.count("\n") - answer.stderr.count("reading") <= 1, answer.stderr
         assert not config.exists()
     status, shown = converse([*arguments, "--names", "bed,x"], ["bed column", f"tcp:127.0.0.1:{plc}", "yes", "none",

@@ -44,7 +44,7 @@ def growth_um_per_K(answer, folder):
     return tomllib.loads((folder / "model.toml").read_text())["matrix_um_per_K"][0][0]
 
 
-def said(answer):
+def output(answer):
     """The message after the progress."""
     assert answer.returncode == 2
     lines = [line for line in answer.stderr.splitlines() if "thermocomp" in line]
@@ -64,7 +64,7 @@ def test_a_mesh_is_read_from_the_build_tree_and_where_it_is_installed(alone, tmp
 
 @pytest.mark.parametrize("command", ["structure", "place"])
 def test_a_missing_module_is_one_line_with_the_places_and_the_package(alone, tmp_path, command):
-    line = said(structure(alone, tmp_path, command=command))
+    line = output(structure(alone, tmp_path, command=command))
     for part in [MODULE, f"{tmp_path}/bin", f"{tmp_path}/lib/thermocomp",
                  "package thermocomp-modelling", "libgmsh4.8"]:
         assert part in line
@@ -73,15 +73,15 @@ def test_a_missing_module_is_one_line_with_the_places_and_the_package(alone, tmp
 def test_what_cannot_be_loaded_is_one_line_with_the_file_and_the_reason(alone, tmp_path):
     module = tmp_path / "bin" / MODULE
     module.write_text("no library")
-    assert f"{module}: " in said(structure(alone, tmp_path))
+    assert f"{module}: " in output(structure(alone, tmp_path))
     # A library without the functions for meshes.
     shutil.copy(next(pathlib.Path("/usr/lib").glob("*/libdl.so.2")), module)
-    line = said(structure(alone, tmp_path))
+    line = output(structure(alone, tmp_path))
     assert str(module) in line and "thermocomp_gmsh_functions" in line
 
 
 def test_a_mesh_in_text_needs_no_reader_but_what_factorises(alone, tmp_path):
-    line = said(structure(alone, tmp_path, mesh="cube.inp"))
+    line = output(structure(alone, tmp_path, mesh="cube.inp"))
     for part in [FACTORISES, f"{tmp_path}/bin", f"{tmp_path}/lib/thermocomp",
                  "package thermocomp-modelling", "libcholmod3"]:
         assert part in line

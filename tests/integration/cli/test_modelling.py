@@ -34,8 +34,8 @@ def test_where_a_command_is_missing_those_that_there_are_are_named():
 
 def test_help_tells_the_exit_statuses_of_this_command():
     for command in (["thermal-test", "plan"], ["thermal-test", "report"], ["plan"], ["fit"]):
-        said = run(*command, "--help").stdout
-        assert "Exit status: 0 success, 2 usage error or bad input.\n" in said, (command, said)
+        result = run(*command, "--help").stdout
+        assert "Exit status: 0 success, 2 usage error or bad input.\n" in result, (command, result)
     assert "Exit status: 0 nothing found, 1 a fault or a departure, 2" in run("inspect", "--help").stdout
 
 
@@ -112,14 +112,14 @@ def test_fit_finds_the_equation_and_its_model_predicts(tmp_path):
     answer = run("fit", *files, "--outputs", "z_um", "--terms", "2", "-o", model, "--json",
                  "--report", tmp_path / "fit.html")
     assert answer.returncode == 0, answer.stderr
-    said = json.loads(answer.stdout)
-    assert said["inputs"] == ["t1_degC", "t3_degC"]
-    assert said["left_out_rms_um"]["z_um"] < 0.5
-    coefficients = {term["place"]: term["um_per_K"] for term in said["terms"]["z_um"]}
+    result = json.loads(answer.stdout)
+    assert result["inputs"] == ["t1_degC", "t3_degC"]
+    assert result["left_out_rms_um"]["z_um"] < 0.5
+    coefficients = {term["place"]: term["um_per_K"] for term in result["terms"]["z_um"]}
     assert coefficients["t1_degC"] == pytest.approx(5, abs=0.1)
     assert coefficients["t3_degC"] == pytest.approx(-2, abs=0.1)
     page = (tmp_path / "fit.html").read_text()
-    left_um, none_um = said["left_out_rms_um"]["z_um"], said["no_model_rms_um"]["z_um"]
+    left_um, none_um = result["left_out_rms_um"]["z_um"], result["no_model_rms_um"]["z_um"]
     assert f"the model leaves {left_um:.2f} µm RMS of {none_um:.1f} µm." in page and "<svg" in page
     predicted = run("predict", "--model", model, files[0], "-o", tmp_path / "out.csv")
     assert predicted.returncode == 0 and float(predicted.stderr.split()[1]) < 0.6
@@ -130,12 +130,12 @@ def test_fit_without_options_compares_families_and_says_where_its_model_holds(tm
     model = tmp_path / "model.toml"
     answer = run("fit", *files, "--outputs", "z_um", "-o", model, "--json")
     assert answer.returncode == 0, answer.stderr
-    said = json.loads(answer.stdout)
-    assert [each["family"] for each in said["families"]] == [
+    result = json.loads(answer.stdout)
+    assert [each["family"] for each in result["families"]] == [
         "none", "static_few", "lagged_few", "physical", "lag_bank"]
-    assert sum(each["chosen"] for each in said["families"]) == 1
-    assert said["families"][3]["left_out_rms_um"] is None  # there is no signal
-    assert said["left_out_rms_um"]["z_um"] < 1.0
+    assert sum(each["chosen"] for each in result["families"]) == 1
+    assert result["families"][3]["left_out_rms_um"] is None  # there is no signal
+    assert result["left_out_rms_um"]["z_um"] < 1.0
     out = tmp_path / "out.csv"
     predicted = run("predict", "--model", model, files[0], "-o", out)
     assert predicted.returncode == 0
@@ -168,8 +168,8 @@ def test_probings_that_missed_are_left_out_by_diagnose_with_a_line(tmp_path):
                  "--json", tmp_path / "out.json")
     assert answer.returncode == 0, answer.stderr
     assert "missed.csv: z_um: 3 values are left out" in answer.stderr, answer.stderr
-    said = json.loads((tmp_path / "out.json").read_text())
-    assert said["baseline"]["z_um"]["test_rms_um"] < 1.0, said["baseline"]
+    result = json.loads((tmp_path / "out.json").read_text())
+    assert result["baseline"]["z_um"]["test_rms_um"] < 1.0, result["baseline"]
 
 
 def test_one_run_is_said_to_judge_itself_and_the_same_rows_twice_are_refused(tmp_path):
@@ -186,8 +186,8 @@ def test_tiebar_gives_both_coefficients(tmp_path):
     answer = run("tiebar", EXAMPLES / "gate_machine.toml", "--json", "--ratio", "0.2",
                  "--curves", tmp_path / "curves.svg")
     assert answer.returncode == 0, answer.stderr
-    said = json.loads(answer.stdout)
-    assert set(said) >= {"Ki_um_per_K", "Kc_um_per_K", "best_tie_height_mm"}
+    result = json.loads(answer.stdout)
+    assert set(result) >= {"Ki_um_per_K", "Kc_um_per_K", "best_tie_height_mm"}
     assert (tmp_path / "curves.svg").read_text().startswith("<svg")
 
 
@@ -209,9 +209,9 @@ def test_tiebar_chooses_ties_for_a_measured_course(tmp_path):
     answer = run("tiebar", EXAMPLES / "gate_machine_two_ties.toml", "--course", write_oil(tmp_path),
                  "--optimise", "--picture", tmp_path / "ties.svg", "--json")
     assert answer.returncode == 0, answer.stderr
-    said = json.loads(answer.stdout)
-    assert len(said["ties"]) == len(said["best"]["ties"]) == 2
-    course, = said["courses"]
+    result = json.loads(answer.stdout)
+    assert len(result["ties"]) == len(result["best"]["ties"]) == 2
+    course, = result["courses"]
     assert course["swing_best_um"] < course["swing_drawn_um"] < course["swing_without_um"]
     assert "best ties" in (tmp_path / "ties.svg").read_text()
 
@@ -241,15 +241,15 @@ def test_bad_use_and_bad_input_are_refused(tmp_path, arguments, names):
 
 def test_place_recommends_and_writes_what_others_read(tmp_path):
     meshio = pytest.importorskip("meshio", reason="python3-meshio is not installed")
-    said = run("place", SOURCE / "config/demo/structure.toml", "--vtu", tmp_path / "fields.vtu",
+    result = run("place", SOURCE / "config/demo/structure.toml", "--vtu", tmp_path / "fields.vtu",
                "--page", tmp_path / "place.html")
-    assert said.returncode == 0, said.stderr
-    assert len(said.stdout.splitlines()) <= 15, said.stdout
-    assert "sensors one by one" in said.stderr
+    assert result.returncode == 0, result.stderr
+    assert len(result.stdout.splitlines()) <= 15, result.stdout
+    assert "sensors one by one" in result.stderr
     full = json.loads(run("place", SOURCE / "config/demo/structure.toml", "--json").stdout)
     best = min((each for each in full["methods"].values() if each["sensors"]),
                key=lambda each: each["left_out"]["rms_um"])
-    assert f"They leave {best['left_out']['rms_um']:.2f} um RMS" in said.stdout
+    assert f"They leave {best['left_out']['rms_um']:.2f} um RMS" in result.stdout
     mesh = meshio.read(tmp_path / "fields.vtu")
     rise_K, moved_um = mesh.point_data["wet_shift_14400s_K"], mesh.point_data["wet_shift_14400s_um"]
     assert moved_um.shape == (len(mesh.points), 3)

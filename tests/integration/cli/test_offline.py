@@ -33,7 +33,7 @@ def predict(files, run_argument="run.csv", output="out.csv"):
 def test_help_succeeds_and_bad_use_is_status_2():
     assert run("--help").returncode == 0
     assert run("predict", "--help").returncode == 0
-    for arguments, said in (
+    for arguments, result in (
             ([], "thermocomp: which command? One of: init, "), (["nosuch"], "no command nosuch\n"),
             (["enabel"], "thermocomp: no command enabel; did you mean enable?"),
             (["history"], "thermocomp history: which command? One of: check.\n"),
@@ -45,7 +45,7 @@ def test_help_succeeds_and_bad_use_is_status_2():
             (["check", "a", "b"], "b"), (["watch", "--for", "-1"], "-1")):
         answer = run(*arguments)
         assert answer.returncode == 2, arguments
-        assert said in answer.stderr, (arguments, answer.stderr)
+        assert result in answer.stderr, (arguments, answer.stderr)
 
 
 def test_check_says_when_a_first_start_compensates_at_once(tmp_path):
@@ -131,10 +131,10 @@ def test_bad_input_is_refused_by_name_and_leaves_no_output(files, name, text):
 
 
 def test_output_that_cannot_be_written_is_status_2(files):
-    for output, said in (("nosuch/out.csv", "No such file"), ("/dev/full", "No space left")):
+    for output, result in (("nosuch/out.csv", "No such file"), ("/dev/full", "No space left")):
         answer = predict(files, output=output)
         assert answer.returncode == 2
-        assert output in answer.stderr and said in answer.stderr, answer.stderr
+        assert output in answer.stderr and result in answer.stderr, answer.stderr
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason=f"no measured data at {DATA} (THERMOCOMP_DATA)")

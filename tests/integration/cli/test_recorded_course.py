@@ -54,10 +54,10 @@ def last_offset(lab, model, record):
 def test_two_days_stand_in_for_probings_on_a_third(lab):
     answer = correction(lab, "day_1.csv", "day_2.csv")
     assert answer.returncode == 0, answer.stderr
-    said = re.search(r"z_um: (\d+) probings taught gains, (\d+) kept; a run left out: RMS ([\d.]+) um "
+    printed = re.search(r"z_um: (\d+) probings taught gains, (\d+) kept; a run left out: RMS ([\d.]+) um "
                      r"\(without a record ([\d.]+) um\)", answer.stderr)
-    assert said, answer.stderr
-    assert float(said[3]) < 0.5 * float(said[4])
+    assert printed, answer.stderr
+    assert float(printed[3]) < 0.5 * float(printed[4])
     # The third day without its probings: its gain is 1.3, the model's 1.
     text = (lab / "day_3.csv").read_text().splitlines()
     (lab / "unprobed.csv").write_text(
@@ -77,9 +77,9 @@ def test_a_probing_that_missed_teaches_nothing(lab):
         rest, z_um = lines[row].rsplit(",", 1)
         lines[row] = f"{rest},{float(z_um) + 4300.0}"
     (lab / "missed.csv").write_text("\n".join(lines) + "\n")
-    said = correction(lab, "missed.csv", "day_2.csv").stderr
-    assert "missed.csv: z_um: 3 values are left out" in said, said
-    rms_um = [float(re.search(r"a run left out: RMS ([\d.]+) um", each)[1]) for each in (clean, said)]
+    printed = correction(lab, "missed.csv", "day_2.csv").stderr
+    assert "missed.csv: z_um: 3 values are left out" in printed, printed
+    rms_um = [float(re.search(r"a run left out: RMS ([\d.]+) um", each)[1]) for each in (clean, printed)]
     assert abs(rms_um[1] - rms_um[0]) < 0.2, rms_um
 
 
@@ -89,16 +89,16 @@ def test_one_day_is_said_to_prove_nothing_of_another(lab):
     assert "not tested on another" in answer.stderr
 
 
-@pytest.mark.parametrize("change, said", [
+@pytest.mark.parametrize("change, printed", [
     (('form = "recursive"', 'form = "off"'), 'form is "off"; choose'),
     (("spindle_degC\"]\n[[correction", "nothing_degC\"]\n[[correction"), "must be an input of the model"),
 ])
-def test_a_configuration_that_teaches_nothing(lab, change, said):
+def test_a_configuration_that_teaches_nothing(lab, change, printed):
     config = lab / "config.toml"
     config.write_text(config.read_text().replace(*change))
     answer = correction(lab, "day_1.csv")
     assert answer.returncode == 2
-    assert said in answer.stderr
+    assert printed in answer.stderr
     assert not (lab / "recorded.toml").exists()
 
 

@@ -110,8 +110,8 @@ def plain_fixture(tmp_path_factory):
         with files[-1].open("w", newline="", encoding="utf-8") as file:
             csv.writer(file).writerows([PLAIN, *simulated(test)])
     answers = answers_of(files, folder, [])
-    for said in answers["stderr"]:
-        assert "read as follows" not in said
+    for output in answers["stderr"]:
+        assert "read as follows" not in output
     return answers
 
 
@@ -140,11 +140,11 @@ def test_a_file_of_another_form_is_told_and_answered_like_the_plain_one(form, pl
         files[-1].write_bytes(text if isinstance(text, bytes) else text.encode())
     (tmp_path / "map.toml").write_text(columns, encoding="utf-8")
     answers = answers_of(files, tmp_path, ["--columns", tmp_path / "map.toml"])
-    for said in answers["stderr"]:
+    for output in answers["stderr"]:
         for file in files:
-            assert said.count(f"{file.name}: read as follows") == 1, said
+            assert output.count(f"{file.name}: read as follows") == 1, output
         for word in words:
-            assert word in said, said
+            assert word in output, output
     mine, own = answers["fit"], plain["fit"]
     assert mine["family"] == own["family"] and mine["inputs"] == own["inputs"]
     assert mine["left_out_rms_um"]["z_um"] == pytest.approx(own["left_out_rms_um"]["z_um"], 1e-3)

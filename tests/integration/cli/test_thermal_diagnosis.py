@@ -232,8 +232,8 @@ def test_the_corrected_machine_file_gives_what_was_measured(tmp_path, changed, k
     assert values[key] == pytest.approx(float(wanted[0].split("=")[1]), rel=0.1)
     after = diagnosis(out, runs)
     assert after["verdict"] == "none"
-    for sensor, said in before["extended"].items():
-        assert after["baseline"][sensor]["test_rms_K"] == pytest.approx(said["test_rms_K"], rel=1e-6)
+    for sensor, output in before["extended"].items():
+        assert after["baseline"][sensor]["test_rms_K"] == pytest.approx(output["test_rms_K"], rel=1e-6)
     worst = max(before["baseline"], key=lambda name: before["baseline"][name]["test_rms_K"])
     assert after["baseline"][worst]["test_rms_K"] < 0.3 * before["baseline"][worst]["test_rms_K"]
 

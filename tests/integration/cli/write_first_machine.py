@@ -22,7 +22,7 @@ def block(text):
     return "```\n" + plain.rstrip() + "\n```\n"
 
 
-def said(folder, *arguments):
+def printed(folder, *arguments):
     """A command as typed in the folder, with its output."""
     answer = subprocess.run([PROGRAM, *map(str, arguments)], cwd=folder, text=True, timeout=120,
                             stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
@@ -55,10 +55,10 @@ def first_outputs(folder):
     with running(config):
         eventually(lambda: run("--socket", "status.sock", "sensors",
                                cwd=folder).stdout.count("  good") == 5, "readings have arrived")
-        first = said(folder, *socket, "sensors")
+        first = printed(folder, *socket, "sensors")
         eventually(lambda: run("--socket", "status.sock", "prove", "z", "0.1",
                                            cwd=folder).returncode == 0, "the axis is in step")
-        first += "\n" + shortened(said(folder, *socket, "prove", "z", "5"))
+        first += "\n" + shortened(printed(folder, *socket, "prove", "z", "5"))
     return first.replace(str(folder) + "/", "")
 
 
@@ -66,10 +66,10 @@ def model_outputs(folder):
     (folder / "machine.toml").symlink_to(SOURCE / "config" / "examples" / "machine.toml")
     text = ""
     for day, seed in {"monday": 1, "tuesday": 2, "friday": 5}.items():
-        text += said(folder, "simulate", "machine.toml", "--seed", seed, "-o", f"{day}.csv")
-    text += "\n" + said(folder, "fit", "monday.csv", "tuesday.csv", "--outputs", "z_um", "-o",
+        text += printed(folder, "simulate", "machine.toml", "--seed", seed, "-o", f"{day}.csv")
+    text += "\n" + printed(folder, "fit", "monday.csv", "tuesday.csv", "--outputs", "z_um", "-o",
                         "fitted.toml")
-    text += "\n" + said(folder, "predict", "--model", "fitted.toml", "friday.csv", "-o",
+    text += "\n" + printed(folder, "predict", "--model", "fitted.toml", "friday.csv", "-o",
                         "predicted.csv")
     return text
 

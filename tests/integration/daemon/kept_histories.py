@@ -37,15 +37,15 @@ def replay(programs, folder):
     for history in histories:
         done = subprocess.run([str(programs / "thermocomp"), "replay", str(history), "-o",
                                os.devnull], capture_output=True, text=True, check=False)
-        said = re.search(r"(\d+) offsets compared, (\d+) differ", done.stderr)
+        output = re.search(r"(\d+) offsets compared, (\d+) differ", done.stderr)
         name = history.relative_to(folder)
-        if done.returncode not in (0, 1) or not said:
+        if done.returncode not in (0, 1) or not output:
             unread += 1
             print(f"{name}: {done.stderr.strip()}")
             continue
-        print(f"{name}: {said.group(0)}")
-        compared += int(said.group(1))
-        different += int(said.group(2))
+        print(f"{name}: {output.group(0)}")
+        compared += int(output.group(1))
+        different += int(output.group(2))
     print(f"{len(histories)} histories, {unread} not read, {compared} offsets compared, "
           f"{different} differ")
     return 0 if compared and not different and not unread else 1

@@ -223,9 +223,9 @@ class Lab:
                 process.wait(PATIENCE_S)
         shutil.rmtree(self.sockets, ignore_errors=True)
         for log in self.folder.glob("*.log"):
-            said = log.read_text(errors="replace")
+            output = log.read_text(errors="replace")
             for finding in ("Sanitizer: ", "runtime error: ", "broken promise: "):
-                assert finding not in said, said
+                assert finding not in output, output
 
 
 def read_columns(path):
@@ -239,8 +239,8 @@ def read_columns(path):
 
 def replay(history, out):
     """Exact replay: (exit status, columns, stderr)."""
-    status, _, said = run_tool("replay", history, "-o", out)
-    return status, read_columns(out) if status in (0, 1) else {}, said
+    status, _, output = run_tool("replay", history, "-o", out)
+    return status, read_columns(out) if status in (0, 1) else {}, output
 
 
 def first_cycle_s(history):
@@ -279,10 +279,10 @@ def same_bits(columns):
 
 def assert_replays_exactly(history, out):
     """Checks the statement of `thermocomp replay` and its columns. Returns the columns."""
-    status, columns, said = replay(history, out)
-    print(said.strip())
-    assert status == 0, said
+    status, columns, output = replay(history, out)
+    print(output.strip())
+    assert status == 0, output
     compared, different = same_bits(columns)
     assert compared > 0 and different == 0
-    assert f" {compared} offsets compared, 0 differ" in said
+    assert f" {compared} offsets compared, 0 differ" in output
     return columns

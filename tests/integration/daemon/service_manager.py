@@ -16,7 +16,7 @@ class ServiceManager:
         self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         self.socket.bind(str(path))
         self.lock = threading.Lock()
-        self.told = []
+        self.messages = []
         threading.Thread(target=self.listen, daemon=True).start()
 
     def listen(self):
@@ -28,11 +28,11 @@ class ServiceManager:
             if not text:
                 return
             with self.lock:
-                self.told.append((time.monotonic(), text))
+                self.messages.append((time.monotonic(), text))
 
     def times_of(self, word):
         with self.lock:
-            return [at for at, text in self.told if text.startswith(word)]
+            return [at for at, text in self.messages if text.startswith(word)]
 
     def close(self):
         self.socket.shutdown(socket.SHUT_RDWR)

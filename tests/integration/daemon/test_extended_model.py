@@ -53,10 +53,10 @@ def extended_model(folder):
     """The model extended by diagnose, with lags scaled to the replay."""
     run = folder / "heat.csv"
     write_machine_with_heat(run)
-    status, said, errors = run_tool("diagnose", "--model", spindle.MODEL, "--train", f"{run}@:60000",
+    status, printed, errors = run_tool("diagnose", "--model", spindle.MODEL, "--train", f"{run}@:60000",
                                     "--test", f"{run}@60000:", "--out", folder / "answer")
     assert status == 0, errors
-    assert "missing_heat_source of spindle_rpm" in said, said
+    assert "missing_heat_source of spindle_rpm" in printed, printed
     text = (folder / "answer" / "model.toml").read_text()
     assert (folder / "answer" / "report.html").stat().st_size > 10000
     tau_s = float(re.search(r"tau_s = ([0-9.e+-]+)", text)[1])
@@ -124,10 +124,10 @@ def test_the_offsets_of_an_extended_model_are_its_prediction(lab, bank):
     daemon.end()
 
     exported, out = lab.folder / "exported.csv", lab.folder / "predicted.csv"
-    status, _, said = run_tool("export", daemon.history, "-o", exported)
-    assert status == 0, said
-    status, _, said = run_tool("predict", "--model", model, exported, "-o", out)
-    assert status == 0, said
+    status, _, printed = run_tool("export", daemon.history, "-o", exported)
+    assert status == 0, printed
+    status, _, printed = run_tool("predict", "--model", model, exported, "-o", out)
+    assert status == 0, printed
     rows, predicted = read_columns(exported), read_columns(out)
     offsets = spindle.offsets_um(rows, "offset")
     wanted = -np.column_stack([predicted[f"ch{i + 1}_predicted_um"] for i in range(spindle.AXES)])

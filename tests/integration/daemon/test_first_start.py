@@ -190,7 +190,7 @@ def test_a_sensor_that_jumps_counts_only_once_an_operator_accepts_it(day):
     assert daemon.cli("accept", "column")[0] != 0  # no question
     show_column(68)  # degF
     eventually(lambda: "sensor_unconfirmed" in daemon.status()["reasons"] and
-               daemon.status()["mode"] == "holding", "the jump is told")
+               daemon.status()["mode"] == "holding", "the jump is reported")
     before_um = daemon.axis()["offset"]
     status, out, _ = daemon.cli("status")
     assert status == 1 and "accept column" in out, out

@@ -89,8 +89,8 @@ def test_a_disk_that_takes_seconds_to_save_the_state(lab, manager):
     watched.start()
     watched.stands.touch()
     warm(watched)
-    said = watched.ask("disable")
-    assert "carried out, but not saved" in said and "does not answer" in said, said
+    output = watched.ask("disable")
+    assert "carried out, but not saved" in output and "does not answer" in output, output
     assert watched.ask()["mode"] == "disabled"
     eventually(lambda: any("does not answer" in warning for warning in watched.ask()["warnings"]),
                "the status says so")
@@ -319,6 +319,6 @@ def test_a_history_that_is_a_pipe_is_refused_at_once(lab, command):
     os.mkfifo(pipe)
     out = () if command[-1] in ("check", "events") else ("-o", str(lab.folder / "out"))
     begun = time.monotonic()
-    status, _, said = run_tool(*command, pipe, *out)
-    assert status == 2 and "must be a regular file" in said, (status, said)
+    status, _, output = run_tool(*command, pipe, *out)
+    assert status == 2 and "must be a regular file" in output, (status, output)
     assert time.monotonic() - begun < 10.0

@@ -91,14 +91,14 @@ def test_an_amplifier_that_does_not_obey_is_seen_and_told_again(lab):
     eventually(lambda: abs(daemon.axis()["applied"] - 6.0) < 0.1, "applied as asked for")
     machine.amplifier.give(75.0)
     eventually(lambda: abs(daemon.axis()["applied"] + 1.3) < 0.2, "what 75 V stand for")
-    eventually(lambda: daemon.axis()["mismatch"], "the operator is told")
+    eventually(lambda: daemon.axis()["mismatch"], "the mismatch is reported")
     eventually(lambda: "mismatch_latched" in daemon.status()["reasons"], "and asked to mend it")
     eventually(lambda: "axis 1 shows 75" in daemon.status()["controller"]["last_error"],
                "and what the amplifier shows")
     disobeyed = len(machine.amplifier.all_volts())
     machine.amplifier.obey()
     # Releasing needs two equal read-backs: a changing one keeps the axis latched.
-    eventually(lambda: abs(daemon.axis()["applied"] - 6.0) < 0.1, "it shows what it was told")
+    eventually(lambda: abs(daemon.axis()["applied"] - 6.0) < 0.1, "it shows the offset it received")
     assert daemon.cli("release", "z")[0] == 0
     machine.reaches(6.0)
     eventually(lambda: 0.0 in machine.amplifier.all_volts()[disobeyed:], "by way of 0 V")

@@ -50,23 +50,23 @@ def test_a_broken_configuration_is_refused_by_daemon_and_check_alike(tmp_path, n
         assert text in model
         model = model.replace(text, instead, 1)
     path = write(tmp_path, config, model)
-    status, said = run_daemon(path)
-    assert status == 2 and named in said, said
+    status, output = run_daemon(path)
+    assert status == 2 and named in output, output
     checked, _, found = run_tool("check", path)
     assert checked == 2 and named in found
-    problems = [line for line in said.splitlines() if ".toml" in line]
+    problems = [line for line in output.splitlines() if ".toml" in line]
     assert problems and all(line in found for line in problems)
     assert not (tmp_path / "history.db").exists() and not (tmp_path / "state.json").exists()
 
 
 def test_a_good_configuration_passes_the_check(tmp_path):
-    status, out, said = run_tool("check", write(tmp_path, GOOD))
-    assert status == 0 and "OK" in out, said
+    status, out, output = run_tool("check", write(tmp_path, GOOD))
+    assert status == 0 and "OK" in out, output
 
 
 def test_a_missing_file_and_wrong_options_are_bad_use(tmp_path):
-    status, said = run_daemon(tmp_path / "nosuch.toml")
-    assert status == 2 and "nosuch.toml" in said
+    status, output = run_daemon(tmp_path / "nosuch.toml")
+    assert status == 2 and "nosuch.toml" in output
     done = subprocess.run([str(BIN / "thermocompd"), "--nosuch"], capture_output=True, text=True,
                           timeout=60)
     assert done.returncode == 2 and "--nosuch" in done.stderr
@@ -91,14 +91,14 @@ def test_folders_that_cannot_be_written_are_named(tmp_path):
         with subprocess.Popen([str(BIN / "thermocompd"), str(path)], stdin=subprocess.DEVNULL,
                               stderr=subprocess.PIPE, text=True) as daemon:
             try:
-                _, said = daemon.communicate(timeout=4)
+                _, output = daemon.communicate(timeout=4)
                 ended = daemon.returncode
             except subprocess.TimeoutExpired:
                 daemon.terminate()
-                _, said = daemon.communicate(timeout=60)
+                _, output = daemon.communicate(timeout=60)
                 ended = None
-        print(key, ended, said)
-        assert place in said, said
+        print(key, ended, output)
+        assert place in output, output
         assert ended in (None, 1)
         for name in os.listdir(tmp_path):
             if name.startswith(("state.json", "history.db", "s")):

@@ -42,8 +42,8 @@ def test_a_reload_that_is_not_taken_in_time_never_happens(machine, stall, lab):
     before = daemon.status()["model"]["checksum"]
     machine.model.write_text(MODEL.replace("3.0,", "1.5,"))
     with stall:
-        said = asked(daemon, "reload")
-        assert "does not answer" in said and "withdrawn" in said, said
+        output = asked(daemon, "reload")
+        assert "does not answer" in output and "withdrawn" in output, output
     # The old model still compensates, and is shown.
     assert daemon.status()["model"]["checksum"] == before
     machine.warm_by(9.0)

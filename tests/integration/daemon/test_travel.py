@@ -155,17 +155,17 @@ def test_check_tells_how_far_a_line_lies_off(lab):
     text = daemon_text("line", {"sensors": 1502, "cnc": 1503})
     text = text.replace("@STATE@\n", "").replace("@HISTORY@\n", "")
     config.write_text(text)
-    status, said, _ = run_tool("check", config)
-    assert status == 0 and "axes: x (2 nodes)" in said
-    assert "largest deviation from the model's curve for 10 K: 2.50 um of 40.00 um" in said
-    status, said, _ = run_tool("check", "--registers", config)
+    status, output, _ = run_tool("check", config)
+    assert status == 0 and "axes: x (2 nodes)" in output
+    assert "largest deviation from the model's curve for 10 K: 2.50 um of 40.00 um" in output
+    status, output, _ = run_tool("check", "--registers", config)
     assert status == 0
     for part in ("holding 100", "begin: number of the set of axis x",
                  "K0, offset at 100 mm of axis x", "um/m, count x 0.001",
                  "offset = K0 + slope (x_mm - 100 mm)", "everywhere on the travel within +-60 um"):
-        assert part in said, said
+        assert part in output, output
     begin = text.index('name = "cnc"')
     config.write_text(text[:begin] + 'name = "mill"\nkind = "linuxcnc"\n' +
                       text[text.index("[[controller.signal]]"):])
-    status, _, said = run_tool("check", config)
-    assert status == 2 and "axis[x].line" in said and "takes a set of values as a whole" in said
+    status, _, output = run_tool("check", config)
+    assert status == 2 and "axis[x].line" in output and "takes a set of values as a whole" in output

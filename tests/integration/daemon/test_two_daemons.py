@@ -28,10 +28,10 @@ def other(lab, tmp_path_factory):
 def assert_refused(daemon, holder, *words):
     daemon.start(wait=False)
     assert daemon.process.wait(30) == 1
-    said = [line for line in daemon.log_text().splitlines() if line.startswith("thermocompd: ")]
-    assert len(said) == 1, daemon.log_text()
+    output = [line for line in daemon.log_text().splitlines() if line.startswith("thermocompd: ")]
+    assert len(output) == 1, daemon.log_text()
     for word in (f"process {holder.process.pid}", str(holder.config), *words):
-        assert word in said[0], said
+        assert word in output[0], output
 
 
 def change(machine, *replacements):

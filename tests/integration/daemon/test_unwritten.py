@@ -56,10 +56,10 @@ def test_what_is_not_written_is_not_called_compensated(machine, how):
     write = controller["write"]
     assert (write["function"], write["address"]) == (16, 0) and write["last_confirmed_s"] is None
     assert write["exception"] == (1 if how == "exception 1" else None)
-    said = "function 16, register 0"
-    assert said in controller["last_error"]
+    output = "function 16, register 0"
+    assert output in controller["last_error"]
     exit_status, out, _ = daemon.cli("status")
-    assert exit_status == 1 and said in out, out
+    assert exit_status == 1 and output in out, out
     begun = time.monotonic()
     failed = daemon.status()["controller"]["write_errors"]
     time.sleep(2.0)
@@ -68,7 +68,7 @@ def test_what_is_not_written_is_not_called_compensated(machine, how):
     assert failed <= (time.monotonic() - begun) / 0.02 + 2  # one per period
     assert daemon.log_text().count("writes to controller cnc: ") <= 1
     events = daemon.call("events")["events"]
-    assert any(said in event["what"] for event in events), events
+    assert any(output in event["what"] for event in events), events
 
 
 def test_a_refusal_while_running_holds_and_a_controller_that_takes_writes_again_goes_on(machine):
@@ -78,7 +78,7 @@ def test_a_refusal_while_running_holds_and_a_controller_that_takes_writes_again_
     machine.controller.writes_become = "exception 1"
     machine.warm_by(30.0)
     status = eventually(lambda: "not_written" in daemon.status()["reasons"] and daemon.status(),
-                        "it is said")
+                        "it is reported")
     assert status["mode"] == "holding"
     offset = daemon.axis()["offset"]
     time.sleep(2.0)

@@ -187,10 +187,10 @@ class Machine:
         means, header, wall = {}, None, None
         for line in run.open():
             line = line.rstrip("\n")
-            told = re.match(r"# ([\d.]+) s: wall time (\S+)Z$", line)
-            if told:
-                at = datetime.datetime.fromisoformat(told[2]).replace(tzinfo=datetime.timezone.utc)
-                wall = at.timestamp() - float(told[1])
+            expected = re.match(r"# ([\d.]+) s: wall time (\S+)Z$", line)
+            if expected:
+                at = datetime.datetime.fromisoformat(expected[2]).replace(tzinfo=datetime.timezone.utc)
+                wall = at.timestamp() - float(expected[1])
             elif line.startswith("#"):
                 continue
             elif header is None:

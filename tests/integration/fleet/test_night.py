@@ -56,10 +56,10 @@ def workshop(store, tmp_path):
 
 
 def test_a_night_names_who_departs_and_why(workshop):
-    said = workshop.fleet("night", "-j", 2, "--nights", 20, status=1)
+    output = workshop.fleet("night", "-j", 2, "--nights", 20, status=1)
     rows = workshop.ask("SELECT name, night, state, coalesce(departs::text, ''), departure, diagnosis IS NOT NULL "
                         "FROM fleet.night_result JOIN fleet.machine ON id = machine ORDER BY name, night")
-    assert len(rows) == 45 and {row[2] for row in rows} == {"done"}, said
+    assert len(rows) == 45 and {row[2] for row in rows} == {"done"}, output
     last = {row[0]: row for row in rows if row[1] == str(TODAY - datetime.timedelta(days=1))}
     departing = {name for name, row in last.items() if row[3] == "true"}
     assert departing == {"mill_3", "mill_4"}, last

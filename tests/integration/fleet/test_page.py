@@ -174,9 +174,9 @@ def test_a_machine_is_judged_beside_its_sisters(page):
     assert sum(machine["verdict"] == "silent" for machine in machines.values()) == 5
     months = page.json("/api/machine?name=" + ODD)["months"]
     assert 12 <= len(months) <= 13 and sum(month["departing"] for month in months) in (9, 10)
-    told = page.json(f"/api/curves?name={ODD}&column=head_degC&seconds=86400")
-    curves = {curve["name"]: curve for curve in told["curves"]}
-    assert len(curves) == 21 and told["curves"][-1]["name"] == ODD
+    result = page.json(f"/api/curves?name={ODD}&column=head_degC&seconds=86400")
+    curves = {curve["name"]: curve for curve in result["curves"]}
+    assert len(curves) == 21 and result["curves"][-1]["name"] == ODD
     apart = [own - curves["mill_003"]["mean"][curves["mill_003"]["at"].index(point)]
              for point, own in zip(curves[ODD]["at"], curves[ODD]["mean"]) if point in curves["mill_003"]["at"]]
     assert len(apart) > 300 and all(4.0 < each < 6.0 for each in apart)

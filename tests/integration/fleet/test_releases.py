@@ -86,9 +86,9 @@ cpu_percent_max = 100
     def admit(self):
         """Receives offers, runs `admit` and sends its reports: (exit status, output)."""
         self.uplink()
-        status, said, problem = run_tool("admit", self.settings)
+        status, output, problem = run_tool("admit", self.settings)
         self.uplink()
-        return status, said + problem
+        return status, output + problem
 
     def offer(self, text, name="offered.toml"):
         file = self.store.folder / name
@@ -116,10 +116,10 @@ cpu_percent_max = 100
 def test_an_approved_release_is_promoted_and_taken_back(lab, store):
     mill = Mill(lab, store, "--central").probe()
     release = mill.offer(BETTER)
-    status, said = mill.admit()
-    assert status == 0 and "over 4 probings" in said, said
-    left, of = map(float, re.search(r"leaves ([\d.]+) of ([\d.]+) um", said).groups())
-    assert left < 0.3 and 1.0 < of < 1.6, said
+    status, output = mill.admit()
+    assert status == 0 and "over 4 probings" in output, output
+    left, of = map(float, re.search(r"leaves ([\d.]+) of ([\d.]+) um", output).groups())
+    assert left < 0.3 and 1.0 < of < 1.6, output
     assert mill.daemon.status()["candidate"]["file"] == str(mill.folder / "candidate.toml")
     assert mill.model() == MODEL
     mill.admit()  # without an approval nothing happens
@@ -182,8 +182,8 @@ def test_what_does_not_fit_is_refused_with_the_reason(lab, store):
     assert status == 2 and "is not a whole offer" in problem
     theirs = dict(json.loads(whole), release=int(release) + 1, machine="mill_2")
     offer.write_text(json.dumps(theirs))
-    status, said, _ = run_tool("admit", mill.settings)
-    assert status == 1 and "is for machine mill_2, this is mill_1" in said
+    status, output, _ = run_tool("admit", mill.settings)
+    assert status == 1 and "is for machine mill_2, this is mill_1" in output
     offer.write_text(json.dumps(dict(theirs, release=1)))
     status, _, problem = run_tool("admit", mill.settings)
     assert status == 2 and "is older than" in problem

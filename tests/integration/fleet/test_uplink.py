@@ -20,7 +20,7 @@ def day(server, tmp_path_factory):
     """A history of twelve hours, copied by the machines."""
     from fleet_lab import Store
     machine = Machine(Store(server, tmp_path_factory.mktemp("day"), "day"), "first")
-    machine.told = machine.record(hours_ago=20, hours=12)
+    machine.expected = machine.record(hours_ago=20, hours=12)
     machine.means = machine.recorded()
     return machine
 
@@ -28,7 +28,7 @@ def day(server, tmp_path_factory):
 @pytest.fixture
 def machine(store, day):
     made = Machine(store, "mill_1", history=day.history)
-    made.told, made.means = dict(day.told), dict(day.means)
+    made.expected, made.means = dict(day.expected), dict(day.means)
     yield made
     made.end()
 
@@ -39,8 +39,8 @@ def assert_all_there_once(machine):
     for begin, means in machine.means.items():
         for name, value in means.items():
             assert taken[begin][name] == pytest.approx(value, rel=1e-5, abs=1e-5), (begin, name)
-    assert machine.count("probing") == machine.told["probings"]
-    assert machine.count("event") == machine.told["events"]
+    assert machine.count("probing") == machine.expected["probings"]
+    assert machine.count("event") == machine.expected["events"]
 
 
 def test_everything_recorded_arrives_once(machine):
@@ -70,7 +70,7 @@ def test_another_start_of_the_daemon_goes_on(machine):
     machine.send()
     more = machine.record(hours_ago=5, hours=2)
     machine.means = machine.recorded()
-    machine.told = {name: machine.told[name] + more[name] for name in more}
+    machine.expected = {name: machine.expected[name] + more[name] for name in more}
     machine.send()
     assert_all_there_once(machine)
     assert machine.progress() == (len(machine.means), 0, 0)
@@ -83,7 +83,7 @@ def test_a_history_that_was_begun_anew_is_sent_from_its_beginning(machine):
     more = machine.record(hours_ago=5, hours=1)
     assert "from its beginning" in machine.send()
     machine.means.update(machine.recorded())
-    machine.told = {name: machine.told[name] + more[name] for name in more}
+    machine.expected = {name: machine.expected[name] + more[name] for name in more}
     assert_all_there_once(machine)
 
 
@@ -95,7 +95,7 @@ def test_a_server_that_is_killed_loses_nothing(machine):
         server.stop("immediate")
         server.start()
     eventually(lambda: machine.count("sample") == len(machine.means), "all rows")
-    eventually(lambda: machine.count("event") == machine.told["events"], "all events")
+    eventually(lambda: machine.count("event") == machine.expected["events"], "all events")
     machine.end()
     assert "sending again" in machine.log.read_text()
     assert_all_there_once(machine)
@@ -160,7 +160,7 @@ def test_a_cable_that_is_pulled_loses_nothing(machine):
         eventually(lambda: machine.log.read_text().count("not sent") > 0, "it is noticed")
         cable.plug()
     eventually(lambda: machine.count("sample") == len(machine.means), "all rows")
-    eventually(lambda: machine.count("event") == machine.told["events"], "all events")
+    eventually(lambda: machine.count("event") == machine.expected["events"], "all events")
     machine.end()
     cable.listener.close()
     assert_all_there_once(machine)
@@ -168,7 +168,7 @@ def test_a_cable_that_is_pulled_loses_nothing(machine):
 
 def test_a_clock_that_is_wrong_costs_its_own_rows_and_is_told(store):
     machine = Machine(store, "mill_1")
-    machine.told = machine.record(hours_ago=20, hours=3, clock=(3600, 400 * 86400))
+    machine.expected = machine.record(hours_ago=20, hours=3, clock=(3600, 400 * 86400))
     machine.means = machine.recorded()
     now = eventually(lambda: int(store.value("SELECT extract(epoch FROM now())::bigint")), "a time")
     ahead = {begin for begin in machine.means if begin > now}
@@ -197,7 +197,7 @@ def test_a_disk_that_is_full_loses_nothing(tmp_path, day):
         server.start()
         store = Store(server, tmp_path, "full_disk")
         machine = Machine(store, "mill_1", history=day.history)
-        machine.told, machine.means = day.told, day.means
+        machine.expected, machine.means = day.expected, day.means
         ballast = place / "ballast"
         left = shutil.disk_usage(place).free
         with ballast.open("wb") as file:
@@ -208,7 +208,7 @@ def test_a_disk_that_is_full_loses_nothing(tmp_path, day):
         server.stop("immediate")  # it may have ended by itself
         server.start()
         eventually(lambda: machine.count("sample") == len(machine.means), "all rows")
-        eventually(lambda: machine.count("event") == machine.told["events"], "all events")
+        eventually(lambda: machine.count("event") == machine.expected["events"], "all events")
         machine.end()
         assert "No space left" in machine.log.read_text() + (server.folder / "log").read_text()
         assert_all_there_once(machine)
@@ -228,10 +228,10 @@ def test_many_uplinks_at_once(store, day):
         machine.start()
     for machine in machines:
         eventually(lambda: machine.count("sample") == len(day.means) and
-                   machine.count("event") == day.told["events"], "all rows of " + machine.name, patience_s=120)
+                   machine.count("event") == day.expected["events"], "all rows of " + machine.name, patience_s=120)
     for machine in machines:
         machine.end()
-        machine.told, machine.means = day.told, day.means
+        machine.expected, machine.means = day.expected, day.means
         assert machine.progress() == (len(day.means), 0, 0)
     assert_all_there_once(machines[7])
 
@@ -262,6 +262,6 @@ def test_a_segment_that_is_damaged_costs_itself_and_is_told(machine):
 def test_a_configuration_is_refused_with_every_problem(machine):
     (machine.folder / "uplink.toml").write_text(
         'format = 1\nmachine = "x"\nstore = "nonsense"\ncpu_percent_max = 0\npassword_file = "none"\nperiod = 3\n')
-    said = machine.send(status=2)
+    output = machine.send(status=2)
     for what in ('store', 'cpu_percent_max', 'password_file', 'period'):
-        assert what in said, said
+        assert what in output, output

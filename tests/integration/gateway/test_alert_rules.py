@@ -40,8 +40,8 @@ def test_each_alert_fires_and_ends():
 
 def test_every_metric_of_a_rule_is_one_that_the_gateway_answers(machine, gateway):
     gateway.wait_for(lambda s: s["here"], "a state")
-    told = set(re.findall(r"^# TYPE (\w+)", gateway.text("/metrics"), re.MULTILINE))
+    reported = set(re.findall(r"^# TYPE (\w+)", gateway.text("/metrics"), re.MULTILINE))
     # The model of the plain machine has no domain.
-    told.add("thermocomp_model_outside_domain")
+    reported.add("thermocomp_model_outside_domain")
     expressions = re.sub(r"#.*|summary:.*|description:.*", "", RULES.read_text())
-    assert set(re.findall(r"\bthermocomp_\w+", expressions)) <= told
+    assert set(re.findall(r"\bthermocomp_\w+", expressions)) <= reported

@@ -53,12 +53,12 @@ def test_the_stream_follows_the_machine_and_says_what_to_do(machine, gateway):
     machine.warm_by(9.0)
     gateway.wait_for(lambda s: abs(s["axes"][0]["offset"] - 9.0) < 0.05, "the offset is shown")
     machine.module.stop()
-    held = gateway.wait_for(lambda s: s["here"] and s["mode"] == "holding", "the holding is told")
+    held = gateway.wait_for(lambda s: s["here"] and s["mode"] == "holding", "holding is reported")
     assert held["verdict"]["level"] == "bad"
-    said = machine.daemon.cli("status")[1]
+    output = machine.daemon.cli("status")[1]
     for problem in held["problems"][:2]:
-        assert problem["what"] in said  # same text as `thermocomp status`
-    assert held["problems"][0]["remedy"] in said
+        assert problem["what"] in output  # same text as `thermocomp status`
+    assert held["problems"][0]["remedy"] in output
     machine.module.start()
     machine.warm_by(9.0)
     again = gateway.wait_for(lambda s: s["verdict"]["level"] == "good", "it is good again")
@@ -102,11 +102,11 @@ def test_a_restart_keeps_what_happened_and_names_the_time_without_a_daemon(machi
     assert began_s - 10.0 < entry["from_s"] <= ended_s <= entry["wall_s"]
     assert any("lasted" in event["text"] for event in gateway.wait_for(lambda s: s["here"], "a state")["events"])
     machine.daemon.committed()  # the new run's first rows: only they end the time without a daemon
-    told = gateway.json("/api/history?from=-600")
-    absent, = [mode for mode in told["modes"] if mode["mode"] == "no_daemon"]
+    result = gateway.json("/api/history?from=-600")
+    absent, = [mode for mode in result["modes"] if mode["mode"] == "no_daemon"]
     assert (absent["from_s"], absent["to_s"]) == pytest.approx((entry["from_s"], entry["wall_s"]), abs=0.01)
-    assert told["recorded_since_s"] == told["from_s"]
-    assert gateway.json("/api/history?from=-0.5")["recorded_since_s"] == told["recorded_since_s"]
+    assert result["recorded_since_s"] == result["from_s"]
+    assert gateway.json("/api/history?from=-0.5")["recorded_since_s"] == result["recorded_since_s"]
 
 
 def test_history_is_that_of_the_export(machine, gateway, lab):
@@ -114,13 +114,13 @@ def test_history_is_that_of_the_export(machine, gateway, lab):
     machine.daemon.wait_for_offset(6.0)
 
     def settled():
-        told = gateway.json("/api/history?from=-60&points=120")
-        known = [v for v in told["columns"]["z_offset_um"] if v is not None]
-        return known and abs(known[-1] - 6.0) < 0.1 and told
+        result = gateway.json("/api/history?from=-60&points=120")
+        known = [v for v in result["columns"]["z_offset_um"] if v is not None]
+        return known and abs(known[-1] - 6.0) < 0.1 and result
 
-    told = eventually(settled, "the newest mean is that of the offset")
-    columns = told["columns"]
-    assert told["chunks"] == told["chunks_read"] > 0 and told["damage"] == []
+    result = eventually(settled, "the newest mean is that of the offset")
+    columns = result["columns"]
+    assert result["chunks"] == result["chunks_read"] > 0 and result["damage"] == []
     assert all(len(values) == 120 for values in columns.values())
     assert {"time_s", "column_degC", "spindle_degC", "z_offset_um"} <= set(columns)
     offsets = [v for v in columns["z_offset_um"] if v is not None]
@@ -141,12 +141,12 @@ def test_history_has_probings_and_when_nothing_was_compensated(machine, gateway)
                          "it is committed, with the offset of its time")
     assert abs(settled["probings"][0]["needed_um"] - 4.5) < 0.2  # 6 um left 1.5 um
     machine.daemon.call("disable")
-    told = eventually(lambda: next((t for t in [gateway.json("/api/history?from=-60&points=60")]
+    result = eventually(lambda: next((t for t in [gateway.json("/api/history?from=-60&points=60")]
                                     if t["modes"] and t["modes"][-1]["mode"] == "disabled"), None),
                       "the mode is committed")
-    probing, = told["probings"]
+    probing, = result["probings"]
     assert probing["axis"] == "z" and probing["left_um"] == 1.5
-    assert any(event["text"].startswith("measured z 1.5 um") for event in told["events"])
+    assert any(event["text"].startswith("measured z 1.5 um") for event in result["events"])
 
 
 def test_a_machine_at_rest_costs_little_to_watch(machine, gateway):
@@ -192,14 +192,14 @@ def test_check_knows_the_configuration(lab, machine, gateway):
              "port = 0\n": ('port = 0\naddress = "0.0.0.0"\n',
                             'http.address = "0.0.0.0": other computers reach')}
     text = gateway.config.read_text()
-    for old, (new, said) in cases.items():
+    for old, (new, output) in cases.items():
         wrong = lab.folder / "wrong.toml"
         wrong.write_text(text.replace(old, new, 1))
         status, _, err = run_tool("check", wrong)
-        assert status == 2 and said in err and f"{wrong}:" in err, (new, err)
+        assert status == 2 and output in err and f"{wrong}:" in err, (new, err)
         started = subprocess.run([str(gateway.process.args[0]), str(wrong)], capture_output=True,
                                  text=True, timeout=60)
-        assert started.returncode == 2 and said in started.stderr
+        assert started.returncode == 2 and output in started.stderr
 
 
 def test_check_refuses_the_files_that_the_start_refuses(lab, machine, gateway):
@@ -219,16 +219,16 @@ def test_check_refuses_the_files_that_the_start_refuses(lab, machine, gateway):
         return run_tool("check", changed), changed
 
     assert answers(right)[0][0] == 0
-    for wrong, said in (({"passwords": empty}, f"{empty}: must have at least one line user:hash"),
+    for wrong, output in (({"passwords": empty}, f"{empty}: must have at least one line user:hash"),
                         ({"passwords": words}, f"{words}:1: maria: must be user:hash"),
                         ({"certificate": words}, f"{words}: must be a certificate in PEM"),
                         ({"key": certificate}, f"{certificate}: must be a private key in PEM"),
                         ({"key": other_key}, "must be the key of the certificate")):
         (status, _, err), changed = answers(right | wrong)
-        assert status == 2 and said in err and f"http.{next(iter(wrong))} = " in err, (wrong, err)
+        assert status == 2 and output in err and f"http.{next(iter(wrong))} = " in err, (wrong, err)
         started = subprocess.run([str(gateway.process.args[0]), str(changed)], capture_output=True,
                                  text=True, timeout=60)
-        assert started.returncode == 2 and said in started.stderr, (wrong, started.stderr)
+        assert started.returncode == 2 and output in started.stderr, (wrong, started.stderr)
     (status, _, err), _ = answers(right, f'[mqtt]\nhost = "broker"\nauthority = "{words}"\n')
     assert status == 2 and f"{words}: must be a certificate in PEM" in err, err
 

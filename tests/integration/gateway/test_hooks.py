@@ -24,18 +24,18 @@ def test_each_alarm_is_told_once_raised_and_once_cleared(lab, machine):
     gateway.wait_for(lambda s: s["here"], "a state")
     machine.module.stop()
 
-    def told(state):
+    def reported(state):
         return sorted(line.split("|")[1] for line in out.read_text().splitlines()
                       if line.startswith(state))
 
     expected = ["bus/cabinet", "compensation"]  # covers its sensors
-    eventually(lambda: told("raised") == expected, "all are raised")
+    eventually(lambda: reported("raised") == expected, "all are raised")
     line = next(line for line in out.read_text().splitlines() if "|bus/cabinet|" in line)
     assert line.split("|")[2] == "mill_3" and line.split("|")[3].startswith("bus cabinet is not connected")
     machine.module.start()
     machine.module.show(20.0, 20.0)
-    eventually(lambda: told("cleared") == expected, "all are cleared")
-    assert told("raised") == expected
+    eventually(lambda: reported("cleared") == expected, "all are cleared")
+    assert reported("raised") == expected
 
 
 def test_a_command_that_hangs_is_ended_and_the_page_goes_on(lab, machine):

@@ -34,9 +34,9 @@ def test_values_arrive_retained_and_the_last_will_ends_them(lab, machine, broker
     machine.warm_by(9.0)
     listener.wait_for(lambda t, _, p: t == topic("axis/z") and abs(p["offset_um"] - 9.0) < 0.1,
                       "the offset")
-    said = listener.wait_for(lambda t, _, p: t == topic("sensor/column"), "the sensor")[2]
-    assert said["fault"] == "none" and said["blocks"] == ["column"] and said["time"].endswith("Z")
-    assert abs(said["raw_degC"] - 17.0) < 0.05
+    output = listener.wait_for(lambda t, _, p: t == topic("sensor/column"), "the sensor")[2]
+    assert output["fault"] == "none" and output["blocks"] == ["column"] and output["time"].endswith("Z")
+    assert abs(output["raw_degC"] - 17.0) < 0.05
     status = listener.wait_for(lambda t, _, p: t == topic("status") and p.get("compensating"),
                                "the status")[2]
     assert (status["state"], status["daemon"], status["mode"]) == ("online", "here",
@@ -128,7 +128,7 @@ def test_a_broker_that_takes_no_connection_keeps_it_from_nothing(lab, machine):
                 link.connect(listener.getsockname())
         gateway = Gateway(lab, machine.daemon, "", f'[mqtt]\nhost = "127.0.0.1"\n'
                           f'port = {listener.getsockname()[1]}').start()
-        eventually(lambda: "no answer in time" in gateway.log.read_text(), "it is said")
+        eventually(lambda: "no answer in time" in gateway.log.read_text(), "it is reported")
         gateway.wait_for(lambda s: any("MQTT" in p["what"] for p in s["problems"]), "shown")
         time.sleep(2.0)  # it retries
         began = time.monotonic()

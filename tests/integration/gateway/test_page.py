@@ -142,7 +142,7 @@ def test_it_says_what_is_wrong_and_recovers(machine, gateway, browser):
                                                                  f"port = {gateway.port}"))
     gateway.start()
     took["gateway back"] = within_s(lambda: text(browser, "answer") == "yes", "it is back")
-    print("the page said so after", {name: f"{s:.1f} s" for name, s in took.items()})
+    print("the page showed it after", {name: f"{s:.1f} s" for name, s in took.items()})
     refused = ("ERR_CONNECTION_REFUSED", "ERR_INCOMPLETE_CHUNKED", "ERR_EMPTY_RESPONSE",
                "503", "ERR_CONNECTION_RESET")
     assert console(browser, but=refused) == []
@@ -368,13 +368,13 @@ def test_a_broker_that_is_gone_is_told_and_found_again(lab, machine, browser):
     show(browser, gateway, PHONE)
     eventually(lambda: text(browser, "problem-list") == "", "nothing is wrong")
     broker.stop()
-    took = {"gone": within_s(lambda: "MQTT broker" in text(browser, "problem-list"), "it is told")}
+    took = {"gone": within_s(lambda: "MQTT broker" in text(browser, "problem-list"), "it is reported")}
     assert "start the broker" in text(browser, "problem-list")
     assert text(browser, "answer") == "yes"
     picture(browser, "broker")
     broker.start()
     took["back"] = within_s(lambda: text(browser, "problem-list") == "", "it is found again")
-    print("the page said so after", {name: f"{s:.1f} s" for name, s in took.items()})
+    print("the page showed it after", {name: f"{s:.1f} s" for name, s in took.items()})
 
 
 def test_a_clock_that_is_wrong_is_told(machine, gateway, browser):
@@ -384,7 +384,7 @@ def test_a_clock_that_is_wrong_is_told(machine, gateway, browser):
     browser.get(f"http://localhost:{gateway.port}/")
     took_s = within_s(lambda: "2 h 0 min ahead of" in text(browser, "problem-list"),
                       "the clocks differ")
-    print(f"the page said so after {took_s:.1f} s")
+    print(f"the page showed it after {took_s:.1f} s")
 
 
 def test_names_cannot_become_a_part_of_the_page(machine, gateway, browser):

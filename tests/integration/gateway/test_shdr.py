@@ -84,8 +84,8 @@ def test_the_device_file_names_every_item(machine, gateway, agent):
 
 def test_who_knows_the_device_file_alone_refuses_no_line(machine, gateway, lab):
     """Warming, a bus disconnected, switching off and on, and a killed daemon."""
-    told = device_file(gateway)
-    agent = lab.also_end(Agent(gateway.ready["shdr"], told))
+    reported = device_file(gateway)
+    agent = lab.also_end(Agent(gateway.ready["shdr"], reported))
     agent.wait_for(lambda: agent.values.get("mode") == "compensating", "it compensates")
     for offset_um in (9.0, -6.0, 12.0):
         machine.warm_by(offset_um)
@@ -109,7 +109,7 @@ def test_who_knows_the_device_file_alone_refuses_no_line(machine, gateway, lab):
     agent.wait_for(lambda: agent.values["avail"] == "AVAILABLE", "the daemon is back")
     agent.wait_for(lambda: agent.values["mode"] == "compensating", "it compensates again")
     assert set(agent.values) | set(agent.conditions) == set(agent.items)
-    print(f"{agent.lines} lines, {len(agent.refused)} refused; {len(agent.items)} data items, each told")
+    print(f"{agent.lines} lines, {len(agent.refused)} refused; {len(agent.items)} data items, each reported")
     assert agent.lines > 20 and agent.refused == []
 
 

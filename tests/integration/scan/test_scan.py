@@ -115,11 +115,11 @@ def test_a_bus_that_cannot_be_opened_and_a_name_that_is_none(simulate, tmp_path)
     report, seen = scan(path)
     assert "No such file" in report["buses"][0]["error"]
     assert seen["bed"]["fault"] == "no_answer"
-    for arguments, said in (([path, "--bus", "other"], "other: no such bus in"),
+    for arguments, output in (([path, "--bus", "other"], "other: no such bus in"),
                             ([path, "--units", "9-3"], "9-3"),
                             ([tmp_path / "none.toml"], "none.toml")):
         done = thermocomp("scan", *arguments)
-        assert done.returncode == 2 and said in done.stderr, done.stderr
+        assert done.returncode == 2 and output in done.stderr, done.stderr
 
 
 def test_a_line_that_the_daemon_reads_is_left_alone(simulate, tmp_path):

@@ -12,9 +12,9 @@ def pytest_runtest_makereport(item, call):
     outcome = yield
     report = outcome.get_result()
     if report.failed:
-        said = service.run("journalctl", "-b", "--no-pager", "-o", "short-monotonic", "-n", "120",
+        output = service.run("journalctl", "-b", "--no-pager", "-o", "short-monotonic", "-n", "120",
                            check=False).stdout
-        report.sections.append(("journal of the guest", said))
+        report.sections.append(("journal of the guest", output))
 
 
 @pytest.fixture(scope="session")

@@ -119,8 +119,8 @@ def test_an_upgrade_and_the_way_back_hold_the_offset_and_lose_nothing(known_mach
     assert installed_version() == NEWER
     change_over(known_machine, OLDER, 30.0, 9.0)
     assert installed_version() == OLDER.name.split("_")[1]
-    said = run("thermocomp", "replay", HISTORY, "-o", service.FILES / "out.csv").stderr.strip()
-    assert ", 0 differ" in said, said
+    output = run("thermocomp", "replay", HISTORY, "-o", service.FILES / "out.csv").stderr.strip()
+    assert ", 0 differ" in output, output
 
 
 def test_an_upgrade_keeps_what_the_site_has_written(running, newer):
@@ -133,8 +133,8 @@ def test_an_upgrade_keeps_what_the_site_has_written(running, newer):
 def test_the_daemon_of_before_goes_on_where_the_next_version_refuses_its_configuration(running, newer):
     pid = service.main_pid()
     CONFIG.write_text(running.config() + "colour = 1\n")
-    said = install(newer)
-    assert "colour" in said and "was not restarted" in said
+    output = install(newer)
+    assert "colour" in output and "was not restarted" in output
     assert service.main_pid() == pid
     orders = running.count()
     running.settled_at(12.0)

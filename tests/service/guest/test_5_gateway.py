@@ -41,9 +41,9 @@ def metric(name):
 
 
 def history_has_offsets():
-    told = json.loads(ask("/api/history?from=-60&points=20")[1])
-    assert told["damage"] == []
-    return any(value is not None for value in told["columns"]["z_offset_um"])
+    reported = json.loads(ask("/api/history?from=-60&points=20")[1])
+    assert reported["damage"] == []
+    return any(value is not None for value in reported["columns"]["z_offset_um"])
 
 
 def test_installed_it_starts_nothing_before_it_is_configured(machine):

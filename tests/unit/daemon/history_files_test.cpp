@@ -58,7 +58,7 @@ TEST_CASE(
   CHECK(machine.writer().statistics().replaced == 1);
   CHECK(machine.writer().statistics().working);
   CHECK(machine.writer().statistics().lost == 0);
-  CHECK_THAT(damage_text(machine.writer().take_news()),
+  CHECK_THAT(damage_text(machine.writer().take_messages()),
              Catch::Contains("reopened") && !Catch::Contains("lost"));
   commit();
   CHECK(records_in(config.file) == machine.writer().statistics().records);
@@ -104,10 +104,10 @@ TEST_CASE("rows whose only copy was in a removed -wal wait until they can be wri
   setrlimit(RLIMIT_FSIZE, &before);
   CHECK(failed.errors > 0);
   CHECK(failed.lost == 0);
-  CHECK(damage_text(machine.writer().take_news()).empty());
+  CHECK(damage_text(machine.writer().take_messages()).empty());
   now += std::chrono::minutes(1);
   commit();
-  CHECK_THAT(damage_text(machine.writer().take_news()), Catch::Contains("reopened"));
+  CHECK_THAT(damage_text(machine.writer().take_messages()), Catch::Contains("reopened"));
   CHECK(machine.writer().statistics().replaced == 1);
   CHECK(machine.writer().statistics().lost == 0);
   machine.stop();
@@ -143,7 +143,8 @@ TEST_CASE("a moved history or folder is reported and a new history begins", "[hi
   }
   for (int i = 0; i < 4; ++i) commit();
   CHECK(machine.writer().statistics().replaced == 1);
-  CHECK_THAT(damage_text(machine.writer().take_news()), Catch::Contains("a new history begins"));
+  CHECK_THAT(damage_text(machine.writer().take_messages()),
+             Catch::Contains("a new history begins"));
   CHECK(records_in(moved) == written);
   machine.stop();
   CHECK(replay_quietly(config.file).different == 0);

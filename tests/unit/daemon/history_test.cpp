@@ -256,13 +256,13 @@ TEST_CASE("a wrong wall clock deletes no history; recorded time does", "[history
     }
   }
   CHECK(machine.writer().statistics().deleted == 0);
-  CHECK(machine.writer().take_news().empty());
+  CHECK(machine.writer().take_messages().empty());
   stepped = nanoseconds{0};
   for (int i = 0; i < 12; ++i) segments = segments_after(minutes(1));
   const HistoryStatistics statistics = machine.writer().statistics();
   CHECK(statistics.deleted >= 8);
   CHECK(segments <= 16);
-  const std::vector<std::string> news = machine.writer().take_news();
+  const std::vector<std::string> news = machine.writer().take_messages();
   REQUIRE_FALSE(news.empty());
   CHECK_THAT(news.front(),
              Catch::Contains("deleted: more than") && Catch::Contains("recorded after them"));

@@ -123,13 +123,13 @@ TEST_CASE("exceptions, silence and wrong answers are distinguished", "[connectio
   });
   CHECK(broken_off.outcome == ExchangeOutcome::bad_frame);
 
-  CHECK(outcome_of(peer::honest).ok());
+  CHECK(outcome_of(peer::correct).ok());
   CHECK(words == Words{3000, 3001});
 }
 
 TEST_CASE("a wrong checksum is a bad frame, and the line recovers", "[connection]") {
   peer::SerialLine serial([](const peer::Request& request) {
-    peer::Reply reply = peer::honest(request);
+    peer::Reply reply = peer::correct(request);
     reply.spoil_checksum = true;
     return reply;
   });
@@ -137,7 +137,7 @@ TEST_CASE("a wrong checksum is a bad frame, and the line recovers", "[connection
   REQUIRE(connection.connect());
   Words words(2);
   CHECK(read_inputs(connection, 3, 0, words).outcome == ExchangeOutcome::bad_frame);
-  serial.handle(peer::honest);
+  serial.handle(peer::correct);
   CHECK(read_inputs(connection, 3, 0, words).ok());
 }
 
@@ -145,7 +145,7 @@ TEST_CASE("TCP: a late answer is not taken for the present one", "[connection][l
   // The first request is answered late, during the second one of the same form.
   std::atomic<int> count{0};
   peer::TcpDevice device([&count](const peer::Request& request) {
-    peer::Reply reply = peer::honest(request);
+    peer::Reply reply = peer::correct(request);
     reply.delay = count++ == 0 ? 250ms : 100ms;
     return reply;
   });
@@ -164,7 +164,7 @@ TEST_CASE("an answer that comes before its request is discarded", "[connection][
   Lines lines;
   std::atomic<int> count{0};
   lines.handle([&](const peer::Request& request) {
-    peer::Reply reply = peer::honest(request);
+    peer::Reply reply = peer::correct(request);
     if (count++ != 0) return reply;
     const peer::Bytes forged = peer::registers_pdu(request.function, {4242, 4243});
     if (rtu) {
@@ -207,7 +207,7 @@ struct LateUnit {
 /// Seven seconds with a unit whose answers are always late.
 LateUnit ask_late_unit(std::chrono::milliseconds lateness) {
   peer::SerialLine serial([lateness](const peer::Request& request) {
-    peer::Reply reply = peer::honest(request);
+    peer::Reply reply = peer::correct(request);
     if (request.unit == 1) reply.delay = lateness;
     return reply;
   });
@@ -250,7 +250,7 @@ TEST_CASE("RTU: answers that are always late are never taken for those of anothe
 TEST_CASE("RTU: noise in place of an answer is refused, and the line recovers", "[connection]") {
   std::atomic<bool> rubbish{true};
   peer::SerialLine serial([&rubbish](const peer::Request& request) {
-    peer::Reply reply = peer::honest(request);
+    peer::Reply reply = peer::correct(request);
     if (rubbish) reply = {.raw = {0x55, 0x04, 0xFF, 0x00, 0x13}};
     return reply;
   });
@@ -267,7 +267,7 @@ TEST_CASE("RTU: the echo of the request and bytes before the answer are skipped"
   std::atomic<bool> echoes{true};
   std::atomic<bool> is_silent{false};
   peer::SerialLine serial([&](const peer::Request& request) {
-    peer::Reply reply = peer::honest(request);
+    peer::Reply reply = peer::correct(request);
     if (request.function == 6) reply.pdu = request.pdu;
     if (!echoes) {
       reply.raw = {0x00, 0x00};
@@ -311,7 +311,7 @@ TEST_CASE("bytes received in place of the answer are described", "[connection]")
     return exchange.detail;
   };
   const auto of_unit_9 = [](const peer::Request& request) {
-    peer::Reply reply = peer::honest(request);
+    peer::Reply reply = peer::correct(request);
     reply.unit = 9;
     return reply;
   };
@@ -365,7 +365,7 @@ TEST_CASE("a connection closed by the peer is a lost line, not a time-out", "[co
   CHECK(read_inputs(connection, 1, 0, words).outcome == ExchangeOutcome::disconnected);
   CHECK_FALSE(connection.connected());
   CHECK(read_inputs(connection, 1, 0, words).outcome == ExchangeOutcome::disconnected);
-  device.handle(peer::honest);
+  device.handle(peer::correct);
   REQUIRE(connection.connect());
   CHECK(read_inputs(connection, 1, 0, words).ok());
 }
@@ -374,7 +374,7 @@ TEST_CASE("a connection that is closed after an answer is reopened", "[connectio
   const int answers = GENERATE(1, 3);
   std::atomic<int> count{0};
   peer::TcpDevice device([&](const peer::Request& request) {
-    peer::Reply reply = peer::honest(request);
+    peer::Reply reply = peer::correct(request);
     if (request.function == 6) reply.pdu = request.pdu;
     reply.close_after = ++count % answers == 0;
     return reply;

@@ -61,7 +61,7 @@ inline Bytes registers_pdu(int function, const std::vector<std::uint16_t>& words
 }
 
 /// Every register holds unit * 1000 + address; every bit is the lowest bit of that number.
-inline Reply honest(const Request& request) {
+inline Reply correct(const Request& request) {
   if (request.function == 16 || request.function == 5) {
     return {Bytes(request.pdu.begin(), request.pdu.begin() + 5)};
   }
@@ -146,7 +146,7 @@ class Device {
 /// One connection at a time on a free port (or a given one, to return at the same address).
 class TcpDevice : public Device {
  public:
-  explicit TcpDevice(Handler handler = honest, int port = 0) : Device(std::move(handler)) {
+  explicit TcpDevice(Handler handler = correct, int port = 0) : Device(std::move(handler)) {
     signal(SIGPIPE, SIG_IGN);
     listener_ = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
     const int on = 1;
@@ -233,7 +233,7 @@ class TcpDevice : public Device {
 /// the line can vanish and return under its name.
 class SerialLine : public Device {
  public:
-  explicit SerialLine(Handler handler = honest) : Device(std::move(handler)) {
+  explicit SerialLine(Handler handler = correct) : Device(std::move(handler)) {
     std::array<char, 32> folder{"/tmp/modbus_line_XXXXXX"};
     if (::mkdtemp(folder.data()) == nullptr) throw std::runtime_error("mkdtemp");
     folder_ = folder.data();

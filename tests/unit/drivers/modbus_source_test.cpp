@@ -169,14 +169,14 @@ TEST_CASE("a busy or failing device gives a fault, and a value again afterwards"
   device.handle([](const auto& r) { return peer::exception(r, 4); });
   CHECK(running.becomes(0, Fault::device_error));
   CHECK(running.all[0].taken_at == last_good);  // the time of the last value is kept
-  device.handle(peer::honest);
+  device.handle(peer::correct);
   CHECK(running.becomes(0, 1000.0));
 }
 
 TEST_CASE("a dead unit has no answer, the others continue, and it returns", "[source]") {
   std::atomic<bool> dead{true};
   peer::SerialLine line([&dead](const peer::Request& request) {
-    return request.unit == 2 && dead ? peer::Reply{} : peer::honest(request);
+    return request.unit == 2 && dead ? peer::Reply{} : peer::correct(request);
   });
   ModbusBusConfig bus = rtu_bus(line.device());
   bus.line.backoff_s_max = 2.0;
@@ -197,7 +197,7 @@ TEST_CASE("a dead unit has no answer, the others continue, and it returns", "[so
 
 TEST_CASE("registers that are never answered leave the others readable", "[source]") {
   peer::TcpDevice device([](const peer::Request& request) {
-    return request.address == 100 ? peer::Reply{} : peer::honest(request);
+    return request.address == 100 ? peer::Reply{} : peer::correct(request);
   });
   ModbusBusConfig bus = tcp_bus(device.port());
   bus.line.timeout_ms = 50.0;
@@ -213,7 +213,7 @@ TEST_CASE("registers that are never answered leave the others readable", "[sourc
 TEST_CASE("a server that closes idle connections costs no reading", "[source][reconnect]") {
   std::atomic<int> count{0};
   peer::TcpDevice device([&count](const peer::Request& request) {
-    peer::Reply reply = peer::honest(request);
+    peer::Reply reply = peer::correct(request);
     reply.close = ++count % 5 == 0;
     return reply;
   });
@@ -250,7 +250,7 @@ TEST_CASE("while the renewal counter does not change, neither do the times", "[s
   std::atomic<std::uint16_t> counter{1};
   peer::TcpDevice device([&counter](const peer::Request& request) {
     if (request.address == 90) return peer::Reply{peer::registers_pdu(4, {counter})};
-    return peer::honest(request);
+    return peer::correct(request);
   });
   ModbusBusConfig bus = tcp_bus(device.port());
   bus.devices = {device_of(1, 0, {0})};

@@ -33,14 +33,14 @@ TEST_CASE("loss of data clears no offset during a cut, or where cutting is unkno
   auto config = small_config();
   Machine machine = lost_mid_cut(config);
   CHECK(machine.offset_um() == -30.0);
-  CHECK(machine.says(Reason::cutting));
+  CHECK(machine.reports(Reason::cutting));
   machine.controller.signals[1] = not_a_number;
   machine.steps(100, {lost, 30.0});
   CHECK(machine.offset_um() == -30.0);
   machine.controller.signals[1] = 0.0;
   machine.step({lost, 30.0});
   CHECK(machine.offset_um() == -20.0);
-  CHECK_FALSE(machine.says(Reason::cutting));
+  CHECK_FALSE(machine.reports(Reason::cutting));
 }
 
 TEST_CASE(
@@ -56,7 +56,7 @@ TEST_CASE(
     CHECK(machine.offset_um() == std::min(-30.0 + 2.0 * i, -12.0));
   }
   CHECK(machine.report().mode == Mode::ramping_to_zero);
-  CHECK(machine.says(Reason::cutting));
+  CHECK(machine.reports(Reason::cutting));
 }
 
 namespace {
@@ -79,8 +79,8 @@ TEST_CASE("a lost block is estimated, and compensation continues with a stated u
   CHECK(machine.report().axes[0].offset_sd_um == 0.0);
   machine.steps(10, {21.0, lost});
   CHECK(machine.report().mode == Mode::compensating);
-  CHECK(machine.says(Reason::block_estimated));
-  CHECK_FALSE(machine.says(Reason::block_lost));
+  CHECK(machine.reports(Reason::block_estimated));
+  CHECK_FALSE(machine.reports(Reason::block_lost));
   CHECK(machine.offset_um() == -6.0);  // starts at the last offset
   machine.steps(100, {23.0, lost});
   const InputReport column = machine.report().inputs[1];
@@ -108,8 +108,8 @@ TEST_CASE("beyond offset_sd_um_max, or without estimate_lost_blocks, the offset 
   machine.steps(10, {21.0, 31.0});
   machine.steps(2000, {21.0, lost});
   CHECK(machine.report().mode == Mode::holding);
-  CHECK(machine.says(Reason::block_lost));
-  CHECK_FALSE(machine.says(Reason::block_estimated));
+  CHECK(machine.reports(Reason::block_lost));
+  CHECK_FALSE(machine.reports(Reason::block_estimated));
   CHECK(machine.report().inputs[1].estimated == too_uncertain);
   if (too_uncertain) CHECK(machine.report().axes[0].offset_sd_um > 0.1);
   const double held_um = machine.offset_um();

@@ -14,8 +14,8 @@ TEST_CASE("the reference is the first valid sample and stays", "[estimator]") {
   Machine machine;
   machine.step({20.0, lost});
   CHECK(machine.report().mode == Mode::starting);
-  CHECK(machine.says(Reason::no_reference));
-  CHECK(machine.says(Reason::block_lost));
+  CHECK(machine.reports(Reason::no_reference));
+  CHECK(machine.reports(Reason::block_lost));
   CHECK(machine.offset_um() == 0.0);
   machine.step({20.5, 30.0});
   CHECK(machine.report().inputs[0].reference_degC == 20.0);
@@ -43,7 +43,7 @@ TEST_CASE("without confirmed writes nothing is compensated", "[estimator]") {
   machine.controller.written = false;
   machine.steps(5, {20.0, 30.0});
   CHECK(machine.report().mode == Mode::starting);
-  CHECK(machine.says(Reason::not_written));
+  CHECK(machine.reports(Reason::not_written));
   CHECK(machine.command.valid[0]);  // else it would never be written
   machine.controller.written = true;
   machine.steps(5, {21.0, 30.0});
@@ -53,12 +53,12 @@ TEST_CASE("without confirmed writes nothing is compensated", "[estimator]") {
   machine.controller.written = false;
   machine.steps(5, {22.0, 30.0});
   CHECK(machine.report().mode == Mode::holding);
-  CHECK(machine.says(Reason::not_written));
+  CHECK(machine.reports(Reason::not_written));
   CHECK(machine.offset_um() == -5.0);
   machine.controller.online = false;
   machine.step({22.0, 30.0});
-  CHECK(machine.says(Reason::controller_offline));
-  CHECK_FALSE(machine.says(Reason::not_written));
+  CHECK(machine.reports(Reason::controller_offline));
+  CHECK_FALSE(machine.reports(Reason::not_written));
 }
 
 TEST_CASE("a signal that is missing or garbled holds the offset and has no later effect",
@@ -74,7 +74,7 @@ TEST_CASE("a signal that is missing or garbled holds the offset and has no later
   for (const double garbage : {not_a_number, 3e38, -1e200, 1e300}) {
     machine.controller.signals[0] = garbage;
     machine.steps(3, {22.0, 30.0});
-    CHECK(machine.says(Reason::signal_lost));
+    CHECK(machine.reports(Reason::signal_lost));
     CHECK(machine.report().mode == Mode::holding);
     CHECK(machine.offset_um() == -5.0);
   }
@@ -97,7 +97,7 @@ TEST_CASE("disable and enable move at the slew rate", "[estimator]") {
   }
   CHECK(machine.report().mode == Mode::disabled);
   CHECK_FALSE(machine.report().enabled);
-  CHECK(machine.says(Reason::operator_disabled));
+  CHECK(machine.reports(Reason::operator_disabled));
   machine.estimator.apply({CommandKind::enable, 0, 0.0});
   for (int i = 1; i <= 7; ++i) {
     machine.step({21.0, 30.0});
@@ -173,11 +173,11 @@ TEST_CASE("a non-finite target holds the offset, with a reason", "[estimator]") 
   REQUIRE(machine.report().mode == Mode::compensating);
   machine.steps(3, {21.0, 31.0});
   CHECK(machine.report().mode == Mode::holding);
-  CHECK(machine.says(Reason::no_target));
+  CHECK(machine.reports(Reason::no_target));
   CHECK(machine.offset_um() == 0.0);
   machine.steps(3, {20.0, 30.0});
   CHECK(machine.report().mode == Mode::compensating);
-  CHECK_FALSE(machine.says(Reason::no_target));
+  CHECK_FALSE(machine.reports(Reason::no_target));
 }
 
 TEST_CASE("while compensating the target is a number, also before the first cycle end",
@@ -198,14 +198,14 @@ TEST_CASE("an operator releases a latched axis and no other", "[estimator]") {
   REQUIRE(machine.offset_um() == Approx(-20.0));
   machine.controller.applied_um[0] = 0.0;  // re-homed
   machine.steps(2, {24.0, 30.0});
-  CHECK(machine.says(Reason::mismatch_latched));
+  CHECK(machine.reports(Reason::mismatch_latched));
   CHECK(machine.report().axes[0].latched_mismatch.read_um == 0.0);
   machine.steps(60, {24.0, 30.0});
   CHECK_FALSE(machine.command.valid[0]);
   machine.estimator.apply({CommandKind::release, 7, 0.0});
   machine.estimator.apply({CommandKind::release, 0, 0.0});
   machine.steps(20, {24.0, 30.0});
-  CHECK_FALSE(machine.says(Reason::mismatch_latched));
+  CHECK_FALSE(machine.reports(Reason::mismatch_latched));
   CHECK(machine.offset_um() == Approx(-20.0));
   CHECK(machine.controller.applied_um[0] == Approx(-20.0));
 }

@@ -91,9 +91,9 @@ TEST_CASE("outside its domain the offset follows, stays, or shrinks, as configur
   step_all(22.0, 60);
   const double inside_um = machine.report().axes[0].offset_um;
   CHECK(inside_um == Approx(-10.0));
-  CHECK_FALSE(machine.says(Reason::outside_domain));
+  CHECK_FALSE(machine.reports(Reason::outside_domain));
   step_all(32.0, 200);
-  CHECK(machine.says(Reason::outside_domain));
+  CHECK(machine.reports(Reason::outside_domain));
   CHECK(machine.report().domain.outside);
   if (policy == OutsidePolicy::warn) CHECK(last_um == Approx(-60.0));
   if (policy == OutsidePolicy::hold) CHECK(last_um > -30.0);
@@ -104,7 +104,7 @@ TEST_CASE("outside its domain the offset follows, stays, or shrinks, as configur
   CHECK(machine.report().mode == Mode::compensating);
   step_all(22.0, 200);  // it returns, and so does the offset
   CHECK(last_um == Approx(-10.0));
-  CHECK_FALSE(machine.says(Reason::outside_domain));
+  CHECK_FALSE(machine.reports(Reason::outside_domain));
   CHECK(machine.report().domain.outside_share_24h == Approx(200.0 / 519.0).margin(0.02));
 }
 

@@ -73,7 +73,7 @@ struct Machine {
     for (int i = 0; i < count; ++i) step(temps_degC);
   }
   [[nodiscard]] Report report() const { return estimator.make_report(); }
-  [[nodiscard]] bool says(Reason reason) const { return has_reason(report().reasons, reason); }
+  [[nodiscard]] bool reports(Reason reason) const { return has_reason(report().reasons, reason); }
   [[nodiscard]] double offset_um() const { return command.offset_um[0]; }
 
   Estimator estimator;

@@ -93,7 +93,7 @@ EstimatorConfig config_of(SuspectedPolicy policy, std::size_t sensors_a_block = 
 }
 
 using ReadingError = std::function<double(std::size_t sensor, double true_degC, double time_s)>;
-double honest(std::size_t, double temp_degC, double) {
+double no_error(std::size_t, double temp_degC, double) {
   return temp_degC;
 }
 /// The sensor reads 2 K more from 20 h on.
@@ -161,7 +161,7 @@ using Names = std::vector<std::string>;
 TEST_CASE("a sensor that jumps is suspected within ten minutes, with size and time",
           "[estimator][suspicion]") {
   Shop shop(config_of(SuspectedPolicy::warn));
-  shop.run_until(20.0, honest);
+  shop.run_until(20.0, no_error);
   CHECK_FALSE(shop.ever_any());
   shop.run_until(20.0 + 1.0 / 6.0, jumped);
   REQUIRE(shop.suspected() == Names{"s3"});
@@ -188,7 +188,7 @@ TEST_CASE("a warning changes no offset by one bit", "[estimator][suspicion]") {
 
 TEST_CASE("day, night and a common warm-up raise no suspicion", "[estimator][suspicion]") {
   Shop shop(config_of(SuspectedPolicy::weigh_down));
-  shop.run_until(16.0 + 72.0, honest);
+  shop.run_until(16.0 + 72.0, no_error);
   CHECK_FALSE(shop.ever_any());
 }
 
@@ -306,11 +306,11 @@ TEST_CASE("with weigh_down the error leaves the offset at the slew rate, without
   Shop with_wrong_sensor(config_of(SuspectedPolicy::weigh_down));
   Shop true_one(config_of(SuspectedPolicy::off));
   with_wrong_sensor.run_until(20.0, jumped);
-  true_one.run_until(20.0, honest);
+  true_one.run_until(20.0, no_error);
   double worst_um = 0.0;
   while (with_wrong_sensor.time_s < 23.0 * hour_s) {
     with_wrong_sensor.step(jumped);
-    true_one.step(honest);
+    true_one.step(no_error);
     const double off_um =
         std::abs(with_wrong_sensor.command.offset_um[0] - true_one.command.offset_um[0]);
     if (with_wrong_sensor.time_s > 20.0 * hour_s + 600.0) worst_um = std::max(worst_um, off_um);

@@ -52,13 +52,13 @@ TEST_CASE("a change of unit while running holds the offset and is reported for a
   const double before_um = machine.offset_um();
   machine.steps(36000, {1.8 * 21.0 + 32.0, 20.0});
   CHECK(machine.report().mode == Mode::holding);
-  CHECK(machine.says(Reason::sensor_unconfirmed));
+  CHECK(machine.reports(Reason::sensor_unconfirmed));
   CHECK(machine.report().sensors[0].fault == Fault::unconfirmed);
   CHECK(machine.report().sensors[0].jump_K == Approx(1.8 * 21.0 + 32.0 - 21.0));
   CHECK(machine.offset_um() == before_um);
   machine.steps(11, {21.5, 20.0});
   CHECK(machine.report().mode == Mode::compensating);
-  CHECK_FALSE(machine.says(Reason::sensor_unconfirmed));
+  CHECK_FALSE(machine.reports(Reason::sensor_unconfirmed));
 }
 
 TEST_CASE("a module whose channels all show the same after an outage is not ready", "[estimator]") {
@@ -103,8 +103,8 @@ TEST_CASE("a replaced sensor that reads 3 K more is reported, and accepted by co
   if (unplugged) machine.steps(180, {lost, 23.6, 23.6});
   machine.steps(3600, {26.6, 23.6, 23.6});
   CHECK(machine.report().mode == Mode::compensating);
-  CHECK(machine.says(Reason::sensor_unconfirmed));
-  CHECK(machine.says(Reason::block_estimated));
+  CHECK(machine.reports(Reason::sensor_unconfirmed));
+  CHECK(machine.reports(Reason::block_estimated));
   CHECK(machine.report().sensors[0].jump_K == Approx(3.0).margin(0.15));
   CHECK(machine.report().inputs[0].temp_degC == Approx(23.6).margin(0.15));
   machine.estimator.apply({CommandKind::accept, 0, 0.0});
@@ -171,7 +171,7 @@ TEST_CASE("a restart confirms no jump", "[estimator]") {
   REQUIRE(restarted.estimator.restore(saved).empty());
   restarted.steps(36000, {68.0, 20.0});
   CHECK(restarted.report().sensors[0].jump_K == 48.0);
-  CHECK(restarted.says(Reason::sensor_unconfirmed));
+  CHECK(restarted.reports(Reason::sensor_unconfirmed));
   restarted.steps(11, {20.8, 20.0});
   CHECK(restarted.report().mode == Mode::compensating);
   CHECK(restarted.estimator.persistent_state(restarted.report()).jumped_from_degC.empty());

@@ -76,7 +76,7 @@ TEST_CASE("alarms keep their state while the daemon is away", "[gateway][alarm]"
 
 TEST_CASE("each condition raises its own alarm", "[gateway][alarm]") {
   Snapshot snapshot = good_snapshot();
-  CHECK(wrong_now(snapshot).empty());
+  CHECK(active_conditions(snapshot).empty());
   snapshot.status.axes[0].at_bound = true;
   snapshot.status.buses[0].connected = false;
   snapshot.status.model.outside = true;
@@ -84,7 +84,7 @@ TEST_CASE("each condition raises its own alarm", "[gateway][alarm]") {
   snapshot.status.reasons = static_cast<std::uint32_t>(Reason::block_lost);
   snapshot.sensors.sensors[0].fault = Fault::open_circuit;
   snapshot.sensors.sensors[0].suspected = {.size_K = 2.0, .since = 1.0};
-  const auto wrong = wrong_now(snapshot);
+  const auto wrong = active_conditions(snapshot);
   CHECK(names(wrong) == std::vector<std::string>{"compensation", "bus/cabinet", "sensor/a",
                                                  "suspected/a", "bound/z", "domain"});
   for (const AlarmCondition& condition : wrong) {
@@ -92,30 +92,30 @@ TEST_CASE("each condition raises its own alarm", "[gateway][alarm]") {
     CHECK_FALSE(condition.remedy.empty());
   }
   snapshot.is_here = false;
-  CHECK(names(wrong_now(snapshot)) == std::vector<std::string>{"daemon"});
+  CHECK(names(active_conditions(snapshot)) == std::vector<std::string>{"daemon"});
 }
 
 TEST_CASE("a disconnected bus or silent module raises one alarm, not one per sensor",
           "[gateway][alarm]") {
   Snapshot snapshot = good_snapshot();
   snapshot.sensors.sensors[0].fault = Fault::no_answer;
-  CHECK(names(wrong_now(snapshot)) == std::vector<std::string>{"sensor/a"});
+  CHECK(names(active_conditions(snapshot)) == std::vector<std::string>{"sensor/a"});
   snapshot.status.buses[0].units = {{.name = "module", .answering = false, .sensors = {"a", "b"}}};
-  const auto wrong = wrong_now(snapshot);
+  const auto wrong = active_conditions(snapshot);
   REQUIRE(names(wrong) == std::vector<std::string>{"unit/module"});
   CHECK(wrong[0].text == "module on cabinet does not answer: without sensors a, b");
   snapshot.status.buses[0].connected = false;
-  CHECK(names(wrong_now(snapshot)) == std::vector<std::string>{"bus/cabinet"});
+  CHECK(names(active_conditions(snapshot)) == std::vector<std::string>{"bus/cabinet"});
 }
 
 TEST_CASE("values not yet confirmed at start-up raise no alarm", "[gateway][alarm]") {
   Snapshot snapshot = good_snapshot();
   snapshot.status.mode = Mode::starting;
   snapshot.sensors.sensors[0].fault = Fault::unconfirmed;
-  CHECK(wrong_now(snapshot).empty());
+  CHECK(active_conditions(snapshot).empty());
   snapshot.sensors.sensors[0].jump = Jump{.size_K = 18.0};
   snapshot.status.sensors_bad = {"a"};
-  CHECK(names(wrong_now(snapshot)) == std::vector<std::string>{"compensation", "sensor/a"});
+  CHECK(names(active_conditions(snapshot)) == std::vector<std::string>{"compensation", "sensor/a"});
 }
 
 TEST_CASE("alarm commands are limited per hour", "[gateway][alarm]") {
@@ -143,7 +143,7 @@ TEST_CASE("a full buffer keeps the newest messages, and the last of each topic",
 TEST_CASE("a dry run raises no alarm, a held dry run does", "[gateway][alarm]") {
   Snapshot snapshot = good_snapshot();
   snapshot.status.dry_run = true;
-  CHECK(wrong_now(snapshot).empty());
+  CHECK(active_conditions(snapshot).empty());
   snapshot.status.mode = Mode::holding;
-  CHECK(names(wrong_now(snapshot)) == std::vector<std::string>{"compensation"});
+  CHECK(names(active_conditions(snapshot)) == std::vector<std::string>{"compensation"});
 }

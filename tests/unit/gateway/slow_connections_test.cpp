@@ -10,7 +10,7 @@
 #include <netinet/in.h>
 #include <sys/socket.h>
 
-#include "gateway/door/request_rules.hpp"
+#include "gateway/http/request_rules.hpp"
 
 using namespace thermocomp::gateway;
 using std::chrono::milliseconds;

@@ -61,7 +61,7 @@ RunFile imported_with(const std::string& name, const std::string& map_text) {
   return load_run({log_file(name)}, &map);
 }
 
-bool says(const RunFile& run, const std::string& part) {
+bool has_note(const RunFile& run, const std::string& part) {
   return std::any_of(run.understood.begin(), run.understood.end(),
                      [&](const std::string& line) { return line.find(part) != std::string::npos; });
 }
@@ -78,8 +78,8 @@ TEST_CASE("halsampler's numbered samples become rows at their times", "[import]"
   CHECK(run.time_s().back() == Approx(0.011));
   CHECK(run.column("t1_degC")[1] == 20.125650);
   CHECK(run.column("z_mm").back() == 24.52);
-  CHECK(says(run, "numbered (-t)"));
-  CHECK(says(run, "number 2 is t1_degC"));
+  CHECK(has_note(run, "numbered (-t)"));
+  CHECK(has_note(run, "number 2 is t1_degC"));
 }
 
 TEST_CASE("halsampler without numbers: an overrun before the first row loses nothing of the file",
@@ -87,7 +87,7 @@ TEST_CASE("halsampler without numbers: an overrun before the first row loses not
   const RunFile run = imported("halsampler_plain.txt", {{"t1_degC", "z_mm", "coolant_on"}, 0.001});
   REQUIRE(run.rows() == 6);
   CHECK(run.column("t1_degC").front() == 20.813186);
-  CHECK(says(run, "not numbered"));
+  CHECK(has_note(run, "not numbered"));
 }
 
 TEST_CASE("halsampler without names and period: the error shows the lines to add", "[import]") {
@@ -103,7 +103,7 @@ TEST_CASE("lost samples are a gap if samples are numbered, else an error", "[imp
   const LogOptions one{{"z_mm"}, 0.5};
   const RunFile run = import_text("7 1.5 \n8 1.6 \noverrun\n20 1.9 \n", one);
   CHECK(run.time_s() == std::vector<double>{0.0, 0.5, 6.5});
-  CHECK(says(run, "lost: 1 times"));
+  CHECK(has_note(run, "lost: 1 times"));
   CHECK_THROWS_WITH(import_text("1.5 \noverrun\n1.9 \n", one), Contains("halsampler -t"));
   CHECK_THROWS_WITH(import_text("1 2 \n3 \n4 5 \n", one), Contains("log:2: 1 numbers"));
 }
@@ -117,7 +117,7 @@ TEST_CASE("Moonraker's temperature store: temperatures, targets, powers", "[impo
   CHECK(run.column("extruder_degC")[1] == 21.12);
   CHECK(run.column("extruder_power_percent")[2] == 100.0);
   CHECK(std::isnan(run.column("frame_degC")[2]));
-  CHECK(says(run, "'temperature_sensor frame' temperatures is frame_degC"));
+  CHECK(has_note(run, "'temperature_sensor frame' temperatures is frame_degC"));
   CHECK_THROWS_WITH(import_text(R"({"result": {"a": 1}})"), Contains("server/temperature_store"));
   CHECK_THROWS_WITH(import_text(R"({"result": )"), Contains("must be JSON"));
   CHECK_THROWS_WITH(import_text(R"({"a": {"temperatures": [1, 2]}, "b": {"temperatures": [1]}})"),
@@ -130,8 +130,8 @@ TEST_CASE("TOA5: names and units from their lines, record numbers left out", "[i
   CHECK(run.time_s() == std::vector<double>{0, 60, 120});
   CHECK(run.column("Head_Avg_degC")[1] == 22.4);
   CHECK(std::isnan(run.column("Bed_Avg_degC")[2]));
-  CHECK(says(run, "mill_3"));
-  CHECK(says(run, "'RECORD' left out"));
+  CHECK(has_note(run, "mill_3"));
+  CHECK(has_note(run, "'RECORD' left out"));
 }
 
 TEST_CASE("TOA5: elements of an array keep their units, absent values are missing", "[import]") {
@@ -153,7 +153,7 @@ TEST_CASE("TOA5: elements of an array keep their units, absent values are missin
   CHECK(run.column("TC(2)_degC")[0] == 21.5);
   CHECK(std::isnan(run.column("TC(1)_degC")[1]));
   CHECK(std::isnan(run.column("TC(2)_degC")[1]));
-  CHECK(says(run, "missing: 1 fields like 'INF'"));
+  CHECK(has_note(run, "missing: 1 fields like 'INF'"));
   CHECK_THROWS_WITH(import_text(written("")), Contains("column 5 = Flag(1): has no unit"));
 }
 
@@ -186,7 +186,7 @@ TEST_CASE("two files with dates are joined by their dates", "[import]") {
   CHECK(std::isnan(run.column("z_um")[2]));
   // Unknown after the last row of the first file.
   CHECK(std::isnan(run.column("head_degC")[5]));
-  CHECK(says(run, "2 of its 3 rows lie within"));
+  CHECK(has_note(run, "2 of its 3 rows lie within"));
   // What is written reads back.
   CHECK(parse_run(write_run(run), "again").columns == run.columns);
 }
@@ -236,7 +236,7 @@ TEST_CASE("files without dates are joined by a common event, or not at all", "[i
     INFO(shift->correlation << " next " << shift->next << " at " << shift->shift_s);
     CHECK(shift->is_sure());
     CHECK(shift->shift_s == Approx(1500.0).margin(15.0));
-    CHECK(says(joined_runs(first, second, {}), "'bed_degC' and 'z_um' change alike"));
+    CHECK(has_note(joined_runs(first, second, {}), "'bed_degC' and 'z_um' change alike"));
     // Noise alone, or an event in only one file, gives no result.
     const RunFile calm = seen_from(1500.0, 7.0, "z_um", 1.0, false, 200 + seed);
     CHECK(!clock_shift(first, calm)->is_sure());

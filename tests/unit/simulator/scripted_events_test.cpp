@@ -143,11 +143,11 @@ TEST_CASE("a controller takes all nodes of a travel or none, and interpolates by
   CHECK(cnc.first(1) == 3);
   cnc.take(0.0, {{0.0, 5.0, 1.0, 7.0}, 3, 0.0});
   cnc.step(0.1, {});
-  cnc.stand_at(0, 1.0, 50.0);
+  cnc.set_position(0, 1.0, 50.0);
   CHECK(cnc.applied_um(0) == Approx(2.5));
-  cnc.stand_at(0, 1.1, 200.0);
+  cnc.set_position(0, 1.1, 200.0);
   CHECK(cnc.applied_um(0) == Approx(3.0));
-  cnc.stand_at(0, 1.15, 150.0);
+  cnc.set_position(0, 1.15, 150.0);
   CHECK(cnc.applied_um(0) == Approx(3.5));  // limited by its own rate
   CHECK(cnc.applied_um(1) == 7.0);
   cnc.take(1.2, {{1.0, 100.0, 1.0, 8.0}, 3, 0.0});
@@ -155,7 +155,7 @@ TEST_CASE("a controller takes all nodes of a travel or none, and interpolates by
   CHECK(cnc.nodes(0)[0] == 0.0);  // one is out of bound
   CHECK(cnc.nodes(0)[1] == 5.0);
   CHECK(cnc.applied_um(1) == 8.0);
-  cnc.stand_at(0, 9.0, 900.0);
+  cnc.set_position(0, 9.0, 900.0);
   CHECK(cnc.applied_um(0) == Approx(1.0));  // a table is constant beyond its end
 }
 

@@ -176,7 +176,7 @@ class Rig:
         self.daemon.wait_for_mode("compensating")
         # The status may be 1 s old and show the buses as not yet connected.
         eventually(lambda: all(bus["connected"] for bus in self.daemon.status()["buses"]),
-                   "both buses are told to be connected")
+                   "both buses are reported as connected")
 
     def start_machine(self, name, text):
         folder = self.lab.folder / name

@@ -37,14 +37,14 @@ def rig(tmp_path_factory):
 def test_error_passive_is_told_and_changes_nothing(rig):
     for bus, interface in INTERFACES.items():
         write_error_frame(interface, rigs.CONTROLLER_PROBLEM, rigs.PASSIVE_BITS)
-        eventually(lambda: rig.bus(bus)["state"] == "passive", "the state is told")
+        eventually(lambda: rig.bus(bus)["state"] == "passive", "the state is reported")
         assert rig.bus(bus)["connected"]
         assert rig.daemon.status()["mode"] == "compensating"
         assert f"bus {bus}: error passive for " in rig.daemon.cli("status")[1]
         write_error_frame(interface, rigs.CONTROLLER_PROBLEM, rigs.WARNING_BITS)
-        eventually(lambda: rig.bus(bus)["state"] == "warning", "the state is told")
+        eventually(lambda: rig.bus(bus)["state"] == "warning", "the state is reported")
         write_error_frame(interface, rigs.CONTROLLER_PROBLEM, rigs.ACTIVE_BITS)
-        eventually(lambda: rig.bus(bus)["state"] == "active", "the state is told")
+        eventually(lambda: rig.bus(bus)["state"] == "active", "the state is reported")
         assert rig.bus(bus)["last_error"] == ""
     assert "error state passive" in rig.daemon.log_text()
 
@@ -57,7 +57,7 @@ def test_bus_off_and_restart(rig, bus):
     def begin():
         machine.cable_out()
         write_error_frame(interface, rigs.BUS_OFF)
-        eventually(lambda: rig.bus(bus)["state"] == "bus_off", "the state is told")
+        eventually(lambda: rig.bus(bus)["state"] == "bus_off", "the state is reported")
         assert not rig.bus(bus)["connected"]
         assert f"bus {bus}: bus-off for " in rig.daemon.cli("status")[1]
 
@@ -73,7 +73,7 @@ def test_bus_off_and_restart(rig, bus):
 def test_interface_down_and_up(rig, bus):
     def begin():
         ip("set", INTERFACES[bus], "down")
-        eventually(lambda: rig.bus(bus)["state"] == "down", "the state is told")
+        eventually(lambda: rig.bus(bus)["state"] == "down", "the state is reported")
 
     rig.outage("interface down, up", bus, begin, lambda: set_up(INTERFACES[bus]))
 

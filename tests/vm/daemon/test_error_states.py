@@ -42,7 +42,7 @@ def test_warning_and_passive_are_told_and_change_nothing(adapter):
     rig = adapter.rig
     for letter, state in (("w", "warning"), ("p", "passive"), ("w", "warning"), ("a", "active")):
         adapter.report_state(letter)
-        eventually(lambda: rig.bus("body")["state"] == state, state + " is told")
+        eventually(lambda: rig.bus("body")["state"] == state, state + " is reported")
         status = rig.daemon.status()
         assert status["mode"] == "compensating" and rig.bus("body")["connected"]
         eventually(lambda: rig.daemon.status()["controller"]["state"] == state, "so is the other's")
@@ -52,11 +52,11 @@ def test_warning_and_passive_are_told_and_change_nothing(adapter):
 
 def bus_off(adapter):
     adapter.report_state("b")
-    eventually(lambda: adapter.rig.bus("body")["state"] == "bus_off", "bus-off is told")
+    eventually(lambda: adapter.rig.bus("body")["state"] == "bus_off", "bus-off is reported")
     eventually(lambda: adapter.rig.daemon.status()["controller"]["state"] == "bus_off",
                "by the controller's link too")
-    said = adapter.rig.daemon.cli("status")[1]
-    assert "bus body: bus-off for " in said and "controller cnc: bus-off for " in said
+    output = adapter.rig.daemon.cli("status")[1]
+    assert "bus body: bus-off for " in output and "controller cnc: bus-off for " in output
 
 
 def test_bus_off_until_the_interface_is_restarted(adapter):
@@ -79,7 +79,7 @@ def test_a_daemon_that_starts_on_a_bus_that_is_off_says_so(adapter):
     bus_off(adapter)
     rig.daemon.end()
     rig.daemon.start()
-    eventually(lambda: rig.bus("body")["state"] == "bus_off", "bus-off is told")
+    eventually(lambda: rig.bus("body")["state"] == "bus_off", "bus-off is reported")
     assert not rig.bus("body")["connected"]
     ip("set", adapter.name, "down")
     set_up(adapter.name)

@@ -37,7 +37,7 @@ def rig(tmp_path_factory):
 def test_link_down_and_up(rig):
     def begin():
         ip("set", CARD, "down")
-        eventually(lambda: rig.bus("body")["state"] == "down", "the state is told")
+        eventually(lambda: rig.bus("body")["state"] == "down", "the state is reported")
         eventually(lambda: rig.bus("body")["last_error"].startswith(CARD), "and why")
 
     rig.outage("link down, up (kvaser_pci)", "both", begin, lambda: set_up(CARD))

@@ -410,7 +410,7 @@ void CanController::note_bus_state() {
 
 void CanController::synchronise() {
   const std::uint32_t before = gate_.epoch();
-  hold_what_is_applied(!is_same_link(gate_.synchronised(state_.applied_um), before));
+  hold_applied(!is_same_link(gate_.synchronised(state_.applied_um), before));
   number_sets();
   const nanoseconds now = monotonic_now();
   next_send_ = now + gate_.next_pause();
@@ -423,7 +423,7 @@ void CanController::synchronise() {
 
 /// Value sent for an axis that is not driven. A plausible read-back is the offset sent last, 0, or
 /// a value between; any other must not be sent back, and then neither is known.
-void CanController::hold_what_is_applied(bool link_is_new) {
+void CanController::hold_applied(bool link_is_new) {
   for (std::size_t axis = 0; axis < config_.axes.size(); ++axis) {
     for (std::size_t node = 0; node < config_.axes[axis].offsets(); ++node) {
       const double applied_um = state_.applied_um[first_[axis] + node];

@@ -86,7 +86,7 @@ class CanController final : public ControllerLink {
   void note_bus_state();
   void report_error();
   void synchronise();
-  void hold_what_is_applied(bool link_is_new);
+  void hold_applied(bool link_is_new);
   void number_sets();
   [[nodiscard]] bool is_driven(std::size_t axis) const noexcept;
   [[nodiscard]] std::span<double> held_um(std::size_t axis) noexcept;

@@ -91,9 +91,9 @@ def test_a_full_disk_stops_the_history_and_nothing_else(machine, disk, lab):
     machine.warm_by(14.0)
     daemon.wait_for_offset(14.0, 0.05)
     eventually(lambda: abs(machine.controller.applied_um() - 14.0) < 0.05, "applied")
-    status, told, _ = daemon.cli("status")
+    status, reported, _ = daemon.cli("status")
     assert status == 0  # the machine is compensated
-    assert "disk is full" in told
+    assert "disk is full" in reported
     assert any("disk is full" in warning for warning in daemon.status()["warnings"])
     assert "disk is full" in daemon.log_text()
     assert before <= chunks(daemon.history)
@@ -103,7 +103,7 @@ def test_a_full_disk_stops_the_history_and_nothing_else(machine, disk, lab):
     history = daemon.status()["history"]
     assert history["lost_records"] == 0  # all records were kept in memory
     assert history["last_error"] == ""
-    eventually(lambda: "history: written again after" in daemon.log_text(), "it is told")
+    eventually(lambda: "history: written again after" in daemon.log_text(), "it is reported")
     assert before <= chunks(daemon.history)
     daemon.end()
     columns = assert_replays_exactly(daemon.history, lab.folder / "out.csv")
@@ -150,8 +150,8 @@ def test_a_daemon_killed_and_started_on_a_full_disk_compensates_and_the_gap_is_t
     run = lab.folder / "run.csv"
     status, _, output = run_tool("export", daemon.history, "-o", run)
     assert status == 0 and "1 gap" in output, output
-    told = [line for line in run.read_text().splitlines() if line.startswith("# nothing")]
-    assert len(told) == 1 and "nothing is recorded from" in told[0], told
+    reported = [line for line in run.read_text().splitlines() if line.startswith("# nothing")]
+    assert len(reported) == 1 and "nothing is recorded from" in reported[0], reported
     times = read_columns(run)["time_s"]
     assert max(later - earlier for earlier, later in zip(times, times[1:])) > 1.0
     assert_slewed(machine.controller.orders())

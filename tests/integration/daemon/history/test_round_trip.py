@@ -28,7 +28,7 @@ def displacement_um(column_degC, spindle_degC):
 def live_a_day(machine, seed):
     """Probes the machine in many states. @return the daemon's modelled displacement at each [um]"""
     daemon, chance = machine.daemon, random.Random(seed)
-    said = []
+    output = []
     for _ in range(STATES):
         column, spindle = (20.0 + round(chance.uniform(0.0, most), 2) for most in (6.0, 4.0))
         machine.module.show(column, spindle)
@@ -45,14 +45,14 @@ def live_a_day(machine, seed):
         eventually(is_settled, "the offset follows")
         noise_um = chance.gauss(0.0, 0.05)
         left_um = displacement_um(column, spindle) + machine.controller.applied_um() + noise_um
-        said.append(daemon.call("measured", axis="z", value_um=left_um)["predicted_um"])
-    return said
+        output.append(daemon.call("measured", axis="z", value_um=left_um)["predicted_um"])
+    return output
 
 
 def must(status, *arguments):
-    found, out, said = run_tool(*arguments)
-    assert found == status, (arguments, out, said)
-    return out, said
+    found, out, output = run_tool(*arguments)
+    assert found == status, (arguments, out, output)
+    return out, output
 
 
 @pytest.mark.parametrize("smoothed", [False, True])
@@ -62,7 +62,7 @@ def test_round_trip(lab, smoothed):
                                                      "rate_um_per_s_max = 400.0")
     machine.daemon.config.write_text(text.replace(*SMOOTHED) if smoothed else text)
     daemon = machine.start()
-    said = live_a_day(machine, seed=5)
+    output = live_a_day(machine, seed=5)
     daemon.committed()
 
     run, predicted = lab.folder / "run.csv", lab.folder / "predicted.csv"
@@ -83,8 +83,8 @@ def test_round_trip(lab, smoothed):
     must(0, "predict", "--model", machine.model, run, "-o", predicted)
     model_um = read_columns(predicted)["z_predicted_um"]
     assert len(model_um) == STATES
-    largest_um = max(abs((model - model_um[0]) - (told - said[0]))
-                     for model, told in zip(model_um, said))
+    largest_um = max(abs((model - model_um[0]) - (reported - output[0]))
+                     for model, reported in zip(model_um, output))
     print(f"smoothed {smoothed}: {STATES} probings, predict beside the daemon: {largest_um:.2g} um")
     assert largest_um < 1e-9
 
@@ -95,9 +95,9 @@ def test_round_trip(lab, smoothed):
     middle_s = columns["time_s"][probed[STATES * 2 // 3]]
     fitted = lab.folder / "fitted.toml"
     must(0, "fit", f"{run}@:{middle_s}", "--outputs", "z_um", "-o", fitted)
-    _, told = must(0, "predict", "--model", fitted, f"{run}@{middle_s}:", "-o", predicted)
-    left_um = float(re.search(r"^z_um ([\d.]+)", told, re.MULTILINE)[1])
-    assert left_um < 0.5, told
+    _, reported = must(0, "predict", "--model", fitted, f"{run}@{middle_s}:", "-o", predicted)
+    left_um = float(re.search(r"^z_um ([\d.]+)", reported, re.MULTILINE)[1])
+    assert left_um < 0.5, reported
     findings = lab.folder / "diagnosis"
     must(0, "diagnose", "--model", machine.model, "--train", f"{run}@:{middle_s}", "--test",
          f"{run}@{middle_s}:", "--out", findings, "--json", lab.folder / "diagnosis.json")
@@ -107,7 +107,7 @@ def test_round_trip(lab, smoothed):
     # The fitted model in the daemon gives the predicted displacement.
     shutil.copy(fitted, machine.model)
     assert daemon.cli("reload")[0] == 0
-    said = live_a_day(machine, seed=6)
+    output = live_a_day(machine, seed=6)
     daemon.committed()
     again = lab.folder / "again.csv"
     # From the row after the first export's last one, without assuming a pause.
@@ -115,8 +115,8 @@ def test_round_trip(lab, smoothed):
     must(0, "predict", "--model", machine.model, again, "-o", predicted)
     model_um = read_columns(predicted)["z_predicted_um"]
     assert len(model_um) == STATES
-    largest_um = max(abs((model - model_um[0]) - (told - said[0]))
-                     for model, told in zip(model_um, said))
+    largest_um = max(abs((model - model_um[0]) - (reported - output[0]))
+                     for model, reported in zip(model_um, output))
     print(f"smoothed {smoothed}: fitted model in the daemon beside predict: {largest_um:.2g} um")
     assert largest_um < 0.01
     left = [abs(value) for value in read_columns(predicted)["z_residual_um"]]

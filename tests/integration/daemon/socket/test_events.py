@@ -40,10 +40,10 @@ def test_a_shift_is_told_in_order_with_durations(lab):
     daemon.wait_for_mode("compensating")
     at_most_s = time.monotonic() - begun
     eventually(lambda: any(event["kind"] == "recovery" and event["subject"] == "bus cabinet"
-                           for event in events_of(daemon)), "the bus is said to be back")
+                           for event in events_of(daemon)), "the bus is reported as back")
     daemon.call("disable")
     eventually(lambda: any(event["what"] == "disabled" for event in events_of(daemon)),
-               "the mode is told")
+               "the mode is reported")
     daemon.call("measured", axis="z", value_um=1.5)
     daemon.call("enable")
     daemon.wait_for_mode("compensating")
@@ -86,18 +86,18 @@ def test_a_first_start_that_is_switched_off_tells_no_faults_of_its_first_moments
                                                        "enabled_at_first_start = false"))
     daemon = machine.daemon.start()
     eventually(lambda: [event for event in events_of(daemon) if event["kind"] == "mode"],
-               "the first mode is told")
-    told = events_of(daemon)
-    assert [event["what"] for event in told if event["kind"] == "mode"] == ["disabled"]
-    assert not [event for event in told if event["kind"] == "fault"
-                and event["subject"].startswith(("sensor ", "reason "))], told
+               "the first mode is reported")
+    listed = events_of(daemon)
+    assert [event["what"] for event in listed if event["kind"] == "mode"] == ["disabled"]
+    assert not [event for event in listed if event["kind"] == "fault"
+                and event["subject"].startswith(("sensor ", "reason "))], listed
 
 
-def same_event(kept, said):
+def same_event(kept, output):
     """An event in the history, in whole nanoseconds, equals the one reported by the daemon."""
     words = ("number", "kind", "subject", "what", "user")
-    times = [(kept[key], said[key]) for key in ("wall_s", "duration_s")]
-    return ([kept[key] for key in words] == [said[key] for key in words] and
+    times = [(kept[key], output[key]) for key in ("wall_s", "duration_s")]
+    return ([kept[key] for key in words] == [output[key] for key in words] and
             all(a == b if a is None or b is None else abs(a - b) < 2e-6 for a, b in times))
 
 
@@ -114,22 +114,22 @@ def test_earlier_runs_are_in_the_history(lab):
     daemon.end()
     daemon.start().wait_for_mode("compensating")
     daemon.kill()  # committed events stay
-    status, out, said = run_tool("events", daemon.history, "--json")
-    assert status == 0, said
-    told = json.loads(out)["events"]
-    earlier = [event for event in told if event["run"] == 1]
+    status, out, output = run_tool("events", daemon.history, "--json")
+    assert status == 0, output
+    listed = json.loads(out)["events"]
+    earlier = [event for event in listed if event["run"] == 1]
     assert len(earlier) > len(first)
     for kept, live in zip(earlier, first):
         assert same_event(kept, live), (kept, live)
     ended = earlier[-1]
     assert ended["kind"] == "daemon" and ended["what"].startswith("stopping")
-    assert {event["run"] for event in told} <= {1, 2}
+    assert {event["run"] for event in listed} <= {1, 2}
     status, out, _ = run_tool("events", daemon.history, "--from", "-1h")
     assert status == 0 and "  recovery  sensor column: " in out and ", by " in out
     status, out, _ = run_tool("events", daemon.history, "--to", "-1h")
     assert status == 0 and out == "nothing has happened\n"
-    status, _, said = run_tool("events", lab.folder / "none.db")
-    assert status == 2 and "none.db" in said
+    status, _, output = run_tool("events", lab.folder / "none.db")
+    assert status == 2 and "none.db" in output
 
 
 def test_strict_sees_what_is_wrong_while_it_compensates(lab):
@@ -140,7 +140,7 @@ def test_strict_sees_what_is_wrong_while_it_compensates(lab):
     eventually(lambda: daemon.axis()["at_bound"], "the bound")
     assert daemon.cli("status")[0] == 0
     status, out, _ = daemon.cli("status", "--strict", "--json")
-    told = json.loads(out)
-    assert (status, told["exit_status"], told["why"]) == (
+    listed = json.loads(out)
+    assert (status, listed["exit_status"], told["why"]) == (
         1, 1, ["at_bound", "axis z is at its bound"])
     assert json.loads(daemon.cli("status", "--json")[1])["why"] == []

@@ -87,9 +87,9 @@ def test_a_broken_configuration_is_not_taken_over(machine):
     good = daemon.config.read_text()
     line = 1 + good.splitlines().index("rate_um_per_s_max = 8.0")
     daemon.config.write_text(good.replace("rate_um_per_s_max = 8.0", "rate_um_per_s_max = -8.0"))
-    status, _, said = daemon.cli("reload")
-    assert status == 1 and f"thermocompd.toml:{line}: " in said, (status, said)
-    assert "rate_um_per_s_max" in said and "nothing was taken" in said, said
+    status, _, output = daemon.cli("reload")
+    assert status == 1 and f"thermocompd.toml:{line}: " in output, (status, output)
+    assert "rate_um_per_s_max" in output and "nothing was taken" in output, output
     daemon.hang_up()
     eventually(lambda: f"thermocompd.toml:{line}: " in daemon.log_text(), "the log says why")
     assert daemon.status()["mode"] == "compensating"
@@ -101,8 +101,8 @@ def test_another_bus_needs_a_restart_and_is_said_so(machine):
     daemon = machine.start()
     text = daemon.config.read_text()
     daemon.config.write_text(text.replace(f"port = {machine.module.port}", "port = 1"))
-    status, _, said = daemon.cli("reload")
-    assert status == 1 and "restart" in said and "cabinet" in said, said
+    status, _, output = daemon.cli("reload")
+    assert status == 1 and "restart" in output and "cabinet" in output, output
     assert daemon.status()["mode"] == "compensating"
 
 
@@ -147,8 +147,8 @@ def test_a_reference_is_refused_without_good_sensors(machine):
     daemon = machine.start()
     machine.module.stop()
     daemon.wait_for_mode("holding")
-    status, _, said = daemon.cli("reference")
-    assert status == 1 and "column_degC" in said
+    status, _, output = daemon.cli("reference")
+    assert status == 1 and "column_degC" in output
     assert "column_degC has no good sensor now" in daemon.status()["reference"]["objections"]
 
 
@@ -167,8 +167,8 @@ def test_the_switch_at_the_controller_works_without_a_terminal(machine):
 
 def test_only_a_latched_axis_is_released(machine, lab):
     daemon = machine.start()
-    status, _, said = daemon.cli("release", "z")
-    assert status == 1 and "no latched mismatch" in said
+    status, _, output = daemon.cli("release", "z")
+    assert status == 1 and "no latched mismatch" in output
     with pytest.raises(Refused, match="nosuch"):
         daemon.call("release", axis="nosuch")
     machine.warm_by(6.0)
@@ -201,8 +201,8 @@ def test_a_measured_displacement_that_cannot_be_is_refused(machine, lab, value_u
     daemon = machine.start()
     with pytest.raises(Refused, match="nothing is taken over: .*Check the axis, the sign"):
         daemon.call("measured", axis="z", value_um=value_um)
-    status, _, said = daemon.cli("measured", "z", str(value_um))
-    assert status == 2 and "60.0 um" in said, said
+    status, _, output = daemon.cli("measured", "z", str(value_um))
+    assert status == 2 and "60.0 um" in output, output
     assert daemon.axis()["measured"] is None
     daemon.call("measured", axis="z", value_um=-59.0)
     assert daemon.axis()["measured"] == -59.0
@@ -213,9 +213,9 @@ def test_a_value_beyond_the_claimed_error_is_asked_back(machine, lab):
     """The model claims 1.5 um: a remainder of 12 um is a factor-of-ten mistake, 2 um are its error."""
     machine.model.write_text(MODEL + CLAIMS)
     daemon = machine.start()
-    status, _, said = daemon.cli("measured", "z", "12", "--source", "part")
-    assert status == 1 and "asked back, nothing is taken over: +12 um" in said, said
-    assert "a tenth of it would fit" in said and "--confirm" in said, said
+    status, _, output = daemon.cli("measured", "z", "12", "--source", "part")
+    assert status == 1 and "asked back, nothing is taken over: +12 um" in output, output
+    assert "a tenth of it would fit" in output and "--confirm" in output, output
     assert daemon.axis()["measured"] is None
     assert daemon.cli("measured", "z", "2", "--source", "part")[0] == 0
     assert daemon.axis()["measured"] == 2.0
@@ -226,8 +226,8 @@ def test_a_value_beyond_the_claimed_error_is_asked_back(machine, lab):
 
 def test_a_part_from_before_the_start_is_refused(machine, lab):
     daemon = machine.start()
-    status, _, said = daemon.cli("measured", "z", "1.5", "--source", "part", "--ago", "100")
-    assert status == 1 and "where the axis was 100 min ago is not known" in said, said
+    status, _, output = daemon.cli("measured", "z", "1.5", "--source", "part", "--ago", "100")
+    assert status == 1 and "where the axis was 100 min ago is not known" in output, output
     assert daemon.axis()["measured"] is None
     with pytest.raises(Refused, match="params.confirm must be true or false"):
         daemon.call("measured", axis="z", value_um=1.5, confirm=1)
@@ -239,8 +239,8 @@ def test_a_second_daemon_on_the_same_socket_is_refused(machine, lab):
     second = lab.daemon(machine.config, "second")
     second.start(wait=False)
     assert second.process.wait(30) == 1
-    said = [line for line in second.log_text().splitlines() if line.startswith("thermocompd: ")]
-    assert len(said) == 1 and str(daemon.socket) in said[0], second.log_text()
+    output = [line for line in second.log_text().splitlines() if line.startswith("thermocompd: ")]
+    assert len(output) == 1 and str(daemon.socket) in output[0], second.log_text()
     assert daemon.status()["mode"] == "compensating"
     time.sleep(0.1)
     assert daemon.cli("status")[0] == 0

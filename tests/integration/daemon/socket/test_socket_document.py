@@ -89,16 +89,16 @@ def fields(value):
     return None
 
 
-def differences(told, answer, place="answer"):
+def differences(expected, answer, place="answer"):
     """Paths at which the fields of an answer differ from the document."""
-    if isinstance(told, dict) and isinstance(answer, dict):
-        if "..." in told:
+    if isinstance(expected, dict) and isinstance(answer, dict):
+        if "..." in expected:
             return []
-        odd = [f"{place}.{key}" for key in sorted(set(told) ^ set(answer))]
-        return odd + [each for key in set(told) & set(answer)
-                      for each in differences(told[key], answer[key], f"{place}.{key}")]
-    if isinstance(told, list) and isinstance(answer, list) and told and answer:
-        return differences(told[0], answer[0], place + "[0]")
+        odd = [f"{place}.{key}" for key in sorted(set(expected) ^ set(answer))]
+        return odd + [each for key in set(expected) & set(answer)
+                      for each in differences(expected[key], answer[key], f"{place}.{key}")]
+    if isinstance(expected, list) and isinstance(answer, list) and expected and answer:
+        return differences(expected[0], answer[0], place + "[0]")
     return []
 
 
@@ -138,10 +138,10 @@ def test_documented_requests_are_taken(lab):
     assert [json.loads(request)["method"] for request, _ in documented] == [
         method for _, method, _ in requests()]
     daemon = running(lab)
-    for request, told in documented:
+    for request, expected in documented:
         answers = exchange(daemon, request)
-        assert len(answers) == len(told), request
-        for answer, text in zip(answers, told):
+        assert len(answers) == len(expected), request
+        for answer, text in zip(answers, expected):
             assert not differences(fields(json.loads(text)), fields(answer)), (request, answer)
 
 

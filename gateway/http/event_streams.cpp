@@ -1,4 +1,4 @@
-#include "gateway/door/event_streams.hpp"
+#include "gateway/http/event_streams.hpp"
 
 #include <algorithm>
 #include <microhttpd.h>

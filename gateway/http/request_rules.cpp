@@ -1,4 +1,4 @@
-#include "gateway/door/request_rules.hpp"
+#include "gateway/http/request_rules.hpp"
 
 #include <algorithm>
 #include <charconv>

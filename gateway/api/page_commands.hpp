@@ -9,8 +9,8 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "gateway/door/answer_thread.hpp"
 #include "gateway/feed/snapshot.hpp"
+#include "gateway/http/answer_thread.hpp"
 #include "gateway/settings/gateway_settings.hpp"
 
 namespace thermocomp::gateway {

@@ -1,9 +1,9 @@
 /// Answer to /api/history.
 #pragma once
 
-#include "gateway/door/answer_thread.hpp"
-#include "gateway/door/request_rules.hpp"
 #include "gateway/feed/daemon_feed.hpp"
+#include "gateway/http/answer_thread.hpp"
+#include "gateway/http/request_rules.hpp"
 
 namespace thermocomp::gateway {
 

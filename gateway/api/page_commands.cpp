@@ -1,4 +1,4 @@
-#include "gateway/http/page_commands.hpp"
+#include "gateway/api/page_commands.hpp"
 
 #include <algorithm>
 #include <array>

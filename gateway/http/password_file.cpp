@@ -1,4 +1,4 @@
-#include "gateway/door/password_file.hpp"
+#include "gateway/http/password_file.hpp"
 
 #include <algorithm>
 #include <array>

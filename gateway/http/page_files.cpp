@@ -1,4 +1,4 @@
-#include "gateway/door/page_files.hpp"
+#include "gateway/http/page_files.hpp"
 
 #include <array>
 #include <stdexcept>

@@ -1,4 +1,4 @@
-#include "gateway/http/history_answer.hpp"
+#include "gateway/api/history_answer.hpp"
 
 #include <array>
 #include <charconv>

@@ -1,4 +1,4 @@
-#include "gateway/door/answer_thread.hpp"
+#include "gateway/http/answer_thread.hpp"
 
 #include <condition_variable>
 #include <deque>
