@@ -15,7 +15,7 @@ void declare_daemon_command_line(CLI::App& app, std::string& config_file) {
   app.footer(
       "Runs in the foreground until SIGTERM or SIGINT; SIGHUP reloads. Logs to the journal when\n"
       "started by systemd, else to standard error. Check a configuration with: thermocomp check.\n"
-      "Exit status: 0 stopped on request, 1 failed to start or continue, 2 wrong usage or "
+      "Exit status: 0 stopped on request, 1 failed to start or continue, 2 usage error or "
       "configuration.");
 }
 

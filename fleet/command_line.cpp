@@ -11,17 +11,18 @@ namespace thermocomp::fleet {
 
 void declare_fleet_command_line(CLI::App& app, std::string& store, cli::Action& action) {
   app.name("thermocomp-fleet");
-  app.description("The store of machines of one type: who is in it, what the nights found");
+  app.description(
+      "Manages the store of machines of one type: machines, nightly comparison, releases");
   app.set_version_flag("--version", THERMOCOMP_VERSION);
   app.require_subcommand(1);
   app.failure_message(cli::command_error_text);
   app.footer(
-      "Exit status: 0 success, 1 no, 2 usage error, bad input, or a store that is not reached.");
+      "Exit status: 0 success, 1 refused, 2 usage error, bad input, or the store is unreachable.");
   store = "dbname=thermocomp_fleet";
   app.add_option(
          "--store", store,
-         "connection to PostgreSQL, as libpq takes it: \"host=... dbname=...\" or a URL. TLS "
-         "with the server's name verified, unless it says sslmode=... itself")
+         "connection to PostgreSQL in libpq's form: \"host=... dbname=...\" or a URL. Uses TLS "
+         "and verifies the server's name, unless it contains sslmode=...")
       ->type_name("CONNECTION")
       ->envname("THERMOCOMP_FLEET_STORE")
       ->capture_default_str();

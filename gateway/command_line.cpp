@@ -25,7 +25,7 @@ void declare_gateway_command_line(CLI::App& app, GatewayOptions& options) {
       "Runs in the foreground until SIGTERM or SIGINT; once it serves it prints a line of JSON "
       "with\n"
       "its ports. Check a configuration with: thermocomp check.\n"
-      "Exit status: 0 stopped on request, 1 failed to start or continue, 2 wrong usage or "
+      "Exit status: 0 stopped on request, 1 failed to start or continue, 2 usage error or "
       "configuration.");
 }
 

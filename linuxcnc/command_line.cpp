@@ -34,14 +34,15 @@ void add_bridge_options(CLI::App& app, BridgeOptions& bridge) {
   app.add_option("--offset-mm-max", bridge.limits.offset_mm_max, "a larger offset is refused")
       ->capture_default_str()
       ->check(between(0.001, 1.0));
-  app.add_option("--fresh-s", bridge.limits.fresh_s, "offsets are fresh so long after an answer")
+  app.add_option("--fresh-s", bridge.limits.fresh_s, "time for which an answer's offsets are fresh")
       ->capture_default_str()
       ->check(between(0.01, 60.0));
   app.add_option("--mismatch-mm", bridge.limits.mismatch_mm,
-                 "applied and asked for may differ by so much")
+                 "allowed difference of requested and applied offset")
       ->capture_default_str()
       ->check(between(0.0001, 1.0));
-  app.add_option("--mismatch-after-s", bridge.limits.mismatch_after_s, "... or longer by more")
+  app.add_option("--mismatch-after-s", bridge.limits.mismatch_after_s,
+                 "allowed duration of a larger difference")
       ->capture_default_str()
       ->check(between(0.01, 60.0));
 }
@@ -60,26 +61,31 @@ void add_hal_options(CLI::App& hal, Task& task, HalTexts& texts) {
       ->required()
       ->transform(CLI::CheckedTransformer(ways));
   hal.add_option("--axes", texts.axes, "axes and their joints, as in x=0,y=1,z=2")->required();
-  hal.add_option("--name", options.name, "of the bridge's component")->capture_default_str();
+  hal.add_option("--name", options.name, "name of the bridge's component")->capture_default_str();
   hal.add_option("--offset-mm-max", options.offset_mm_max, "bound of an offset")
       ->capture_default_str();
-  hal.add_option("--speed", options.speed_mm_per_s, "of an offset [mm/s]")->capture_default_str();
-  hal.add_option("--acceleration", options.acceleration_mm_per_s2, "of an offset [mm/s2]")
+  hal.add_option("--speed", options.speed_mm_per_s, "largest speed of an offset [mm/s]")
       ->capture_default_str();
-  hal.add_option("--command", options.command, "that starts the bridge")->capture_default_str();
-  hal.add_option("--arguments", options.arguments, "of the bridge, as in \"--socket /tmp/s\"");
+  hal.add_option("--acceleration", options.acceleration_mm_per_s2,
+                 "largest acceleration of an offset [mm/s2]")
+      ->capture_default_str();
+  hal.add_option("--command", options.command, "command that starts the bridge")
+      ->capture_default_str();
+  hal.add_option("--arguments", options.arguments,
+                 "arguments of the bridge, as in \"--socket /tmp/s\"");
   hal.add_option("--thread", options.thread, "the servo thread")->capture_default_str();
   hal.add_option("--feedback-position", options.feedback_position,
-                 "joint: place in the thread, after what reads the drives")
+                 "joint: position in the thread, after the drives are read")
       ->capture_default_str();
   hal.add_option("--output-position", options.output_position,
-                 "joint: place in the thread, -1 is last, before what writes the drives")
+                 "joint: position in the thread, before the drives are written; -1: last")
       ->capture_default_str();
-  hal.add_flag("--halui", options.program_running, "halui is loaded: it says when a program runs");
+  hal.add_flag("--halui", options.program_running,
+               "halui is loaded and shows whether a program runs");
   hal.add_option("--signal", texts.signals,
-                 "PIN=SIGNAL: a pin of LinuxCNC that is on a signal of yours; may be repeated");
+                 "PIN=SIGNAL: a pin of LinuxCNC that is already on a signal; may be repeated");
   hal.add_option("--rejoin", task.rejoin_as,
-                 "print what another component of this name needs to take over from a killed one");
+                 "print HAL commands with which a component of this name replaces a killed one");
 }
 
 std::map<std::string, std::string> read_signals(const std::vector<std::string>& texts) {

@@ -200,8 +200,8 @@ void write_joint(Writer& out) {
   for (const char* part : warning_parts) at_end(part);
 
   out.line(
-      "\n# ---- offsets count while all joints are homed; without that they go to zero, so that\n"
-      "# ---- none is in effect where a home switch is searched");
+      "\n# ---- offsets apply while all joints are homed, else they return to zero, so that none\n"
+      "# ---- is in effect during homing");
   out.from_machine("motion.is-all-homed", "tc-homed", "tc.speed.sel tc.acceleration.sel");
   out.set("tc.speed.in0", number(options.homing_speed_mm_per_s));
   out.set("tc.speed.in1", number(options.speed_mm_per_s));

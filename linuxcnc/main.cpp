@@ -86,7 +86,7 @@ class Exchange {
     while (const std::optional<std::string> line = link_.receive()) {
       const bool awaited = std::exchange(asked_, false);
       try {
-        if (!awaited) throw BadAnswer("the daemon says what was not asked");
+        if (!awaited) throw BadAnswer("unrequested answer from the daemon");
         const Answer answer = read_answer(*line, id_, options_.axes, options_.limits.offset_mm_max);
         state_.take(answer, reported_, Clock::now().time_since_epoch());
         print_once("");

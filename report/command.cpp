@@ -57,7 +57,7 @@ std::string command_error_text(const CLI::App* app, const CLI::Error& error) {
     std::string names;
     for (const std::string& each : known) names += (names.empty() ? "" : ", ") + each;
     return words + ": which command? One of: " + names + ".\n" + words +
-           " --help tells what they do.\n";
+           " --help describes them.\n";
   }
   if (known.empty() || word == rest.end()) return CLI::FailureMessage::simple(app, error);
   const std::string meant = nearest_name(*word, known);

@@ -71,7 +71,7 @@ void OutputFile::refuse_what_hangs() const {
   const int descriptor = ::open(destination_.c_str(), O_WRONLY | O_NONBLOCK | O_CLOEXEC | O_NOCTTY);
   if (descriptor < 0) {
     if (errno == ENXIO) {
-      throw Failure("cannot write " + name_ + ": it is a pipe or socket that nobody reads");
+      throw Failure("cannot write " + name_ + ": it is a pipe or socket without a reader");
     }
     throw cannot_write(name_, errno);
   }
@@ -85,7 +85,7 @@ void OutputFile::refuse_what_hangs() const {
   const bool is_harmless =
       S_ISCHR(there.st_mode) && (major(there.st_rdev) == memory_devices || is_output);
   if (!is_known || (is_device && !is_harmless)) {
-    throw Failure("cannot write " + name_ + ": it is a device; -o takes a file, a pipe or -");
+    throw Failure("cannot write " + name_ + ": it is a device; -o must be a file, a pipe or -");
   }
 }
 

@@ -10,8 +10,7 @@
 namespace thermocomp::cli {
 
 inline constexpr const char* columns_help =
-    "what the columns of the run files are and how they are written (TOML), where the files do not "
-    "say it";
+    "meaning and format of the run files' columns, as far as the files do not define them (TOML)";
 
 class RunLoader {
  public:

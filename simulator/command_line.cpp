@@ -31,7 +31,7 @@ CLI::Validator number_between(double low, double high) {
 void declare_simulator_command_line(CLI::App& app, SimulatorArguments& arguments) {
   app.name("thermocomp-sim");
   app.description(
-      "A simulated machine that warms and bends, with thermocouples and a controller on real "
+      "Simulates a machine with thermal displacement, thermocouples and a controller on real "
       "buses");
   const auto positive = number_between(1e-9, 1e9);
   const auto not_negative = number_between(0.0, 1e9);
@@ -40,39 +40,40 @@ void declare_simulator_command_line(CLI::App& app, SimulatorArguments& arguments
       ->type_name("FILE")
       ->required();
   app.add_option("--seed", arguments.seed, "Seed instead of the file's");
-  auto* factor = app.add_option("--time-factor", session.time_factor,
-                                "Plant time goes so much faster than real time");
+  auto* factor = app.add_option("--time-factor", session.time_factor, "Plant time per real time");
   auto* duration = app.add_option("--duration", arguments.duration_h,
                                   "Plant hours instead of the file's; 0: until stopped");
   app.add_flag("--start-on-heartbeat", session.start_on_heartbeat,
-               "Time stands at the beginning until the controller's heartbeat beats");
-  app.add_flag("--stay", session.stay, "Go on after the end until stopped");
-  app.add_option("--truth", session.truth, "Run file of what really happened at the tool")
+               "Start the plant time when the controller's heartbeat first changes");
+  app.add_flag("--stay", session.stay, "Continue after the end until stopped");
+  app.add_option("--truth", session.truth,
+                 "Run file to write with the true displacement at the tool")
       ->type_name("FILE");
-  auto* truth_period = app.add_option("--truth-period-s", arguments.truth_period_s,
-                                      "Plant time between its rows, instead of the file's pitch_s");
+  auto* truth_period =
+      app.add_option("--truth-period-s", arguments.truth_period_s,
+                     "Plant time between its rows; default: the machine file's pitch_s");
   auto* replay =
-      app.add_option("--replay", session.replay, "Run file whose rows take the place of the plant")
+      app.add_option("--replay", session.replay, "Run file to replay instead of the plant")
           ->type_name("FILE");
   auto* row_period = app.add_option("--row-period-ms", arguments.row_period_ms,
-                                    "Replay: one row each so often, real time; else by time_s");
-  auto* rows = app.add_option("--rows", arguments.rows, "Replay: rows A:B, from A and before B");
-  auto* row_log =
-      app.add_option("--row-log", session.row_log,
-                     "Replay: CSV of each row and the CLOCK_MONOTONIC ns at which it could be read")
-          ->type_name("FILE");
+                                    "Replay: period of rows, real time; default: by time_s");
+  auto* rows = app.add_option("--rows", arguments.rows, "Replay: rows A:B, B excluded");
+  auto* row_log = app.add_option("--row-log", session.row_log,
+                                 "Replay: CSV to write with each row and the CLOCK_MONOTONIC ns "
+                                 "since which it is readable")
+                      ->type_name("FILE");
   auto* settle = app.add_option("--settle-s", session.settle_s,
-                                "Replay: the last row stands for so long (default 1)");
-  app.add_option("--ports-file", session.ports_file, "The ready line goes there too")
+                                "Replay: duration of the last row (default 1)");
+  app.add_option("--ports-file", session.ports_file, "File that also receives the ready line")
       ->type_name("FILE");
-  app.add_option("--port", arguments.ports, "NAME=PORT of a bus or the controller; several times")
+  app.add_option("--port", arguments.ports, "NAME=PORT of a bus or the controller; may be repeated")
       ->type_name("NAME=PORT")
       ->allow_extra_args(false);
-  app.add_option("--path", arguments.paths, "NAME=PATH of a serial line's link; several times")
+  app.add_option("--path", arguments.paths, "NAME=PATH of a serial line's link; may be repeated")
       ->type_name("NAME=PATH")
       ->allow_extra_args(false);
   app.add_option("--tick-ms", arguments.tick_ms,
-                 "Registers are brought up to date so often, real time (default 10)")
+                 "Period of register updates, real time (default 10)")
       ->check(number_between(0.1, 10000.0));
   for (auto* option : {factor, truth_period, row_period}) option->check(positive);
   for (auto* option : {duration, settle}) option->check(not_negative);

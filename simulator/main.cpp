@@ -59,7 +59,7 @@ SimulatedBus& named_bus(MachineConfig& machine, const std::string& text, const s
   for (SimulatedBus& bus : machine.buses) {
     if (bus.name == name && bus.kind == kind) return bus;
   }
-  throw std::runtime_error(option + ": there is no such bus as \"" + name + "\"");
+  throw std::runtime_error(option + ": no bus is named \"" + name + "\"");
 }
 
 void apply(const SimulatorArguments& arguments, MachineConfig& machine, SessionOptions& session) {

@@ -143,7 +143,7 @@ std::string gaps_text(const ModbusControllerConfig& controller,
   }
   return text.empty()
              ? text
-             : "  read along, so they must be there (gap_registers_max = 0: none): " + text + "\n";
+             : "  also read, so they must exist (gap_registers_max = 0: none): " + text + "\n";
 }
 
 std::string modbus_table(const DaemonConfig& config, const ModbusControllerConfig& controller) {
@@ -344,10 +344,10 @@ std::string register_table(const DaemonConfig& config) {
   for (const AxisSpan& span : axis_spans(config.estimator.axes)) {
     const AxisConfig& axis = config.estimator.axes[span.first];
     if (const DiameterSpec* diameter = diameter_of(config.model, axis.output))
-      halves += "\naxis " + axis_name(axis) + " takes out " + half_of(*diameter) + ", a diameter\n";
+      halves += "\naxis " + axis_name(axis) + " corrects " + half_of(*diameter) + ", a diameter\n";
   }
   return "controller " + name + ": " + std::visit(TableText{config}, config.controller) + halves +
-         (config.dry_run ? "\nDRY RUN: the daemon only reads and writes none of these\n" : "");
+         (config.dry_run ? "\nDRY RUN: the daemon reads but writes none of these\n" : "");
 }
 
 }  // namespace thermocomp::cli

@@ -67,7 +67,7 @@ int run_export(const ExportOptions& options) {
   }
   if (summary.rows == 0) {
     report_damage(options.history, summary.damage);
-    throw Failure(options.history + ": nothing was recorded in that time");
+    throw Failure(options.history + ": nothing was recorded in this period");
   }
   file.commit();
   std::fprintf(stderr, "%llu rows, %zu columns\n", static_cast<unsigned long long>(summary.rows),
@@ -97,7 +97,7 @@ int run_history_replay(const ReplayOptions& options) {
   }
   const int status = report_damage(options.input, summary.damage);
   if (summary.compared == 0 && status != exit_success) {
-    throw Failure(options.input + ": nothing of it can be replayed");
+    throw Failure(options.input + ": no segment can be replayed");
   }
   file.commit();
   std::fprintf(
@@ -158,11 +158,10 @@ int run_history_check(const std::string& history) {
 }
 
 void add_history_check(CLI::App& app, Action& action) {
-  CLI::App* group = app.add_subcommand("history", "what a daemon recorded, as a file");
+  CLI::App* group = app.add_subcommand("history", "tests a daemon's history");
   group->require_subcommand(1);
   CLI::App* sub = group->add_subcommand(
-      "check",
-      "which segments of a history are sound; changes nothing. Exit status 1: some are not");
+      "check", "tests the segments of a history, read only. Exit status 1: some are damaged");
   const auto history = std::make_shared<std::string>();
   sub->add_option("HISTORY", *history, "history of thermocompd")->type_name("FILE")->required();
   sub->callback([&action, history] { action = [history] { return run_history_check(*history); }; });

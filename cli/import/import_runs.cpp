@@ -257,8 +257,8 @@ class Join {
     }
     if (inside_ == 0)
       refuse(second_, "--join", range(second_.time_s(), shift_s_),
-             "lies outside of " + first_.name + ", which is " + range(a, 0.0) +
-                 ": the clocks differ; write --shift-s S, where the second file's time_s plus S is "
+             "is outside " + first_.name + ", which is " + range(a, 0.0) +
+                 ": the clocks differ; give --shift-s S, where the second file's time_s plus S is "
                  "the first one's");
     run_.selected_end = run_.rows();
     note_shift();
@@ -290,8 +290,8 @@ class Join {
                               " s is that of " + first_.name + ", " + why_);
     run_.understood.push_back(
         std::to_string(inside_) + " of its " + std::to_string(rows) +
-        " rows lie within; temperatures and positions between two rows are on the line between "
-        "them, over at most " +
+        " rows are within; temperatures and positions are interpolated between rows, over at "
+        "most " +
         number_text(gap_s_) + " s");
   }
 

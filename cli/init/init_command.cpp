@@ -160,8 +160,8 @@ void refuse_missing_signals(const InitDraft& draft) {
   throw Failure("the model needs " + missing.front() + " from the controller: " +
                 (controller.is_modbus()
                      ? "--signal " + missing.front() + "=TABLE:ADDRESS[:TYPE[:SCALE]]"
-                     : "give it by --controller (--dry-run writes nothing to it), or until there "
-                       "is one take a model that needs no signal"));
+                     : "give it by --controller (--dry-run writes nothing to it), or use a model "
+                       "without signals"));
 }
 
 void refuse_missing_sensors(const InitDraft& draft) {
@@ -292,42 +292,45 @@ void add_init_command(CLI::App& app, Action& action) {
          "--bus", options->buses,
          std::string("a Modbus bus of modules: ") + link_forms + "; may be given several times")
       ->type_name("BUS");
-  sub->add_option("--module", options->modules,
-                  "UNIT=PRESET[/THERMOCOUPLE][@BASE][:CHANNELS], or without a preset "
-                  "UNIT=TABLE:TYPE:DEGC_A_COUNT:ADDRESSES[:OPEN_CIRCUIT_CODES]; BUS/UNIT=... on "
-                  "another bus than the first. Without CHANNELS those that give a temperature now")
+  sub->add_option(
+         "--module", options->modules,
+         "UNIT=PRESET[/THERMOCOUPLE][@BASE][:CHANNELS], or without a preset "
+         "UNIT=TABLE:TYPE:DEGC_A_COUNT:ADDRESSES[:OPEN_CIRCUIT_CODES]; BUS/UNIT=... on "
+         "another bus than the first. Default of CHANNELS: all that have a temperature now")
       ->type_name("MODULE");
   sub->add_option("--names", options->names,
-                  "names of the sensors, in order of modules and channels, commas between")
+                  "comma-separated names of the sensors, in order of modules and channels")
       ->type_name("NAMES");
   sub->add_option("--controller", options->controller,
                   "a line as of a bus and [@UNIT], linuxcnc or none; registers as in "
                   "docs/controllers/plc.md")
       ->type_name("WHERE");
   sub->add_option("--offset", options->offset,
-                  "where the controller takes the offset of the first axis, the others behind it: "
+                  "place of the first axis' offset in the controller; the others follow it: "
                   "TABLE:ADDRESS:TYPE:UM_A_COUNT (default holding:0:int32:0.01)")
       ->type_name("PLACE");
   sub->add_option("--applied", options->applied,
                   "read-back of the applied offset, or none (default input:0:int32:0.01)")
       ->type_name("PLACE");
-  sub->add_option("--valid-bits", options->valid_bits, "or none (default holding:10:uint16)")
+  sub->add_option("--valid-bits", options->valid_bits,
+                  "valid bits, or none (default holding:10:uint16)")
       ->type_name("PLACE");
-  sub->add_option("--heartbeat", options->heartbeat, "or none (default holding:11:uint16)")
+  sub->add_option("--heartbeat", options->heartbeat,
+                  "heartbeat, or none (default holding:11:uint16)")
       ->type_name("PLACE");
   sub->add_option("--signal", options->signals,
                   "further values to read from the controller, NAME=TABLE:ADDRESS[:TYPE[:SCALE]]")
       ->type_name("SIGNAL");
-  sub->add_option("--axes", options->axes, "axes that get an offset, commas between")
+  sub->add_option("--axes", options->axes, "comma-separated axes that get an offset")
       ->type_name("AXES");
   sub->add_option("--model", options->model,
-                  "a model that exists already; else one that gives no displacement yet is written")
+                  "an existing model; default: write one that gives no displacement yet")
       ->type_name("FILE");
   sub->add_option("--offset-um-max", options->offset_um_max,
-                  "bound of every axis (default 5, which is small to begin with)")
+                  "bound of every axis (default 5, small for a start)")
       ->check(CLI::Range(0.001, 500.0));
   sub->add_flag("--dry-run", options->dry_run,
-                "with dry_run = true: the controller is read and nothing is written to it");
+                "write dry_run = true: the daemon reads the controller and writes nothing to it");
   sub->add_flag("--no-scan", options->no_scan, "read no bus; channels must then be named");
   sub->add_flag("--force", options->force, "replace existing files; each is kept as FILE.old");
   sub->callback([&action, options] { action = [options] { return run_init(*options); }; });

@@ -42,9 +42,8 @@ int run_predict(const PredictOptions& options) {
   for (const PredictedOutput& output : prediction.outputs) {
     std::fprintf(stderr, "%s %.3f %.3f\n", output.name.c_str(), output.rms_um, output.peak_um);
     if (!output.measured_there)
-      std::fprintf(stderr,
-                   "%s: %s has no measured value of it, so there is nothing to compare with\n",
-                   output.name.c_str(), run.name.c_str());
+      std::fprintf(stderr, "%s: %s has no measured value to compare with\n", output.name.c_str(),
+                   run.name.c_str());
   }
   const std::string furthest = furthest_text(prediction);
   if (!furthest.empty()) std::fprintf(stderr, "%s\n", furthest.c_str());
@@ -80,7 +79,7 @@ int run_covariance(const CovarianceOptions& options) {
   const std::string text = read_text_file(options.model, model_bytes_max);
   ThermalModel model = parse_model(text, options.model);
   if (model.inputs.size() > covariance_inputs_max) {
-    throw Failure(options.model + ": a covariance is for at most " +
+    throw Failure(options.model + ": a covariance supports at most " +
                   std::to_string(covariance_inputs_max) + " inputs");
   }
   std::vector<RunFile> runs;
@@ -111,7 +110,7 @@ int run_correction(const CourseOptions& options) {
   const CorrectionConfig& correction = config.estimator.correction;
   if (correction.form == CorrectionForm::off) {
     throw Failure(options.config + ": [correction] form is \"off\"; choose \"two_phase\" or " +
-                  "\"recursive\" and its groups: the record contains what they learn");
+                  "\"recursive\" and its groups, since the record contains their gains");
   }
   ThermalModel model = load_model(config.model_file);
   std::vector<RunFile> runs;
@@ -125,10 +124,10 @@ int run_correction(const CourseOptions& options) {
   model.course = fit.course;
   cli::write_file(options.output, write_model(model));
   for (const auto& [name, points] : fit.course.outputs) {
-    std::fprintf(stderr, "%s: %zu probings taught gains, %zu kept", name.c_str(),
+    std::fprintf(stderr, "%s: %zu probings determined gains, %zu kept", name.c_str(),
                  fit.probings.at(name), points.size());
     if (fit.left_out_rms_um.contains(name)) {
-      std::fprintf(stderr, "; a run left out: RMS %.2f um (without a record %.2f um)",
+      std::fprintf(stderr, "; left-out runs: RMS %.2f um (without a record %.2f um)",
                    fit.left_out_rms_um.at(name), fit.without_rms_um.at(name));
     } else {
       std::fprintf(stderr, "; one run: not tested on another");

@@ -172,11 +172,11 @@ std::string furthest_text(const Prediction& prediction) {
   if (!(row.distance > 1.0)) return "";
   std::ostringstream text;
   text << std::setprecision(4) << "at " << std::lround(row.time_s) << " s the machine was "
-       << std::setprecision(2) << row.distance << " times as far from what the model was made from "
-       << "as counts as known, mostly by " << std::setprecision(4) << row.column << ": "
-       << row.value << " (recorded " << row.low << " to " << row.high << ")";
+       << std::setprecision(2) << row.distance << " times the limit away from the model's data, "
+       << "mostly by " << std::setprecision(4) << row.column << ": " << row.value << " (recorded "
+       << row.low << " to " << row.high << ")";
   if (row.value >= row.low && row.value <= row.high)
-    text << ", which is new with such other values or such a past";
+    text << ", in a new combination with other values or the past";
   return text.str();
 }
 

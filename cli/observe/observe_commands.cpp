@@ -157,13 +157,12 @@ int run_watch(const GlobalOptions& global, const WatchOptions& options) {
 void add_observe_commands(CLI::App& app, const GlobalOptions& global, Action& action) {
   const auto as_json = std::make_shared<bool>(false);
   const auto wanted = std::make_shared<StatusOptions>();
-  CLI::App* status = app.add_subcommand(
-      "status", "shows whether and how much the daemon compensates, since when, and problems");
+  CLI::App* status = app.add_subcommand("status", "shows mode, offsets and problems of the daemon");
   status->add_flag("--json", wanted->as_json,
-                   "the daemon's answer as JSON, with exit_status and why it is that");
+                   "print the daemon's answer as JSON, with exit_status and its reason");
   status->add_flag("--strict", wanted->strict,
-                   "exit status 1 also while it compensates, but something is wrong: a bound "
-                   "reached, a read-back that disagrees, a bad sensor, a silent unit");
+                   "exit status 1 also while it compensates with a problem: a bound reached, a "
+                   "mismatch, a bad sensor, a silent unit");
   status->callback([&, wanted] { action = [&, wanted] { return run_status(global, *wanted); }; });
 
   CLI::App* events =

@@ -93,8 +93,8 @@ int run_reference(const GlobalOptions& global, bool force) {
     answer = ask_daemon(global.socket, "reference", params);
   } catch (const Failure& refusal) {
     if (force || refusal.status() != exit_no) throw;
-    throw Failure(refusal.what() + std::string(". thermocomp reference --force takes it all the "
-                                               "same, unless a sensor is lost"),
+    throw Failure(refusal.what() + std::string(". thermocomp reference --force takes it "
+                                               "nevertheless, unless a sensor is lost"),
                   exit_no);
   }
   std::cout << "reference: the present temperatures\n";

@@ -49,7 +49,7 @@ int run_report(const ReportOptions& options) {
   span.from_s = moment_of(options.from, std::max(recorded.from_s, span.to_s - week_s), recorded);
   if (!(span.to_s > span.from_s)) throw Failure("--from must be before --to");
   if (!(span.within(recorded).length_s() > 0.0))
-    throw Failure(options.history + ": nothing was recorded in that time");
+    throw Failure(options.history + ": nothing was recorded in this period");
   MachineWeek week = machine_week(options.history, span);
   week.machine = options.machine;
   cli::write_file(options.output, week_html(week));

@@ -151,8 +151,8 @@ std::string probings_part(const MachineWeek& week) {
   if (week.candidate)
     html += html_paragraph("Candidate model, not in use: " + candidate_text(*week.candidate) + ".");
   return html + html_paragraph(
-                    "Left: displacement found by the probing with the offset of that time. In a "
-                    "dry run nothing was sent: both are hypothetical.",
+                    "Left: displacement found by the probing, with the offset at that time. In a "
+                    "dry run no offset was sent, so both are hypothetical.",
                     "small");
 }
 
@@ -177,10 +177,10 @@ std::string sensors_part(const MachineWeek& week) {
   }
   return html_heading("Sensors") + html_table(rows) +
          html_paragraph(
-             "Suspected: time during which the sensor contradicted its neighbours. Drift: of the "
-             "difference to the sensor that moved most like it, over the whole time, apart from "
-             "what that sensor's course explains; ± two standard deviations, six hours counted as "
-             "one independent value.",
+             "Suspected: time during which the sensor contradicted its neighbours. Drift: change "
+             "of the difference to the most similar sensor over the whole time, except for the "
+             "part explained by that sensor's course; ± two standard deviations, with one "
+             "independent value per six hours.",
              "small");
 }
 

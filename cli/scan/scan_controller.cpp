@@ -130,18 +130,18 @@ std::string why_it_may_move(const ModbusControllerConfig& modbus, const std::vec
   for (std::size_t axis = 0; axis < modbus.axes.size(); ++axis) {
     const Place* applied = of_axis(read, axis);
     const Place* offset = of_axis(written, axis);
-    if (offset == nullptr) return "each set along a travel has a number of its own";
+    if (offset == nullptr) return "each set along a travel has its own number";
     if (applied == nullptr) return offset->shown.what + " is not read back";
     const double step = std::abs(applied->value.scale) + std::abs(offset->value.scale);
     if (!(std::abs(applied->shown.value - offset->shown.value) <= step))
-      return offset->shown.what + " is not what is applied";
+      return offset->shown.what + " differs from the applied offset";
     const bool is_valid =
         valid_bits == nullptr ||
         (bits_of(valid_bits->words, valid_bits->value.encoding, valid_bits->value.word_order) >>
              axis &
          1U) != 0;
     if (!is_valid && std::abs(applied->shown.value) > step)
-      return "valid_bits is not what is applied";
+      return "valid_bits contradicts the applied offset";
   }
   return "";
 }
@@ -250,7 +250,7 @@ class ControllerScan {
                      std::to_string(request.address) + ".." +
                      std::to_string(request.address + request.count - 1) +
                      " in one request, which the controller refuses (" + why_not(exchange) +
-                     "): gap_registers_max = 0 in [controller] reads none between";
+                     "): gap_registers_max = 0 in [controller] reads no registers between";
   }
 
   void write_back(const std::vector<Place>& written, ScanController& result) {
@@ -266,7 +266,7 @@ class ControllerScan {
     }
     result.writes =
         "writes are answered: the registers' present values were written back (thermocomp status "
-        "shows whether a new offset is taken over)";
+        "shows whether a new offset is applied)";
   }
 
   void ask_alone(Place& place) {

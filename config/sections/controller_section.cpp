@@ -33,7 +33,7 @@ enum class Kind {
 void refuse_travel(const TomlTable& axis) {
   refuse_all(axis, {"line", "table"},
              "needs a controller that takes a set of values as a whole (kind = \"modbus_tcp\", "
-             "\"modbus_rtu\" or \"can\"); with `offset` the daemon itself follows the position");
+             "\"modbus_rtu\" or \"can\"); with `offset` the daemon follows the position");
 }
 
 template <class Place>

@@ -198,7 +198,7 @@ ModbusStatus read_status(const TomlTable& table, int base_address) {
     return status;
   }
   if (status.address + base_address > address_max) {
-    table.problem("address", "would pass register 65535 with the device's base_address");
+    table.problem("address", "exceeds register 65535 with the device's base_address");
   } else {
     status.address = static_cast<std::uint16_t>(status.address + base_address);
   }

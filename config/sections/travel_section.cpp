@@ -38,7 +38,7 @@ void check_offset_place(const TomlTable& table, std::string_view key, const Carr
   if (place.count <= count_um_max(limiter)) return;
   table.problem(key, "one count of " + number_text(place.count) + " um",
                 "must be at most " + number_text(count_um_max(limiter)) +
-                    " um beside offset_um_max = " + number_text(limiter.offset_um_max) +
+                    " um with offset_um_max = " + number_text(limiter.offset_um_max) +
                     " and rate_um_per_s_max = " + number_text(limiter.rate_um_per_s_max) +
                     ": check `scale`");
 }

@@ -11,7 +11,7 @@ namespace thermocomp {
 /// UTF-8.
 [[nodiscard]] bool is_printable(std::string_view text);
 inline constexpr std::string_view printable_rule =
-    "must be printable: no control characters, none that turn the direction of writing";
+    "must be printable, without control characters or changes of writing direction";
 
 /// Replaces unprintable characters by their name: `<U+202E>`; a byte that is not UTF-8 by `?`, a C0
 /// control character or DEL by a blank.

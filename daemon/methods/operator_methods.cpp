@@ -132,9 +132,9 @@ void require_possible(const StatusView& view, const Command& command, double exp
     throw RpcError(
         rpc::invalid_params,
         fmt::format(
-            "nothing is taken over: {:g} um was measured where the model expects {:.1f} um; "
-            "the axis' bound and three times the model's claimed error allow {:.1f} um of "
-            "difference. Check the axis, the sign and the unit",
+            "value refused: {:g} um measured, {:.1f} um expected by the model; the axis' bound and "
+            "three times the model's claimed error allow a difference of {:.1f} um. Check axis, "
+            "sign and unit",
             command.value_um, from_um, allowed_um));
 }
 
@@ -175,9 +175,9 @@ Command measured_command(const StatusView& view, const json& params) {
                 "\"remaining\"");
   const double known_s = view.report.remembered_s;
   refuse_unless(command.ago_s <= known_s,
-                fmt::format("where the axis was {:.0f} min ago is not known: the daemon remembers "
-                            "the last {:.0f} min since the start or the reference, and nothing "
-                            "with [correction] form = \"off\"",
+                fmt::format("the axis' state {:.0f} min ago is unknown: the daemon keeps the last "
+                            "{:.0f} min since the start or the reference, and nothing with "
+                            "[correction] form = \"off\"",
                             command.ago_s / 60.0, known_s / 60.0));
   return command;
 }
@@ -198,8 +198,8 @@ void ask_back(const StatusView& view, const Command& command, double expected_um
   if (entry_error == EntryError::none || is_confirmed) return;
   throw RpcError(
       rpc::refused,
-      fmt::format("asked back, nothing is taken over: {:+g} um was measured, {:+.1f} +-{:.1f} um "
-                  "(1 sd) was expected; {}. If it is correct, repeat it with --confirm",
+      fmt::format("not confirmed, value refused: {:+g} um measured, {:+.1f} +-{:.1f} um (1 sd) "
+                  "expected; {}. If it is correct, repeat it with --confirm",
                   command.value_um, expected_um, sd_um, text_of(entry_error)));
 }
 

@@ -27,8 +27,8 @@ constexpr std::chrono::milliseconds connected_again_every(20);
 
 [[noreturn]] void no_daemon(const std::string& path, int error) {
   std::string why = std::strerror(error);
-  if (error == ENOENT) why = "there is no such socket (is thermocompd running?)";
-  if (error == ECONNREFUSED) why = "nobody listens there (is thermocompd running?)";
+  if (error == ENOENT) why = "no such socket (is thermocompd running?)";
+  if (error == ECONNREFUSED) why = "connection refused (is thermocompd running?)";
   throw ClientError("no daemon at " + path + ": " + why);
 }
 
@@ -131,9 +131,9 @@ json StatusClient::Parts::parse(std::string_view line) const {
     json message = parse_outer_json(line);
     if (message.is_object()) return message;
   } catch (const JsonError& error) {
-    throw ClientError(path + ": answers something else than JSON-RPC: " + error.what());
+    throw ClientError(path + ": answer is not JSON-RPC: " + error.what());
   }
-  throw ClientError(path + ": answers something else than JSON-RPC");
+  throw ClientError(path + ": answer is not JSON-RPC");
 }
 
 void StatusClient::Parts::keep(json notification) {

@@ -90,7 +90,7 @@ std::string exception_text(int code) {
   const bool is_known = code > 0 && static_cast<std::size_t>(code) < names.size();
   const std::string_view name = is_known ? names[static_cast<std::size_t>(code)] : "";
   return "exception " + std::to_string(code) + " (" +
-         (name.empty() ? "the protocol does not know it" : std::string(name)) + ")";
+         (name.empty() ? "not in the protocol" : std::string(name)) + ")";
 }
 
 }  // namespace
@@ -327,7 +327,7 @@ Exchange ModbusConnection::Implementation::try_once(int unit, const Pdu& request
   exchange.sent_at = port_->now();
   was_sent_ = false;
   if (!discard()) {
-    exchange.detail = "the line was lost, or bytes come without end that answer nothing";
+    exchange.detail = "the line was lost, or unrelated bytes keep arriving";
     return exchange;
   }
   const auto frame = frames_.request(unit, request.view(), answer_bytes);

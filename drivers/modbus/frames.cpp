@@ -50,13 +50,13 @@ std::span<const std::uint8_t> rtu_answer(std::span<const std::uint8_t> bytes) no
 }
 
 std::string of_unit(std::uint8_t unit, int asked, std::span<const std::uint8_t> bytes) {
-  return "unit " + std::to_string(unit) + " answered, asked was unit " + std::to_string(asked) +
+  return "unit " + std::to_string(unit) + " answered instead of unit " + std::to_string(asked) +
          " (" + hex_text(bytes) + ")";
 }
 
 std::string of_function(std::span<const std::uint8_t> pdu, int asked) {
-  return "an answer to function " + std::to_string(pdu[0] & ~exception_bit) +
-         " came, asked was function " + std::to_string(asked) + " (" + hex_text(pdu) + ")";
+  return "received an answer to function " + std::to_string(pdu[0] & ~exception_bit) +
+         " instead of function " + std::to_string(asked) + " (" + hex_text(pdu) + ")";
 }
 
 }  // namespace
@@ -184,8 +184,8 @@ ModbusFrames::Found ModbusFrames::look_tcp() {
     const std::size_t size = word_at(received(), 4) + std::size_t{6};
     if (word_at(received(), 2) != 0 || size <= head_bytes || size > frame_.size()) {
       other_ = rtu_answer(received()).empty()
-                   ? "what came is no Modbus TCP frame (" + hex_text(received()) + ")"
-                   : "a serial frame came (" + hex_text(received()) +
+                   ? "received bytes are not a Modbus TCP frame (" + hex_text(received()) + ")"
+                   : "received a serial frame (" + hex_text(received()) +
                          "): kind = \"modbus_rtu_over_tcp\"";
       return Found::no_frame;
     }
@@ -232,9 +232,9 @@ std::string ModbusFrames::came() const {
     const std::size_t whole = answer_bytes_ + (rtu_ ? 1 + checksum_bytes : head_bytes);
     const std::string count = std::to_string(part.size()) + " of " + std::to_string(whole) +
                               " bytes (" + hex_text(part) + ")";
-    return part.size() < whole ? "the answer broke off: " + count : "wrong checksum: " + count;
+    return part.size() < whole ? "incomplete answer: " + count : "wrong checksum: " + count;
   }
-  return echoed_ ? "only the echo of the request came" : "";
+  return echoed_ ? "received only the echo of the request" : "";
 }
 
 }  // namespace thermocomp

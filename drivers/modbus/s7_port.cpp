@@ -212,7 +212,7 @@ bool S7Port::ask(const Bytes& request, std::string& why) {
     if (kind == PortBytes::Kind::bytes) return true;
     if (kind == PortBytes::Kind::nothing) continue;
     why = stream_.empty() ? "it closes the connection"
-                          : "what came is no ISO-on-TCP (" + hex_text(stream_) + ")";
+                          : "received bytes are not ISO-on-TCP (" + hex_text(stream_) + ")";
     return false;
   }
   return false;

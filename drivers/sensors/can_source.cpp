@@ -130,7 +130,7 @@ std::vector<UnitHealth> CanSource::units(nanoseconds now) {
     UnitHealth& unit = units_[channel.device];
     if (!usable() || unit.answers != 0 || !unit.last_error.empty()) continue;
     if (now - opened_at_ < silent_after) continue;
-    unit.last_error = "no frame with identifier " + hexadecimal(channel.id) + " has come";
+    unit.last_error = "no frame with identifier " + hexadecimal(channel.id) + " received";
   }
   return units_;
 }
@@ -155,7 +155,7 @@ void CanSource::note_arrival(Arrival arrival, UnitHealth& unit) {
     ++unit.bad_frames;
     unit.last_error = "frame too short";
   } else if (arrival == Arrival::unchanged) {
-    unit.last_error = "the counter in the frame stands still";
+    unit.last_error = "the counter in the frame does not change";
   } else {
     ++unit.answers;
     unit.last_error.clear();
@@ -175,7 +175,7 @@ std::string CanSource::contest(const CanFrame& frame, Channel& channel) {
   if (at >= channel.contested_until) return {};
   const auto [low, high] = std::minmax(*channel.rival, frame.id);
   return hexadecimal(low) + " and " + hexadecimal(high) +
-         " send the same group: key id of the sensor says which counts";
+         " send the same group: choose one by the sensor's key id";
 }
 
 void CanSource::take(const CanFrame& frame) {

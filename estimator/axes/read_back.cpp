@@ -115,9 +115,9 @@ std::string likely_text(const Mismatch& mismatch) {
     case MismatchCause::stands_still:
       if (std::abs(mismatch.read_um) <= noise_um)
         return "reads back nothing of what is sent: not taken, or check scale";
-      return "does not take what is sent (rejects it or stands still)";
+      return "does not follow the offset sent (rejected, or stopped)";
     case MismatchCause::changes_alone:
-      return "changes without us: another writer?";
+      return "changes by itself: another writer?";
     case MismatchCause::constant:
       std::snprintf(text.data(), text.size(), "constant %+.1f um: check the offset's zero",
                     mismatch.size);

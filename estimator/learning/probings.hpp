@@ -145,7 +145,7 @@ class Probings {
   /// Present state of the axis, with contributions and entered offset.
   [[nodiscard]] PastMoment present(std::size_t axis, double compensated_um,
                                    double model_um) const noexcept;
-  /// Kept state nearest to `at`; nullptr: none near.
+  /// Stored state nearest to `at`; nullptr: none near.
   [[nodiscard]] const PastMoment* past(std::size_t axis, nanoseconds at) const noexcept;
   [[nodiscard]] bool must_remember(nanoseconds now) const noexcept {
     return is_on_ && now - remembered_at_ >= past_pitch;

@@ -117,7 +117,7 @@ std::string subject_text(const nlohmann::json& answer) {
                   first.value("subject", std::string()).c_str(), first.value("effect_um", 0.0));
     return text.data();
   }
-  return "more is left than of its sisters";
+  return "its residual is larger than its sisters'";
 }
 
 /// The last compared night was unusual too; a single unusual night happens by chance.
@@ -304,7 +304,7 @@ NightOutcome work_off(pqxx::connection& store, const MachineNight& night) {
   const fs::path run = folder / (night.night + ".csv");
   if (write_run(store, night, run) < probings_min) {
     result.state = "empty";
-    text = "hardly anything was probed";
+    text = "too few probings";
   } else {
     run_modelling(
         {"series", "--machine", night.name, run.string(), "-o", folder / "statistics.toml"},

@@ -181,32 +181,32 @@ int run_by_slurm(const std::string& conninfo, const NightOptions& options) {
 void add_night_command(CLI::App& app, const std::string& store, cli::Action& action) {
   auto options = std::make_shared<NightOptions>();
   CLI::App* command = app.add_subcommand(
-      "night",
-      "compares every machine's days that are over with its sisters and with its own past");
+      "night", "compares every machine's past days with its sisters and with its own past");
   command
-      ->add_option("--nights", options->nights, "how far back it looks for days without a result")
+      ->add_option("--nights", options->nights, "number of past days to check for missing results")
       ->check(CLI::Range(1, 400))
       ->capture_default_str();
-  CLI::Option* jobs =
-      command->add_option("-j,--jobs", options->jobs, "machines at the same time; else one a core")
-          ->check(CLI::Range(1, 256));
+  CLI::Option* jobs = command
+                          ->add_option("-j,--jobs", options->jobs,
+                                       "number of machines in parallel; default: one per core")
+                          ->check(CLI::Range(1, 256));
   CLI::Option* slurm =
       command
           ->add_flag("--slurm", options->is_slurm,
-                     "makes the series, gives Slurm (sbatch) one job array with a task a machine, "
-                     "and waits for it. The program and the store are reached from every node; the "
-                     "tasks write into thermocomp-night-JOB.log here. What was killed is done by "
-                     "the next run")
+                     "computes the series, submits one job array with a task per machine to Slurm "
+                     "(sbatch) and waits for it. Every node must reach the program and the store. "
+                     "Tasks write to thermocomp-night-JOB.log in this folder; the next run repeats "
+                     "killed tasks")
           ->excludes(jobs);
   command
       ->add_option("--machine-number", options->machine,
-                   "only this machine, by its number in the store, beside the series that are "
-                   "there: a task of --slurm")
+                   "evaluate only the machine with this number in the store, with existing "
+                   "series; used by the tasks of --slurm")
       ->check(CLI::PositiveNumber)
       ->excludes(slurm);
   command->footer(
-      "Exit status: 0 nothing departs; 1 a machine departs, or a night has no result (it is tried "
-      "again); 2 usage error, or the store is not reached.");
+      "Exit status: 0 no machine departs; 1 a machine departs, or a night has no result (the next "
+      "run retries); 2 usage error, or the store is unreachable.");
   command->callback([&store, &action, options] {
     action = [&store, options] {
       return options->is_slurm ? run_by_slurm(store, *options) : run_here(store, *options);

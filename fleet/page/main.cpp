@@ -68,7 +68,7 @@ class StoreReader {
       }
       pqxx::nontransaction work(*store_);
       const pqxx::row row = work.exec_params1(sql, pqxx::prepare::make_dynamic_params(values));
-      if (row[0].is_null()) return {404, error_text("there is no such machine")};
+      if (row[0].is_null()) return {404, error_text("no such machine")};
       return {200, row[0].as<std::string>()};
     } catch (const std::exception& error) {
       spdlog::warn("not answered: {}", error.what());
@@ -111,7 +111,7 @@ class Page {
       return tables_.ask(exchange, "fleet.page_machine($1)",
                          {std::string(exchange.argument("name"))});
     if (path == "/api/curves") return ask_curves(exchange);
-    exchange.answer(404, json_type, error_text("there is no such page"));
+    exchange.answer(404, json_type, error_text("no such page"));
   }
 
   /// Curves of the last `seconds`, at most a year.

@@ -35,7 +35,7 @@ int offer(const std::string& conninfo, const OfferOptions& options) {
       "SELECT id, name FROM fleet.machine WHERE name = $1 OR (type = $1 AND NOT EXISTS"
       " (SELECT FROM fleet.machine WHERE name = $1)) ORDER BY name",
       options.whom);
-  if (machines.empty()) throw cli::Failure(options.whom + ": no machine and no type is called so");
+  if (machines.empty()) throw cli::Failure(options.whom + ": no machine or type has this name");
   for (const auto& machine : machines) {
     const auto release =
         work.exec_params1(
@@ -80,11 +80,11 @@ int order(const std::string& conninfo, const OrderOptions& options) {
       " JOIN fleet.machine ON machine.id = release.machine WHERE release.id = $1",
       options.release);
   const std::string name = "release " + std::to_string(options.release);
-  if (found.empty()) throw cli::Failure(name + ": there is none");
+  if (found.empty()) throw cli::Failure(name + ": does not exist");
   const auto machine = found[0][0].as<std::string>();
   const std::string done = done_with(work, options.release);
   if (done == "refused" || done == "rolled_back")
-    throw cli::Failure(name + ": " + machine + " has ended it (" + done + ")", cli::exit_no);
+    throw cli::Failure(name + ": " + machine + " has finished it (" + done + ")", cli::exit_no);
   if (options.takes_back && done != "promoted") {
     add_step(work, options.release, "withdrawn", "");
     work.commit();
@@ -95,7 +95,7 @@ int order(const std::string& conninfo, const OrderOptions& options) {
     throw cli::Failure(name + ": " + machine + " is approved at the machine: thermocomp promote " +
                            (options.takes_back ? "--back there" : "there"),
                        cli::exit_no);
-  if (options.key.empty()) throw cli::Failure("--key: whoever orders it must sign it");
+  if (options.key.empty()) throw cli::Failure("--key: the order must be signed");
   const std::string signature = sign_order(
       {machine, options.release, found[0][1].as<std::string>(), options.takes_back}, options.key);
   add_step(work, options.release, options.takes_back ? "rollback" : "approved", signature);
@@ -110,8 +110,8 @@ void add_order(CLI::App& app, const std::string& store, cli::Action& action, con
   auto options = std::make_shared<OrderOptions>();
   options->takes_back = takes_back;
   CLI::App* command = app.add_subcommand(name, help);
-  command->add_option("RELEASE", options->release, "its number")->required();
-  command->add_option("--key", options->key, "private Ed25519 key of who orders it, PEM")
+  command->add_option("RELEASE", options->release, "number of the release")->required();
+  command->add_option("--key", options->key, "private Ed25519 key that signs the order, PEM")
       ->type_name("FILE");
   command->callback([&store, &action, options] {
     action = [&store, options] { return order(store, *options); };
@@ -123,18 +123,19 @@ void add_order(CLI::App& app, const std::string& store, cli::Action& action, con
 void add_release_commands(CLI::App& app, const std::string& store, cli::Action& action) {
   auto options = std::make_shared<OfferOptions>();
   CLI::App* command = app.add_subcommand(
-      "offer", "offers a model to a machine, or to all of a type; each checks it by itself");
+      "offer", "offers a model to a machine or to all machines of a type; each machine checks it");
   command->add_option("WHOM", options->whom, "machine or type")->required();
   command->add_option("MODEL", options->model, "model file")->type_name("FILE")->required();
-  command->add_option("--note", options->note, "why, for those who approve it")->type_name("TEXT");
+  command->add_option("--note", options->note, "reason, shown to those who approve it")
+      ->type_name("TEXT");
   command->callback([&store, &action, options] {
     action = [&store, options] { return offer(store, *options); };
   });
   add_order(app, store, action, "approve",
-            "signs that a machine which is approved centrally may promote a release", false);
+            "approves a release by signature, for machines with central approval", false);
   add_order(app, store, action, "rollback",
-            "takes a release back: withdraws what is not in use yet, and signs that the model "
-            "before may run again",
+            "takes a release back: withdraws it if it is not in use yet, else approves the "
+            "previous model by signature",
             true);
 }
 

@@ -88,7 +88,7 @@ MachineRows::MachineRows(pqxx::connection& store, const std::string& machine, st
       machine.empty() ? work.exec("SELECT fleet.my_machine()")
                       : work.exec_params("SELECT id FROM fleet.machine WHERE name = $1", machine);
   if (found.empty() || found[0][0].is_null())
-    throw std::runtime_error(machine.empty() ? "the role that logged in is of no machine"
+    throw std::runtime_error(machine.empty() ? "the role that logged in belongs to no machine"
                                              : machine + ": no such machine in the store");
   machine_ = found[0][0].as<int>();
   work.exec_params(

@@ -81,7 +81,7 @@ MigrationResult migrate(pqxx::connection& store, const std::filesystem::path& fo
   for (const auto& entry : std::filesystem::directory_iterator(folder))
     if (entry.path().extension() == ".sql")
       files[entry.path().filename().string()] = read_text_file(entry.path());
-  if (files.empty()) throw std::runtime_error(folder.string() + ": no *.sql in it");
+  if (files.empty()) throw std::runtime_error(folder.string() + ": contains no *.sql");
   MigrationResult result;
   pqxx::work work(store);
   work.exec(

@@ -45,11 +45,11 @@ void write_secret(const fs::path& file, const std::string& text) {
   if (descriptor < 0) throw cli::Failure(file.string() + ": " + std::strerror(errno));
   const ssize_t written = write(descriptor, text.data(), text.size());
   if (close(descriptor) != 0 || written != static_cast<ssize_t>(text.size()))
-    throw cli::Failure(file.string() + ": could not be written whole");
+    throw cli::Failure(file.string() + ": could not be written completely");
 }
 
 int add(const std::string& conninfo, const NewMachine& machine, const fs::path& file) {
-  if (fs::exists(file)) throw cli::Failure(file.string() + ": exists already");
+  if (fs::exists(file)) throw cli::Failure(file.string() + ": already exists");
   pqxx::connection store = open_store(conninfo);
   const std::string password = add_machine(store, machine);
   write_secret(file, password + "\n");
@@ -94,7 +94,7 @@ std::string night_text(const pqxx::row& row) {
   std::string text(row["night"].c_str());
   const std::string state = row["night_state"].c_str();
   if (state == "failed") return text.append(" failed: ").append(row["error"].c_str());
-  if (state == "empty") return text.append(" nothing was probed");
+  if (state == "empty") return text.append(" no probings");
   if (row["departs"].is_null()) return text.append(" no series yet");
   text.append(row["departs"].as<bool>() ? " DEPARTS" : " like its sisters");
   return text.append(", p ").append(row["probability"].c_str());
@@ -185,7 +185,7 @@ int load(const std::string& conninfo, const LoadOptions& options) {
   pqxx::connection store = open_store(conninfo);
   const Taken taken =
       MachineRows(store, options.machine, fs::path(options.run).filename()).send(batch);
-  std::printf("%llu rows, %llu refused (time), %llu were there already; %zu probed values\n",
+  std::printf("%llu rows, %llu refused (time), %llu already present; %zu probed values\n",
               static_cast<unsigned long long>(taken.sent),
               static_cast<unsigned long long>(taken.refused),
               static_cast<unsigned long long>(taken.repeated), batch.probings.size());
@@ -196,24 +196,24 @@ int load(const std::string& conninfo, const LoadOptions& options) {
 
 void add_store_commands(CLI::App& app, const std::string& store, cli::Action& action) {
   CLI::App* init_command = app.add_subcommand("init",
-                                              "makes the tables of a new store in an empty "
-                                              "database, or brings older ones up to this version");
+                                              "creates the tables of a store in an empty "
+                                              "database, or updates older tables");
   init_command->callback([&] { action = [&store] { return init(store); }; });
 
   auto machine = std::make_shared<NewMachine>();
   auto file = std::make_shared<std::string>();
-  CLI::App* add_command =
-      app.add_subcommand("add", "adds a machine, and the role by which its uplink logs in");
-  add_command->add_option("MACHINE", machine->name, "its name: letters, digits, _ - .")->required();
-  add_command->add_option("--type", machine->type, "machines of one type are compared")
+  CLI::App* add_command = app.add_subcommand("add", "adds a machine and the role of its uplink");
+  add_command->add_option("MACHINE", machine->name, "name of the machine: letters, digits, _ - .")
+      ->required();
+  add_command->add_option("--type", machine->type, "type; machines of one type are compared")
       ->type_name("TYPE")
       ->required();
-  add_command->add_option("--hall", machine->hall, "where it stands")->type_name("HALL");
+  add_command->add_option("--hall", machine->hall, "location of the machine")->type_name("HALL");
   add_command->add_flag("--central", machine->central_approval,
                         "models are approved by a member of fleet_approval, not at the machine");
   add_command
       ->add_option("-o,--password-file", *file,
-                   "where the role's password is written, for the uplink (uplink_MACHINE.password)")
+                   "file for the role's password, default uplink_MACHINE.password")
       ->type_name("FILE");
   add_command->callback([&store, &action, machine, file] {
     action = [&store, machine, file] {
@@ -224,10 +224,10 @@ void add_store_commands(CLI::App& app, const std::string& store, cli::Action& ac
 
   auto loading = std::make_shared<LoadOptions>();
   CLI::App* load_command = app.add_subcommand(
-      "load", "a run file as if an uplink had sent it: of a machine that has no network");
-  load_command->add_option("MACHINE", loading->machine, "its name in the store")->required();
-  load_command->add_option("RUN.csv", loading->run, "run file, as thermocomp export writes it")
+      "load", "loads a run file instead of an uplink, for a machine without network");
+  load_command->add_option("MACHINE", loading->machine, "name of the machine in the store")
       ->required();
+  load_command->add_option("RUN.csv", loading->run, "run file of thermocomp export")->required();
   load_command
       ->add_option("--begin", loading->begin, "time of its first second: 2026-03-01T08:30:00Z")
       ->required();
@@ -238,12 +238,11 @@ void add_store_commands(CLI::App& app, const std::string& store, cli::Action& ac
       [&store, &action, loading] { action = [&store, loading] { return load(store, *loading); }; });
 
   CLI::App* status_command = app.add_subcommand("status",
-                                                "the machines: when they were heard last, what "
-                                                "their newest night found, and which models wait");
+                                                "lists machines with last contact, result of the "
+                                                "newest night, and releases in progress");
   status_command->footer(
-      "Exit status: 0 all is well; 1 a machine departs, a night failed, or an uplink was not heard "
-      "for "
-      "a day; 2 usage error, or the store is not reached.");
+      "Exit status: 0 no problem; 1 a machine departs, a night failed, or an uplink was silent for "
+      "a day; 2 usage error, or the store is unreachable.");
   status_command->callback([&] { action = [&store] { return status(store); }; });
 }
 

@@ -91,7 +91,7 @@ bool Uplink::send_new(Source& source) {
       spdlog::warn("{} of {} rows refused: their time is impossible (clock set wrong?)",
                    taken.refused, taken.sent);
     if (taken.repeated > 0)
-      spdlog::info("{} of {} rows were there already", taken.repeated, taken.sent);
+      spdlog::info("{} of {} rows were already present", taken.repeated, taken.sent);
     pace_.rest();
     if (batch->rows.size() < rows_a_batch) break;
   }

@@ -21,7 +21,7 @@ std::vector<double> read_vector(const TomlTable& table, std::string_view key, st
   std::vector<double> values = table.numbers(key);
   if (values.size() != states && table.has(key)) {
     table.problem(key, std::to_string(values.size()) + " numbers",
-                  "must be as many numbers as there are states");
+                  "must have one number per state");
   }
   values.resize(states, 0.0);
   return values;
@@ -100,7 +100,7 @@ BodyPart read_part(const TomlTable& table, std::size_t states) {
   if (film)
     part.inflow = read_vector(table, "inflow", states);
   else
-    table.refuse("inflow", "only a film brings something in");
+    table.refuse("inflow", "only a film has an inflow");
   return part;
 }
 

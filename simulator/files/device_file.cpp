@@ -184,7 +184,7 @@ DeviceDefaults read_device(Draft& state, const TomlTable& own, sections::Presets
 /// Adds the device's base address; reports a result beyond the last register.
 std::uint16_t moved(const TomlTable& table, std::uint16_t address, int base_address) {
   if (address + base_address <= 65535) return static_cast<std::uint16_t>(address + base_address);
-  table.problem("address", "would pass register 65535 with the device's base_address");
+  table.problem("address", "exceeds register 65535 with the device's base_address");
   return address;
 }
 
@@ -519,7 +519,7 @@ void read_channel_code(const Draft& state, const TomlTable& table, EventConfig& 
   };
   if (!lists(channel.codes) && !(channel.status && lists(channel.status->codes)) &&
       !lists(channel.can_status.codes)) {
-    table.problem("code", "must be one that the channel's device has for it");
+    table.problem("code", "must be a code of the channel's device for this fault");
   }
 }
 
@@ -562,7 +562,7 @@ EventConfig read_event(const Draft& state, const TomlTable& table) {
   read_channel_code(state, table, event);
   if (event.kind == MachineEventKind::exception) event.code = table.integer("code", 1, 255, 6);
   if (!fits(event.kind, event.target, on_can(state, event))) {
-    table.problem("kind", "cannot happen to such a target");
+    table.problem("kind", "does not apply to this target");
   }
   return event;
 }

@@ -45,8 +45,8 @@ NodeEvent read_event(const TomlTable& table, std::size_t channels) {
       event.code = table.integer<std::int64_t>("code", -(1LL << 40), 1LL << 40);
     }
   } else {
-    table.refuse("channel", "is a matter of the whole node");
-    table.refuse("code", "is a matter of a channel");
+    table.refuse("channel", "must be omitted: the event concerns the whole node");
+    table.refuse("code", "must be omitted: it applies to a channel only");
   }
   event.at_s = table.number("at_s", Range::between(0.0, large), 0.0);
   event.duration_s = table.number("duration_s", Range::above(0.0, large), large);
@@ -67,7 +67,7 @@ void check_event(const TomlTable& table, const SimulatedCanopenNode& node, const
       node.emergency == EmergencyForm::jumo && !event.code &&
       (event.kind == NodeEventKind::open_circuit || event.kind == NodeEventKind::short_circuit);
   if (is_shown || lists(channel.codes, event) || lists(channel.status.codes, event)) return;
-  table.problem(event.code ? "code" : "kind", "is nothing that the channel can show");
+  table.problem(event.code ? "code" : "kind", "is not supported by the channel");
 }
 
 void check_event(const TomlTable& table, const SimulatedJ1939Node& node, const NodeEvent& event) {
@@ -82,7 +82,7 @@ void check_event(const TomlTable& table, const SimulatedJ1939Node& node, const N
                                          event.kind == NodeEventKind::over_range ||
                                          event.kind == NodeEventKind::channel_error);
   if (is_standard || has_first) return;
-  table.problem(event.code ? "code" : "kind", "is nothing that the channel can show");
+  table.problem(event.code ? "code" : "kind", "is not supported by the channel");
 }
 
 template <class Node>
@@ -152,7 +152,7 @@ J1939NodeChannel read_j1939_place(const TomlTable& own, const TomlTable& device,
     channel.place = sections::read_j1939_channel(table, device).parameter;
     channel.codes = read_codes(table, device);
     if (channel.place.length_bits % 8 != 0 || channel.place.start_bit != 0) {
-      own.problem("channel", "is not of whole bytes, which a simulated node sends");
+      own.problem("channel", "must consist of whole bytes in a simulated node");
       channel.place.length_bits = 16;
     }
   } else {

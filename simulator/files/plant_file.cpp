@@ -22,7 +22,7 @@ void read_signal_steps(const TomlTable& table, SignalConfig& signal) {
                                         [](double a, double b) { return !(a < b); });
   if (falls != signal.times_s.end()) table.problem("times_s", "must increase");
   if (signal.repeat_s > 0.0 && !(signal.repeat_s > signal.times_s.back())) {
-    table.problem("repeat_s", "must be more than the last of times_s");
+    table.problem("repeat_s", "must be greater than the last of times_s");
   }
 }
 
@@ -96,7 +96,7 @@ NodeConfig read_node(const TomlTable& table, NameList& nodes, const NameList& ou
   NodeConfig node;
   node.name = nodes.read(table);
   if (node.name == "room" || node.name == "coolant") {
-    table.problem("name", "must not be \"room\" or \"coolant\", which have a meaning of their own");
+    table.problem("name", "must not be \"room\" or \"coolant\", which are reserved");
   }
   node.block = table.text("block", "");
   node.capacity_J_per_K = table.number("capacity_J_per_K", Range::above(0.0, large));
@@ -235,7 +235,7 @@ PlantConfig read_plant(const TomlTable& root, const std::filesystem::path& folde
   }
   if (own.has("body")) {
     for (const char* key : {"node", "link", "source", "position_effect"}) {
-      root.refuse(key, "a machine with a body of its own (plant.body) has no lumps");
+      root.refuse(key, "must be omitted with plant.body");
     }
     read_body_of(own, folder, signals, plant);
     if (plant.body) {

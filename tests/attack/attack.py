@@ -135,7 +135,7 @@ def wanted_tries(given):
               if link in given.links and
               (not given.only or any(text in name for text in given.only))]
     if not chosen:
-        sys.exit("attack.py: no attack is called so on these links (--list)")
+        sys.exit("attack.py: no attack has this name on these links (--list)")
     return chosen
 
 

@@ -87,7 +87,7 @@ TEST_CASE("FD and classic frames, pages and counters are read on one interface",
   // The counter is unchanged: neither value nor time changes.
   REQUIRE(shell("cansend vcan0 181#FF00000000000001"));
   REQUIRE(eventually([&] {
-    return bus.source.health().units[0].last_error == "the counter in the frame stands still";
+    return bus.source.health().units[0].last_error == "the counter in the frame does not change";
   }));
   CHECK(bus.newest(0).temp_degC == Approx(22.5));
   CHECK(bus.newest(0).taken_at == taken_at);
@@ -111,7 +111,7 @@ TEST_CASE("a J1939 group is read from any sender, and from none while two send i
   REQUIRE(shell("cansend vcan0 18FF3131#0190"));
   REQUIRE(eventually([&] { return bus.newest(3).fault == Fault::device_error; }));
   CHECK(bus.source.health().units[1].last_error ==
-        "0x14FF3127 and 0x18FF3131 send the same group: key id of the sensor says which counts");
+        "0x14FF3127 and 0x18FF3131 send the same group: choose one by the sensor's key id");
   CHECK(bus.newest(0).fault == Fault::never_read);
 }
 

@@ -567,7 +567,7 @@ std::string CanopenNode::trouble(nanoseconds now) const {
   for (const Watched& each : watched_) {
     if (!each.rate.too_often()) continue;
     return "COB-ID " + std::to_string(each.cob_id) +
-           " comes too often: two nodes send it, or pdo_period_s is wrong";
+           " is received too often: two nodes send it, or pdo_period_s is wrong";
   }
   if (phase_ == Phase::closed) return {};
   if (lost_) return "no heartbeat";
@@ -576,9 +576,8 @@ std::string CanopenNode::trouble(nanoseconds now) const {
   for (const Watched& each : watched_) {
     if (phase_ != Phase::running || each.cob_id == 0 || now < each.due_by) continue;
     return "COB-ID " + std::to_string(each.cob_id) +
-           " does not come, though the node is there: a TPDO on change needs an event timer "
-           "(object "
-           "1800 and following, sub 5) or pdo_on_change";
+           " is not received, though the node is alive: a TPDO on change needs an event timer "
+           "(object 1800 and following, sub 5) or pdo_on_change";
   }
   return poll_error_;
 }

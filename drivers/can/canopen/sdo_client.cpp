@@ -112,7 +112,7 @@ std::string to_string(const SdoResult& result) {
       text.append(": aborted by the node: ");
       break;
     case SdoOutcome::broken:
-      text.append(": not an answer to what was asked: ");
+      text.append(": not an answer to the request: ");
       break;
   }
   return text.append(hexadecimal(result.abort_code))

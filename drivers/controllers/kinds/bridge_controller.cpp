@@ -57,7 +57,7 @@ std::optional<BridgeAnswer> BridgeController::report(const BridgeReport& report)
   const bool silent = session_ == 0 || is_silent(now);
   if (report.session != session_ && !silent) {
     ++health_.read_errors;
-    health_.last_error = "two bridges report: the one that came later is refused";
+    health_.last_error = "two bridges report: the later one is refused";
     return std::nullopt;
   }
   ++health_.reads;
@@ -72,7 +72,7 @@ std::optional<BridgeAnswer> BridgeController::report(const BridgeReport& report)
   BridgeAnswer answer;
   if (commands_.fresh()) gate_.offered(commands_.front().command, commands_.front().computed_at);
   const bool moved = taking && taking_ && !gate_.explains(report.applied_um);
-  if (moved) health_.last_error = "the controller applies what it was not sent";
+  if (moved) health_.last_error = "the controller applies an offset that was not sent";
   if (silent || report.session != session_ || taking != taking_) gate_.lost();
   if (answered_ && taking && !silent && report.session == session_) {
     gate_.confirmed(now);

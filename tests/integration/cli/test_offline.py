@@ -113,7 +113,7 @@ def test_predict_says_when_nothing_was_measured(files):
     assert answer.returncode == 0
     assert answer.stderr.splitlines() == [
         "z_um nan nan",
-        "z_um: run.csv has no measured value of it, so there is nothing to compare with"]
+        "z_um: run.csv has no measured value to compare with"]
 
 
 @pytest.mark.parametrize("name, text", [

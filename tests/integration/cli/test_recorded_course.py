@@ -54,7 +54,7 @@ def last_offset(lab, model, record):
 def test_two_days_stand_in_for_probings_on_a_third(lab):
     answer = correction(lab, "day_1.csv", "day_2.csv")
     assert answer.returncode == 0, answer.stderr
-    printed = re.search(r"z_um: (\d+) probings taught gains, (\d+) kept; a run left out: RMS ([\d.]+) um "
+    printed = re.search(r"z_um: (\d+) probings determined gains, (\d+) kept; left-out runs: RMS ([\d.]+) um "
                      r"\(without a record ([\d.]+) um\)", answer.stderr)
     assert printed, answer.stderr
     assert float(printed[3]) < 0.5 * float(printed[4])
@@ -79,7 +79,7 @@ def test_a_probing_that_missed_teaches_nothing(lab):
     (lab / "missed.csv").write_text("\n".join(lines) + "\n")
     printed = correction(lab, "missed.csv", "day_2.csv").stderr
     assert "missed.csv: z_um: 3 values are left out" in printed, printed
-    rms_um = [float(re.search(r"a run left out: RMS ([\d.]+) um", each)[1]) for each in (clean, printed)]
+    rms_um = [float(re.search(r"left-out runs: RMS ([\d.]+) um", each)[1]) for each in (clean, printed)]
     assert abs(rms_um[1] - rms_um[0]) < 0.2, rms_um
 
 

@@ -171,7 +171,7 @@ def test_a_migration_that_was_changed_is_refused(store, tmp_path):
 
 def test_a_password_file_is_never_overwritten(store):
     (store.folder / "mill_3.password").write_text("kept")
-    assert "exists already" in store.fleet("add", "mill_3", "--type", "mill", "-o", store.folder / "mill_3.password",
+    assert "already exists" in store.fleet("add", "mill_3", "--type", "mill", "-o", store.folder / "mill_3.password",
                                            status=2)
     assert store.value("SELECT count(*) FROM fleet.machine") == "0"
     store.add("mill_4")

@@ -127,7 +127,7 @@ def test_every_register_is_read_and_none_is_changed(simulate, relay, tmp_path):
     assert "-> 250.00 mm" in done.stdout
     assert done.stdout.endswith(
         "    writes are answered: the registers' present values were written back (thermocomp status "
-        "shows whether a new offset is taken over)\n"
+        "shows whether a new offset is applied)\n"
         "1 of 1 channels give a temperature\n7 of 7 values of the controller are present\n")
     assert 16 in between.functions
     assert written(simulator) == before
@@ -141,7 +141,7 @@ def write(simulator, address, words):
 
 
 @pytest.mark.parametrize("keys, why", [
-    ({}, "offset of axis z is not what is applied"),  # no valid axis, so nothing of it is
+    ({}, "offset of axis z differs from the applied offset"),  # no valid axis
     ({"dry_run": True}, "")])
 def test_nothing_is_written_that_might_move_an_axis(simulate, relay, tmp_path, keys, why):
     simulator = simulate(MACHINE)

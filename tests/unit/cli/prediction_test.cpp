@@ -99,9 +99,10 @@ TEST_CASE("the furthest row is reported with its main quantity", "[cli][predict]
   const Prediction outside = predict(model, parse_run(header + "20,18,30,-14\n", "run.csv"));
   // With S = [1 1/2; 1/2 1] of level and rise, both 10 K: 10^2 2 / (1 + 1/2); of t1 2^2 2 / (3/2).
   CHECK(outside.furthest.distance == Approx(std::sqrt((400.0 + 16.0) / 3.0 / 4.0) / 2.0));
-  CHECK(furthest_text(outside) ==
-        "at 20 s the machine was 2.9 times as far from what the model was made from as counts as "
-        "known, mostly by t2_degC: 30 (recorded 19 to 22)");
+  CHECK(
+      furthest_text(outside) ==
+      "at 20 s the machine was 2.9 times the limit away from the model's data, mostly by t2_degC: "
+      "30 (recorded 19 to 22)");
 }
 
 }  // namespace

@@ -48,7 +48,7 @@ TEST_CASE("the table says which output is a diameter", "[cli][registers]") {
   config.model.diameters = {{config.estimator.axes.front().output, "x", -1.0}};
   CHECK_THAT(
       register_table(config),
-      Contains("axis x takes out " + half_of(config.model.diameters.front()) + ", a diameter"));
+      Contains("axis x corrects " + half_of(config.model.diameters.front()) + ", a diameter"));
   CHECK_THAT(half_of(config.model.diameters.front()), Contains("half"));
 }
 
@@ -67,7 +67,7 @@ TEST_CASE("the table of CAN goes by frames and bits", "[cli][registers]") {
   CHECK_THAT(text.substr(read),
              Contains("16, 1 bit             unsigned, little endian  cutting_on"));
   config.dry_run = true;
-  CHECK_THAT(register_table(config), Contains("DRY RUN: the daemon only reads"));
+  CHECK_THAT(register_table(config), Contains("DRY RUN: the daemon reads"));
 }
 
 TEST_CASE("missing optional signals are listed", "[cli][registers]") {
@@ -134,5 +134,5 @@ TEST_CASE("a data block is shown in a PLC programmer's notation", "[cli][registe
         "DBD 0    DINT  offset of axis z", "DBW 6    WORD  heartbeat",
         "DBD 8    DINT  applied offset of axis z", "DBW 12   INT   spindle_rpm"})
     CHECK_THAT(text, Contains(part));
-  for (const char* part : {"function", "unit 1", "read along"}) CHECK_THAT(text, !Contains(part));
+  for (const char* part : {"function", "unit 1", "also read"}) CHECK_THAT(text, !Contains(part));
 }

@@ -340,7 +340,7 @@ TEST_CASE("impossible sets of frames are refused", "[controllers][travel]") {
   refused("must increase", table(2), [](auto& bad) { bad.nodes_mm[1] = 400.0; });
   CanControllerConfig config = config_of(line());
   config.silent_after_s = 30.0;
-  CHECK_THROWS_WITH(CanController(config), Catch::Contains("come round"));
+  CHECK_THROWS_WITH(CanController(config), Catch::Contains("set numbers repeat"));
   config = config_of(table(3));
   config.axes.resize(4, config.axes[0]);
   CHECK_THROWS_WITH(CanController(config), Catch::Contains("at most 16 axes"));

@@ -72,7 +72,7 @@ TEST_CASE("SDO: an answer may omit unused bytes, but no others", "[canopen][sdo]
   CHECK(answered({0x4B, 0x40, 0x20, 0x01, 0xE1, 0x00}).bytes == Bytes{0xE1, 0x00});
   CHECK(answered({0x42, 0x40, 0x20, 0x01, 0xE1}).bytes == Bytes{0xE1});
   CHECK(to_string(answered({0x4B, 0x40, 0x20, 0x01, 0xE1})) ==
-        "2040:01: not an answer to what was asked: 0x06070010 length does not match");
+        "2040:01: not an answer to the request: 0x06070010 length does not match");
   CHECK(answered({0x42, 0x40, 0x20, 0x01}).outcome == SdoOutcome::broken);
   CHECK(answered({0x4B, 0x40}).outcome == SdoOutcome::broken);
   const SdoResult aborted = answered({0x80, 0x40, 0x20, 0x01, 0x11, 0x00, 0x09, 0x06});

@@ -501,7 +501,8 @@ TEST_CASE("a TPDO at twice its rate gives no value", "[canopen][duplicate]") {
   run(2);
   CHECK(bus.fault(0) == Fault::device_error);
   CHECK(bus.fault(1) == Fault::none);
-  CHECK(bus.error() == "COB-ID 389 comes too often: two nodes send it, or pdo_period_s is wrong");
+  CHECK(bus.error() ==
+        "COB-ID 389 is received too often: two nodes send it, or pdo_period_s is wrong");
   run(1);
   CHECK(bus.fault(0) == Fault::none);
 }

@@ -293,7 +293,7 @@ TEST_CASE("RTU: the echo of the request and bytes before the answer are skipped"
   is_silent = true;
   const Exchange written = connection.write_register(3, 5, 78);
   CHECK(written.outcome == ExchangeOutcome::timeout);
-  CHECK_THAT(written.detail, Catch::Contains("only the echo of the request came"));
+  CHECK_THAT(written.detail, Catch::Contains("received only the echo of the request"));
   is_silent = echoes = false;
   REQUIRE(peer::eventually([&] { return read_inputs(connection, 3, 0, words).ok(); }));
   CHECK(connection.write_register(3, 5, 79).ok());
@@ -316,7 +316,7 @@ TEST_CASE("bytes received in place of the answer are described", "[connection]")
     return reply;
   };
   for (const bool rtu : {false, true})
-    CHECK_THAT(message(rtu, of_unit_9), Catch::Contains("unit 9 answered, asked was unit 3"));
+    CHECK_THAT(message(rtu, of_unit_9), Catch::Contains("unit 9 answered instead of unit 3"));
   const auto of_transaction_0 = [](const peer::Request&) {
     return peer::Reply{.raw = {0, 0, 0, 0, 0, 7, 3, 4, 4, 0, 1, 0, 2}};
   };
@@ -329,8 +329,9 @@ TEST_CASE("bytes received in place of the answer are described", "[connection]")
     CHECK_THAT(message(rtu, wide), Catch::Contains("expected 4 bytes of data, got 8") &&
                                        Catch::Contains("wide_registers = true"));
   const auto part = [](const peer::Request&) { return peer::Reply{.raw = {3, 4, 4, 0, 7}}; };
-  CHECK_THAT(message(true, part),
-             Catch::Contains("broke off: 5 of 9 bytes (03 04 04 00 07) within timeout_ms = 300"));
+  CHECK_THAT(
+      message(true, part),
+      Catch::Contains("incomplete answer: 5 of 9 bytes (03 04 04 00 07) within timeout_ms = 300"));
 }
 
 TEST_CASE("any transaction id is accepted where so configured, late answers are not",

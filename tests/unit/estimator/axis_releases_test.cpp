@@ -177,13 +177,13 @@ TEST_CASE("the usual mistakes of commissioning are reported by name", "[axis]") 
   CHECK(cause_text(wrong_read_back(-30.0, [](double um) { return um + 3.0; })) ==
         "constant +3.0 um: check the offset's zero");
   CHECK(cause_text(wrong_read_back(30.0, [](double) { return 1.0; })) ==
-        "does not take what is sent (rejects it or stands still)");
+        "does not follow the offset sent (rejected, or stopped)");
   Bench bench;
   bench.steps(100, 10.0);
   bench.obeys = false;
   bench.input.applied_um = 31.0;
   bench.steps(3, 10.0);
-  CHECK(cause_text(bench) == "changes without us: another writer?");
+  CHECK(cause_text(bench) == "changes by itself: another writer?");
 }
 
 TEST_CASE("a sign that flips while running is reported by name", "[axis]") {

@@ -198,7 +198,7 @@ TEST_CASE("files without a common clock need the shift", "[import]") {
   const RunFile run = joined_runs(store, probings, 1.5);
   CHECK(run.time_s()[2] == 1.5);
   CHECK(run.column("z_um")[2] == 0.8);
-  CHECK_THROWS_WITH(joined_runs(store, probings, 5000.0), Contains("lies outside of"));
+  CHECK_THROWS_WITH(joined_runs(store, probings, 5000.0), Contains("is outside "));
   CHECK_THROWS_WITH(joined_runs(probings, probings, 0.0), Contains("is a column of"));
 }
 

@@ -232,7 +232,7 @@ def test_a_rebooted_node_is_set_up_again(nodes):
 
 def test_a_second_node_of_the_same_number_is_noticed(nodes):
     double = nodes.start(canopen_machine())
-    nodes.become(CANOPEN, "device_error", "its sensor is unknown")
+    nodes.become(CANOPEN, "device_error", "its values are ambiguous")
     nodes.expect_text("modules", "two nodes answer as node 5")
     nodes.stop(double)
     nodes.become(CANOPEN, "none", "one of them is gone")

@@ -87,7 +87,7 @@ void check_travels(const CanControllerConfig& config) {
     }
     const double round_s = static_cast<double>(set_numbers(axis.travel->sent)) * config.period_s;
     require(round_s > config.silent_after_s, "silent_after_s", config.silent_after_s,
-            "must be less than the time in which the numbers of a set come round");
+            "must be less than the time in which the set numbers repeat");
   }
 }
 
@@ -395,7 +395,7 @@ void CanController::report_error() {
   if (health_.last_error.empty()) health_.last_error = health_.write.error;
   if (!health_.last_error.empty() || gate_.in_sync()) return;
   if (all_frames_seen() && !all_sets_seen())
-    health_.last_error = "the frames that show what is applied along a travel are of two sets";
+    health_.last_error = "the read-back frames along a travel belong to two sets";
   else if (silent_)
     health_.last_error = "the controller is silent";
 }
@@ -490,7 +490,7 @@ void CanController::send_command(nanoseconds now) {
   if (sent && !waits) return;
   ++health_.write.unanswered;
   health_.write.error =
-      sent ? config_.interface + ": frames wait and are not sent: nobody takes them"
+      sent ? config_.interface + ": frames cannot be sent: no other node acknowledges them"
            : socket_.error();
   health_.last_error = health_.write.error;
 }

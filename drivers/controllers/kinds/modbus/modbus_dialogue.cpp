@@ -327,7 +327,7 @@ bool ModbusDialogue::look() {
   if (!gate_.explains(judged_um())) {
     gate_.synchronised(judged_um());
     const std::scoped_lock lock(health_mutex_);
-    health_.last_error = "the controller applies what it was not sent";
+    health_.last_error = "the controller applies an offset that was not sent";
   }
   publish(true);
   return true;
@@ -515,7 +515,7 @@ void ModbusDialogue::show_piezos() {
     if (piezos_[axis]->obeyed()) continue;
     const std::scoped_lock lock(health_mutex_);
     health_.last_error = "the amplifier of axis " + std::to_string(axis + 1) + " shows " +
-                         std::to_string(shown_V_[axis]) + " V and not what it was set to";
+                         std::to_string(shown_V_[axis]) + " V instead of its setpoint";
   }
 }
 

@@ -214,7 +214,7 @@ def test_a_value_beyond_the_claimed_error_is_asked_back(machine, lab):
     machine.model.write_text(MODEL + CLAIMS)
     daemon = machine.start()
     status, _, output = daemon.cli("measured", "z", "12", "--source", "part")
-    assert status == 1 and "asked back, nothing is taken over: +12 um" in output, output
+    assert status == 1 and "not confirmed, value refused: +12 um" in output, output
     assert "a tenth of it would fit" in output and "--confirm" in output, output
     assert daemon.axis()["measured"] is None
     assert daemon.cli("measured", "z", "2", "--source", "part")[0] == 0
