@@ -219,7 +219,7 @@ def wrong_read_back_at_release(rig):
         rig.release()
         time.sleep(rig.random.uniform(0.0, 0.06))
         rig.axis.read_error = rig.random.choice((read_errors.constant(rig.random.uniform(-12.0, 12.0)),
-                                          read_errors.factor(0.5), read_errors.factor(-1.0)))
+                                                 read_errors.factor(0.5), read_errors.factor(-1.0)))
         for _ in range(rig.random.randint(0, 4)):
             time.sleep(rig.random.uniform(0.0, 0.1))
             rig.release()

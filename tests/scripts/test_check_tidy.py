@@ -55,7 +55,7 @@ def test_clean_code_passes(tmp_path):
 
 
 @pytest.mark.parametrize("check", PLANTS)
-def test_what_is_planted_is_an_error_by_its_name(tmp_path, check):
+def test_a_planted_error_is_found_by_its_name(tmp_path, check):
     result = run_tidy(tmp_path, "estimator", PLANTS[check])
     assert result.returncode != 0
     assert re.search(rf"planted\.hpp:\d+:\d+: error: .*\[{check}[,\]]", result.stdout), result.stdout

@@ -68,6 +68,6 @@ def test_a_purge_of_the_others_leaves_what_the_daemon_runs_with(root):
     assert not (root / CONFIG).exists() and not (root / STATE).exists()
 
 
-def test_a_purge_of_what_was_never_configured_is_none_the_less_one(tmp_path):
+def test_a_purge_of_an_unconfigured_package_is_complete(tmp_path):
     assert after("thermocomp", "purge", tmp_path) == []
     assert after("thermocomp-gateway", "purge", tmp_path) == []

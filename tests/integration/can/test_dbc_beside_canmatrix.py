@@ -62,7 +62,7 @@ def test_ten_thousand_random_frames_are_decoded_as_canmatrix_encoded_them():
 
 
 @pytest.mark.parametrize("planted", ["0|16@1- (0.1,0)", "7|16@0- (0.1,0)"])
-def test_a_file_with_one_bit_moved_is_told_apart(planted, tmp_path):
+def test_a_file_with_one_changed_bit_differs(planted, tmp_path):
     original = (HERE / "every_kind.dbc").read_text()
     dbc = tmp_path / "moved.dbc"
     dbc.write_text(original.replace(planted, {"0": "1", "7": "6"}[planted[0]] + planted[1:], 1))

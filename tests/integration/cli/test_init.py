@@ -107,7 +107,7 @@ def assert_runs(config):
         assert "no (the model gives no displacement" in status() and "fit one to measured runs" in status()
 
 
-def test_what_is_no_bus_no_axis_and_another_word_for_a_sensor(foreign, folder):
+def test_invalid_answers_and_searches_for_presets(foreign, folder):
     modules, plc = foreign
     answers = [f"tcp:127.0.0.1:{modules}", "?pt100", "",  # no such host
                "?pt100", "?rtd", "wago_750_458", NAMES, "holding:float32/CDAB:1:100,102", "",
@@ -120,7 +120,7 @@ def test_what_is_no_bus_no_axis_and_another_word_for_a_sensor(foreign, folder):
     assert lists[0] == lists[1] and "pt100" in lists[0].lower() and "rtd" in lists[0].lower()
 
 
-def test_asked_on_a_terminal(foreign, folder):
+def test_interview_on_a_terminal(foreign, folder):
     modules, plc = foreign
     config = folder / "thermocompd.toml"
     answers = [f"tcp:127.0.0.1:{modules}", "",  # one bus
@@ -154,9 +154,9 @@ def test_nothing_answered_is_lost_to_a_mistake_or_a_step_back(foreign, folder):
     status, shown = converse(["init", config], answers)
     assert status == 0, shown
     for output in ("    wago_750_464: WAGO, 750-464, two or four RTD", "wago_750 is not a preset",
-                 "bed: the names of sensors must be unique",
-                 f"Module of unit 4 on bus1 (127.0.0.1:{modules})", "In word order CDAB all give",
-                 "is left out: it has no module"):
+                   "bed: the names of sensors must be unique",
+                   f"Module of unit 4 on bus1 (127.0.0.1:{modules})", "In word order CDAB all give",
+                   "is left out: it has no module"):
         assert output in shown, (output, shown)
     assert "pixsys" not in shown  # does not match "Wago"
     text = config.read_text()
@@ -210,7 +210,7 @@ def test_a_model_that_is_there_is_bound_by_the_sensors_names(foreign, folder):
     assert "in no block: column" in run("check", config).stdout
 
 
-def test_what_a_model_needs_is_asked_for(foreign, folder):
+def test_missing_signals_and_names_are_requested(foreign, folder):
     modules, plc = foreign
     (folder / "mill.toml").write_text(
         'format = 1\ninputs = ["bed_degC"]\noutputs = ["z_um"]\nreference = "first_sample"\n'
@@ -221,11 +221,11 @@ def test_what_a_model_needs_is_asked_for(foreign, folder):
                  "3=wago_750_458:1-2", "--model", folder / "mill.toml"]
     plc_there = ["--controller", f"tcp:127.0.0.1:{plc}"]
     for more, output in ((["--names", "bed,x", "--controller", "none"], "give it by --controller"),
-                       (["--names", "bed,x", *plc_there], "--signal spindle_rpm=TABLE:ADDRESS"),
-                       (["--names", "x", *plc_there, "--signal", "spindle_rpm=input:26:uint16"],
-                        "1 names for 2 sensors: m3_1 m3_2"),
-                       (["--names", "x,y", *plc_there, "--signal", "spindle_rpm=input:26:uint16"],
-                        "name a sensor bed (--names)")):
+                         (["--names", "bed,x", *plc_there], "--signal spindle_rpm=TABLE:ADDRESS"),
+                         (["--names", "x", *plc_there, "--signal", "spindle_rpm=input:26:uint16"],
+                          "1 names for 2 sensors: m3_1 m3_2"),
+                         (["--names", "x,y", *plc_there, "--signal", "spindle_rpm=input:26:uint16"],
+                          "name a sensor bed (--names)")):
         answer = run(*arguments, *more)
         assert answer.returncode == 2 and output in answer.stderr, answer.stdout + answer.stderr
         assert answer.stderr.count("\n") - answer.stderr.count("reading") <= 1, answer.stderr
@@ -276,7 +276,7 @@ def test_a_dry_run_from_the_first_start_on(foreign, folder):
     assert "\n# dry_run = true" in config.read_text()
 
 
-def test_what_is_not_there_is_named(foreign, folder):
+def test_missing_options_are_named(foreign, folder):
     _, plc = foreign
     config = folder / "thermocompd.toml"
     answer = run("init", config, "--bus", f"tcp:127.0.0.1:{free_port()}", "--module",
@@ -313,7 +313,7 @@ def test_no_scan_looks_at_no_bus_while_it_asks(folder):
     ("--module", "3=input:int16:1:0:1:1", "CODES"), ("--module", "3=wago_750_458:4-1", "ranges"),
     ("--controller", "tcp:h@x", "unit"), ("--signal", "x", "NAME="),
     ("--signal", "x=coil:0:int16", "TABLE:ADDRESS"), ("--offset", "disc:0", "holding")])
-def test_bad_use_is_named_in_one_line(folder, option, value, named):
+def test_a_usage_error_is_one_line(folder, option, value, named):
     answer = run("init", folder / "c.toml", "--bus", "tcp:127.0.0.1:9", option, value,
                  stdin=subprocess.DEVNULL)
     assert answer.returncode == 2, answer.stdout

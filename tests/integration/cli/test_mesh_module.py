@@ -70,7 +70,7 @@ def test_a_missing_module_is_one_line_with_the_places_and_the_package(alone, tmp
         assert part in line
 
 
-def test_what_cannot_be_loaded_is_one_line_with_the_file_and_the_reason(alone, tmp_path):
+def test_a_load_error_is_one_line_with_file_and_reason(alone, tmp_path):
     module = tmp_path / "bin" / MODULE
     module.write_text("no library")
     assert f"{module}: " in output(structure(alone, tmp_path))
@@ -80,7 +80,7 @@ def test_what_cannot_be_loaded_is_one_line_with_the_file_and_the_reason(alone, t
     assert str(module) in line and "thermocomp_gmsh_functions" in line
 
 
-def test_a_mesh_in_text_needs_no_reader_but_what_factorises(alone, tmp_path):
+def test_a_text_mesh_needs_only_the_factorisation_module(alone, tmp_path):
     line = output(structure(alone, tmp_path, mesh="cube.inp"))
     for part in [FACTORISES, f"{tmp_path}/bin", f"{tmp_path}/lib/thermocomp",
                  "package thermocomp-modelling", "libcholmod3"]:

@@ -16,7 +16,7 @@ pytestmark = pytest.mark.skipif(
     reason="thermocomp-modelling is not in this build")
 
 
-def test_a_slip_in_the_name_of_a_command_is_named():
+def test_a_mistyped_command_gets_a_suggestion():
     modelling = pathlib.Path(PROGRAM).parent / "thermocomp-modelling"
     answer = run("thermal-test", "plam", "-o", "sheet.csv")
     assert answer.returncode == 2
@@ -32,7 +32,7 @@ def test_where_a_command_is_missing_those_that_there_are_are_named():
     assert "thermal-test: which command? One of: report, plan.\n" in answer.stderr, answer.stderr
 
 
-def test_help_tells_the_exit_statuses_of_this_command():
+def test_help_has_the_exit_statuses_of_this_command():
     for command in (["thermal-test", "plan"], ["thermal-test", "report"], ["plan"], ["fit"]):
         result = run(*command, "--help").stdout
         assert "Exit status: 0 success, 2 usage error or bad input.\n" in result, (command, result)
@@ -125,7 +125,7 @@ def test_fit_finds_the_equation_and_its_model_predicts(tmp_path):
     assert predicted.returncode == 0 and float(predicted.stderr.split()[1]) < 0.6
 
 
-def test_fit_without_options_compares_families_and_says_where_its_model_holds(tmp_path):
+def test_fit_without_options_compares_families_and_writes_the_models_domain(tmp_path):
     files = write_tests(tmp_path)
     model = tmp_path / "model.toml"
     answer = run("fit", *files, "--outputs", "z_um", "-o", model, "--json")
@@ -172,7 +172,7 @@ def test_probings_that_missed_are_left_out_by_diagnose_with_a_line(tmp_path):
     assert result["baseline"]["z_um"]["test_rms_um"] < 1.0, result["baseline"]
 
 
-def test_one_run_is_said_to_judge_itself_and_the_same_rows_twice_are_refused(tmp_path):
+def test_a_single_run_is_reported_as_its_own_test_and_repeated_rows_are_refused(tmp_path):
     files = write_tests(tmp_path, 1)
     model = tmp_path / "model.toml"
     answer = run("fit", files[0], "--outputs", "z_um", "-o", model)
@@ -216,7 +216,7 @@ def test_tiebar_chooses_ties_for_a_measured_course(tmp_path):
     assert "best ties" in (tmp_path / "ties.svg").read_text()
 
 
-def test_tiebar_with_several_ties_refuses_what_is_for_one():
+def test_tiebar_with_several_ties_refuses_options_for_one():
     answer = run("tiebar", EXAMPLES / "gate_machine_two_ties.toml", "--ratio", "0.2")
     assert answer.returncode == 2 and "--ratio" in answer.stderr
     answer = run("tiebar", EXAMPLES / "gate_machine.toml", "--optimise")
@@ -231,7 +231,7 @@ def test_tiebar_with_several_ties_refuses_what_is_for_one():
     (("plan", "@run"), "test_0.csv"),
     (("tiebar", "@run"), "test_0.csv"),
 ])
-def test_bad_use_and_bad_input_are_refused(tmp_path, arguments, names):
+def test_usage_errors_and_bad_input_are_refused(tmp_path, arguments, names):
     places = {"@run": write_tests(tmp_path, 1)[0], "@out": tmp_path / "model.toml",
               "@none": tmp_path / "none.csv"}
     answer = run(*(places.get(word, word) for word in arguments))
@@ -239,10 +239,10 @@ def test_bad_use_and_bad_input_are_refused(tmp_path, arguments, names):
     assert not (tmp_path / "model.toml").exists()
 
 
-def test_place_recommends_and_writes_what_others_read(tmp_path):
+def test_place_recommends_and_writes_readable_files(tmp_path):
     meshio = pytest.importorskip("meshio", reason="python3-meshio is not installed")
     result = run("place", SOURCE / "config/demo/structure.toml", "--vtu", tmp_path / "fields.vtu",
-               "--page", tmp_path / "place.html")
+                 "--page", tmp_path / "place.html")
     assert result.returncode == 0, result.stderr
     assert len(result.stdout.splitlines()) <= 15, result.stdout
     assert "sensors one by one" in result.stderr

@@ -30,7 +30,7 @@ def predict(files, run_argument="run.csv", output="out.csv"):
     return run("predict", "--model", "model.toml", run_argument, "-o", output, cwd=files)
 
 
-def test_help_succeeds_and_bad_use_is_status_2():
+def test_help_succeeds_and_a_usage_error_is_status_2():
     assert run("--help").returncode == 0
     assert run("predict", "--help").returncode == 0
     for arguments, result in (
@@ -48,7 +48,7 @@ def test_help_succeeds_and_bad_use_is_status_2():
         assert result in answer.stderr, (arguments, answer.stderr)
 
 
-def test_check_says_when_a_first_start_compensates_at_once(tmp_path):
+def test_check_warns_when_a_first_start_compensates_immediately(tmp_path):
     for model in EXAMPLES.glob("*model*.toml"):
         shutil.copy(model, tmp_path)
     text = (EXAMPLES / "small_machine.toml").read_text()
@@ -107,7 +107,7 @@ def test_predict_of_a_selection_refers_to_the_first_row_of_the_file(files):
     assert answer.stdout.splitlines()[1].split(",") == ["30", "4", "4", "0"]
 
 
-def test_predict_says_when_nothing_was_measured(files):
+def test_predict_reports_missing_measurements(files):
     (files / "run.csv").write_text("time_s,t1_degC,z_measured_um\n0,20,\n10,21,3\n")
     answer = predict(files)
     assert answer.returncode == 0
@@ -199,7 +199,7 @@ def test_a_run_file_is_replayed_through_a_configuration(tmp_path):
 
 
 @pytest.mark.parametrize("command", ["export", "replay"])
-def test_what_is_no_history_is_refused(tmp_path, command):
+def test_other_files_than_histories_are_refused(tmp_path, command):
     (tmp_path / "h.db").write_text("no database")
     for name in ("h.db", "nosuch.db"):
         answer = run(command, name, "-o", "out.csv", cwd=tmp_path)
@@ -215,7 +215,7 @@ def alone(tmp_path):
     return shutil.copy(PROGRAM, tmp_path / "bin")
 
 
-def test_modelling_commands_say_which_package_is_missing(alone, tmp_path):
+def test_modelling_commands_name_the_missing_package(alone, tmp_path):
     answer = run("fit", "run.csv", "--outputs", "z_um", program=alone, env={"PATH": str(tmp_path)})
     assert answer.returncode == 2
     assert answer.stderr.count("\n") == 1 and "thermocomp-modelling" in answer.stderr

@@ -51,11 +51,11 @@ def last_offset(lab, model, record):
     return min(float(row[at]) for row in rows[1:] if row[at])
 
 
-def test_two_days_stand_in_for_probings_on_a_third(lab):
+def test_two_days_replace_probings_on_a_third(lab):
     answer = correction(lab, "day_1.csv", "day_2.csv")
     assert answer.returncode == 0, answer.stderr
     printed = re.search(r"z_um: (\d+) probings determined gains, (\d+) kept; left-out runs: RMS ([\d.]+) um "
-                     r"\(without a record ([\d.]+) um\)", answer.stderr)
+                        r"\(without a record ([\d.]+) um\)", answer.stderr)
     assert printed, answer.stderr
     assert float(printed[3]) < 0.5 * float(printed[4])
     # The third day without its probings: its gain is 1.3, the model's 1.
@@ -70,7 +70,7 @@ def test_two_days_stand_in_for_probings_on_a_third(lab):
     assert abs(recorded_um - true_um) < 0.25 * abs(bare_um - true_um)
 
 
-def test_a_probing_that_missed_teaches_nothing(lab):
+def test_a_missed_probing_changes_no_gain(lab):
     clean = correction(lab, "day_1.csv", "day_2.csv").stderr
     lines = (lab / "day_1.csv").read_text().splitlines()
     for row in (60, 61, 200):
@@ -83,7 +83,7 @@ def test_a_probing_that_missed_teaches_nothing(lab):
     assert abs(rms_um[1] - rms_um[0]) < 0.2, rms_um
 
 
-def test_one_day_is_said_to_prove_nothing_of_another(lab):
+def test_a_record_of_one_day_is_reported_as_untested_on_another(lab):
     answer = correction(lab, "day_1.csv")
     assert answer.returncode == 0, answer.stderr
     assert "not tested on another" in answer.stderr
@@ -93,7 +93,7 @@ def test_one_day_is_said_to_prove_nothing_of_another(lab):
     (('form = "recursive"', 'form = "off"'), 'form is "off"; choose'),
     (("spindle_degC\"]\n[[correction", "nothing_degC\"]\n[[correction"), "must be an input of the model"),
 ])
-def test_a_configuration_that_teaches_nothing(lab, change, printed):
+def test_a_configuration_without_gains_is_refused(lab, change, printed):
     config = lab / "config.toml"
     config.write_text(config.read_text().replace(*change))
     answer = correction(lab, "day_1.csv")

@@ -131,7 +131,7 @@ def answers_of(files, folder, options):
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_a_file_of_another_form_is_told_and_answered_like_the_plain_one(form, plain, tmp_path):
+def test_a_file_of_another_form_is_reported_and_gives_the_same_result(form, plain, tmp_path):
     write, columns, words = FORMS[form]
     files = []
     for test in range(RUNS):
@@ -166,7 +166,7 @@ def slashes(rows):
     (slashes, ['date_order = "day.month.year" or "month.day.year"']),
 ], ids=lambda value: getattr(value, "__name__", ""))
 @pytest.mark.parametrize("command", ["fit", "diagnose"])
-def test_what_may_mean_two_things_is_asked_for(write, asked, command, tmp_path):
+def test_ambiguous_columns_must_be_defined(write, asked, command, tmp_path):
     file = tmp_path / "run.csv"
     file.write_text(write(simulated(0)), encoding="utf-8")
     model = tmp_path / "base.toml"
@@ -184,7 +184,7 @@ def test_what_may_mean_two_things_is_asked_for(write, asked, command, tmp_path):
         assert line in answer.stderr, answer.stderr
 
 
-def test_rows_that_judge_may_not_be_fitted(tmp_path):
+def test_test_rows_must_not_be_fitted(tmp_path):
     file = tmp_path / "run.csv"
     with file.open("w", newline="", encoding="utf-8") as text:
         csv.writer(text).writerows([PLAIN, *simulated(0)])

@@ -104,7 +104,7 @@ def departs(run_file, prior):
     return json.loads(printed.stdout)["departure"]["z_um"]["departs"]
 
 
-def test_beside_its_own_past_a_machine_departs_where_sisters_would_not(series, tmp_path):
+def test_a_machine_departs_from_its_own_past_before_its_sisters_show_it(series, tmp_path):
     past = [write_run(tmp_path / f"past_{i}.csv", 100 + i, 5.0) for i in range(2)]
     own = tmp_path / "own.toml"
     done = run("series", *past, "--machine", "mine", "--prior", series, "-o", own)
@@ -117,7 +117,7 @@ def test_beside_its_own_past_a_machine_departs_where_sisters_would_not(series, t
     assert alone.returncode == 2 and "--machine" in alone.stderr, alone.stderr
 
 
-def test_what_cannot_be_used_is_refused_with_file_and_rule(series, tmp_path):
+def test_unusable_input_is_refused_with_file_and_rule(series, tmp_path):
     one = write_run(tmp_path / "one.csv", 1, 5.0)
     lone = run("series", one, "-o", tmp_path / "s.toml")
     assert lone.returncode == 2 and "one machine does not show" in lone.stderr

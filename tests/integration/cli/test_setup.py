@@ -59,14 +59,14 @@ def test_with_everything_installed_nothing_is_called(system):
     assert (system / "calls").read_text() == ""
 
 
-def test_without_a_network_one_line_says_what_to_do(system):
+def test_without_a_network_one_line_has_the_advice(system):
     (system / "offline").touch()
     answer = set_up(system)
     assert answer.returncode == 1
     assert answer.stderr.splitlines()[-1].startswith("setup: apt-get could not install")
 
 
-def test_bad_use_is_status_2(system):
+def test_a_usage_error_is_status_2(system):
     answer = set_up(system, "nosuch")
     assert answer.returncode == 2
     assert answer.stderr == "usage: setup.sh build|modelling|petsc|demo|demo_fleet|test|bench\n"

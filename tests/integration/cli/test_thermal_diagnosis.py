@@ -206,7 +206,7 @@ def test_a_body_that_is_right_is_left_alone(model, tmp_path):
 @pytest.mark.parametrize("cause, subject, changed, factor", [
     ("wrong_conductance", "head_on_column", {"joint": 90.0}, 0.3),
     ("wrong_film_coefficient", "part column|room", {"column_film": 20.0}, 2.5)])
-def test_what_is_wrong_with_a_body_is_named(model, tmp_path, cause, subject, changed, factor):
+def test_problems_of_a_body_are_named(model, tmp_path, cause, subject, changed, factor):
     """The machine has finer elements than the model given to the diagnosis."""
     answer = diagnosis(model, measured(machine(tmp_path / "truth", size=100, **changed)))
     finding = answer["findings"][0]

@@ -71,7 +71,7 @@ def latched(applied_um, releasing):
                                              "releasing": releasing}}])
 
 
-def test_release_waits_for_the_read_backs_and_says_what_it_takes_on_trust(daemon):
+def test_release_waits_for_read_backs_and_reports_unchecked_ones(daemon):
     daemon.answers["release"] = {"done": True}
     for applied_um, trusts in ((26.67, True), (14.6, False)):
         daemon.requests.clear()
@@ -85,7 +85,7 @@ def test_release_waits_for_the_read_backs_and_says_what_it_takes_on_trust(daemon
         assert daemon.requests[1]["params"] == {"axis": "z"}
 
 
-def test_a_release_that_the_read_backs_contradict_is_told(daemon):
+def test_a_release_contradicted_by_read_backs_is_reported(daemon):
     daemon.answers["release"] = {"done": True}
     daemon.answers["status"] = [latched(26.67, False), latched(26.67, True), latched(26.67, False)]
     answer = run("--socket", daemon.path, "release", "z")
@@ -94,7 +94,7 @@ def test_a_release_that_the_read_backs_contradict_is_told(daemon):
             "us)") in answer.stdout
 
 
-def test_measured_shows_what_is_left_beside_what_the_model_says_is_left(daemon):
+def test_measured_shows_measured_and_expected_remainder(daemon):
     daemon.answers["measured"] = {"done": True, "measured_um": 3.0, "meaning": "remaining",
                                   "predicted_um": -12.0, "predicted_remaining_um": 0.4}
     answer = run("--socket", daemon.path, "measured", "z", "3")
@@ -105,7 +105,7 @@ def test_measured_shows_what_is_left_beside_what_the_model_says_is_left(daemon):
     assert answer.stdout == "axis z: measured +3.00 um without offset; by the model -12.00 um\n"
 
 
-def test_nan_is_told_in_the_same_words_by_sensors_and_scan(daemon):
+def test_sensors_and_scan_report_nan_in_the_same_words(daemon):
     daemon.answers["sensors"] = {"sensors": [{"name": "bed", "raw_degC": None,
                                               "fault": "out_of_range"}], "inputs": [], "axes": []}
     assert "NaN, no number -> many modules send NaN for a broken wire" in run(
@@ -120,7 +120,7 @@ def offsets(offset_um, applied_um, proving):
 @pytest.mark.parametrize("there_um, status, words", [
     (5.0, 0, "moved and came back"), (0.1, 1, "did NOT move as commanded"),
     (-5.0, 1, "moved the OTHER way")])
-def test_prove_waits_until_the_move_is_over_and_tells_what_was_read(daemon, there_um, status,
+def test_prove_waits_for_the_end_of_the_move_and_reports_read_backs(daemon, there_um, status,
                                                                     words):
     daemon.answers["offsets"] = [offsets(0.0, 0.0, False), offsets(2.0, 0.4 * there_um, True),
                                  offsets(5.0, there_um, True), offsets(0.0, 0.0, False)]
@@ -141,7 +141,7 @@ def test_prove_gives_up_on_a_move_that_does_not_end(daemon):
     assert "axis z: sent +2.00 um, read back +1.90 um\n" in answer.stderr
 
 
-def test_a_reference_says_how_long_the_temperatures_were_watched(daemon):
+def test_a_reference_reports_how_long_temperatures_were_observed(daemon):
     for watched_s, words in ((40.0, "watched for 40 s only"), (1800.0, None)):
         daemon.answers["reference"] = {"done": True, "watched_s": watched_s, "although": ""}
         answer = run("--socket", daemon.path, "reference")
@@ -167,7 +167,7 @@ def test_watch_prints_plain_lines_when_it_is_no_terminal(daemon):
     assert "\033" not in answer.stdout
 
 
-def test_watch_shows_what_comes(daemon):
+def test_watch_shows_new_values(daemon):
     # The connection is silent after three notifications: the watch ends as unreachable.
     answer = run("--socket", daemon.path, "watch", "--period", "0.1")
     assert answer.returncode == 2 and daemon.path in answer.stderr, answer.stderr

@@ -68,9 +68,9 @@ def model_outputs(folder):
     for day, seed in {"monday": 1, "tuesday": 2, "friday": 5}.items():
         text += printed(folder, "simulate", "machine.toml", "--seed", seed, "-o", f"{day}.csv")
     text += "\n" + printed(folder, "fit", "monday.csv", "tuesday.csv", "--outputs", "z_um", "-o",
-                        "fitted.toml")
+                           "fitted.toml")
     text += "\n" + printed(folder, "predict", "--model", "fitted.toml", "friday.csv", "-o",
-                        "predicted.csv")
+                           "predicted.csv")
     return text
 
 

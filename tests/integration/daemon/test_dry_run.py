@@ -142,7 +142,7 @@ def test_a_controller_that_is_gone_is_noticed(lab):
     assert_only_read(machine.controller)
 
 
-def test_what_was_sent_before_is_kept_and_a_real_run_writes(lab):
+def test_earlier_offsets_are_kept_and_a_real_run_writes(lab):
     machine = Machine(lab, edit=lambda text: text.replace('on_stop = "ramp_to_zero"\n', ""))
     daemon = machine.daemon
     daemon.write_config(machine.real)
@@ -161,7 +161,7 @@ def test_what_was_sent_before_is_kept_and_a_real_run_writes(lab):
 
 
 @pytest.mark.parametrize("read_back", [False, True])
-def test_a_piezo_is_told_no_voltage(lab, read_back):
+def test_a_dry_run_sends_no_voltage_to_a_piezo(lab, read_back):
     def piezo(text):
         text = text.replace('name = "cnc"\nkind = "modbus', 'name = "cnc"\nkind = "piezo')
         text = text.replace(OFFSET, VOLTS).replace("offset_um_max = 60.0", "offset_um_max = 20.0")

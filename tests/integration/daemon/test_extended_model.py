@@ -54,7 +54,7 @@ def extended_model(folder):
     run = folder / "heat.csv"
     write_machine_with_heat(run)
     status, printed, errors = run_tool("diagnose", "--model", spindle.MODEL, "--train", f"{run}@:60000",
-                                    "--test", f"{run}@60000:", "--out", folder / "answer")
+                                       "--test", f"{run}@60000:", "--out", folder / "answer")
     assert status == 0, errors
     assert "missing_heat_source of spindle_rpm" in printed, printed
     text = (folder / "answer" / "model.toml").read_text()

@@ -52,7 +52,7 @@ def column(daemon):
     return daemon.status()["inputs"][0]
 
 
-def test_nothing_moves_before_an_operator_enables_it_and_what_was_said_survives(day):
+def test_nothing_moves_before_an_operator_enables_it_and_the_switch_survives(day):
     day.show("0:1")
     daemon = day.daemon()
     status, out, errors = run_tool("check", daemon.config)
@@ -155,7 +155,7 @@ def test_a_reference_is_refused_where_it_would_be_wrong_unless_forced(day):
     assert reference(daemon) == forced
 
 
-def test_proving_waits_shows_progress_and_tells_what_was_read(day):
+def test_proving_shows_progress_and_reports_read_backs(day):
     day.show("0:1")
     daemon = day.daemon().start()
     daemon.wait_for_mode("disabled")

@@ -34,7 +34,7 @@ def lose_the_spindle(machine):
     machine.daemon.wait_for_offset(offset_um(2.0, 2.0 * SHARE), 0.02)
 
 
-def test_a_lost_block_is_estimated_and_told_and_replayed(machine, lab):
+def test_a_lost_block_is_estimated_reported_and_replayed(machine, lab):
     daemon = machine.start()
     lose_the_spindle(machine)
     status, out, _ = daemon.cli("status")
@@ -58,7 +58,7 @@ def test_a_lost_block_is_estimated_and_told_and_replayed(machine, lab):
     assert_replays_exactly(daemon.history, lab.folder / "out.csv")
 
 
-def test_after_a_restart_the_estimate_goes_on_until_it_is_too_uncertain(machine):
+def test_after_a_restart_the_estimate_continues_until_it_is_too_uncertain(machine):
     daemon = machine.start()
     lose_the_spindle(machine)
     daemon.end()
@@ -80,7 +80,7 @@ def test_after_a_restart_the_estimate_goes_on_until_it_is_too_uncertain(machine)
     assert daemon.axis()["offset"] == held
 
 
-def test_told_not_to_estimate_it_holds(machine):
+def test_configured_not_to_estimate_it_holds(machine):
     machine.daemon.write_config(machine.config.replace(
         "[compensation]\n", "[compensation]\nestimate_lost_blocks = false\n"))
     daemon = machine.start()
@@ -109,7 +109,7 @@ def test_the_covariance_of_a_history_is_put_into_the_model_file(machine, lab):
     wait_for_reasons(daemon, "block_estimated")
 
 
-def test_a_record_that_says_too_little_is_refused(machine, lab):
+def test_a_record_with_too_little_data_is_refused(machine, lab):
     run = lab.folder / "run.csv"
     run.write_text("time_s,column_degC\n0,20\n15,21\n")
     status, _, output = run_tool("covariance", "--model", machine.model, run, "-o", "-")

@@ -214,7 +214,7 @@ def end_without_log(watched):
     assert took_s <= 6.0 + 2 * watched.metronome.latest_s(begun, time.monotonic())
 
 
-def test_a_log_pipe_that_nobody_reads(lab, manager):
+def test_an_unread_log_pipe(lab, manager):
     watched = Watched(lab, manager)
     reading, writing = os.pipe()
     fcntl.fcntl(writing, fcntl.F_SETPIPE_SZ, PIPE_BYTES)
@@ -244,7 +244,7 @@ def test_a_log_pipe_that_nobody_reads(lab, manager):
     os.close(writing)
 
 
-def test_nothing_of_the_log_is_lost_where_somebody_reads_it(lab, manager):
+def test_no_line_of_a_log_that_is_read_is_lost(lab, manager):
     watched = Watched(lab, manager)
     watched.start()
     for _ in range(20):
@@ -256,7 +256,7 @@ def test_nothing_of_the_log_is_lost_where_somebody_reads_it(lab, manager):
     assert "stopped; " in log.splitlines()[-1] and "were lost" not in log
 
 
-def test_a_journal_that_nobody_reads(lab, manager):
+def test_an_unread_journal(lab, manager):
     namespace = ("unshare", "--mount", "--map-root-user")
     if subprocess.run([*namespace, "true"], capture_output=True).returncode != 0:
         pytest.skip("this kernel gives no mount namespace")
@@ -294,7 +294,7 @@ def test_a_service_manager_that_does_not_read(lab):
     assert daemon.process.wait(PATIENCE_S) == 0
 
 
-def test_pipes_beside_state_and_history(lab, manager):
+def test_pipes_next_to_state_and_history(lab, manager):
     watched = Watched(lab, manager)
     os.mkfifo(str(watched.daemon.state) + ".new")
     os.mkfifo(str(watched.daemon.history) + "-journal")

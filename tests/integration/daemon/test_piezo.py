@@ -73,7 +73,7 @@ def compensating_with_read_back(lab, warmed_K):
     return machine, machine.daemon
 
 
-def test_with_read_back_a_restart_leaves_the_tool_where_it_stands(lab):
+def test_with_read_back_a_restart_does_not_move_the_tool(lab):
     machine, daemon = compensating_with_read_back(lab, 10.0)
     before = machine.amplifier.all_volts()
     daemon.end()
@@ -86,7 +86,7 @@ def test_with_read_back_a_restart_leaves_the_tool_where_it_stands(lab):
     assert len(after) == 2 and after[0] == 0.0 and 0.0 < after[1] < before[-1], (before, after)
 
 
-def test_an_amplifier_that_does_not_obey_is_seen_and_told_again(lab):
+def test_an_amplifier_that_does_not_obey_is_detected_and_written_again(lab):
     machine, daemon = compensating_with_read_back(lab, 6.0)
     eventually(lambda: abs(daemon.axis()["applied"] - 6.0) < 0.1, "applied as asked for")
     machine.amplifier.give(75.0)

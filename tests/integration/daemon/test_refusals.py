@@ -64,7 +64,7 @@ def test_a_good_configuration_passes_the_check(tmp_path):
     assert status == 0 and "OK" in out, output
 
 
-def test_a_missing_file_and_wrong_options_are_bad_use(tmp_path):
+def test_a_missing_file_and_wrong_options_are_usage_errors(tmp_path):
     status, output = run_daemon(tmp_path / "nosuch.toml")
     assert status == 2 and "nosuch.toml" in output
     done = subprocess.run([str(BIN / "thermocompd"), "--nosuch"], capture_output=True, text=True,

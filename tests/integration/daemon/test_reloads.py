@@ -12,7 +12,7 @@ SHARE = float(os.environ.get("THERMOCOMP_RELOAD_SHARE", "1"))
 
 
 @pytest.mark.parametrize("rate_hz", ROUNDS)
-def test_reloads_beside_clients_leave_nothing_undone(lab, rate_hz):
+def test_reloads_with_clients_complete(lab, rate_hz):
     rounds = ReloadRounds(lab, rate_hz)
     rounds.run(max(3, round(SHARE * ROUNDS[rate_hz])))
     rounds.print_figures()

@@ -77,7 +77,7 @@ def test_a_disable_after_a_late_reload_survives_a_restart(machine, stall):
     daemon.wait_for_mode("disabled")
 
 
-def test_others_are_answered_while_somebody_waits_and_a_second_reload_is_refused(machine, stall):
+def test_others_are_answered_during_a_reload_and_a_second_reload_is_refused(machine, stall):
     daemon = machine.start()
     answers = []
     with stall:

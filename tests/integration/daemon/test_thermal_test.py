@@ -117,7 +117,7 @@ def test_two_stretches_of_one_history_are_before_and_after(machine, lab):
     assert "Before against after" in page
 
 
-def test_a_history_without_probings_says_what_to_do(machine, lab):
+def test_a_history_without_probings_has_advice(machine, lab):
     machine.start()
     machine.daemon.committed()
     machine.daemon.end()

@@ -91,7 +91,7 @@ def test_the_controller_interpolates_what_the_daemon_fitted(lab, form):
     slide(lab, form, stay=False).assert_interpolates(form, 60 + REST_S + WARM_S + MOVING_S)
 
 
-def test_a_daemon_that_was_killed_goes_on_along_the_travel(lab):
+def test_a_killed_daemon_continues_along_the_travel(lab):
     moving = slide(lab, "line")
     daemon = moving.daemon.start()
     moving.wait_for_warm_line()
@@ -149,7 +149,7 @@ def test_a_set_that_is_broken_off_is_never_applied(lab):
     eventually(lambda: client.applied() == (-500, 9000), "the next whole set")
 
 
-def test_check_tells_how_far_a_line_lies_off(lab):
+def test_check_shows_the_deviation_of_a_line(lab):
     (lab.folder / "model.toml").write_text(MODEL)
     config = lab.folder / "line.toml"
     text = daemon_text("line", {"sensors": 1502, "cnc": 1503})

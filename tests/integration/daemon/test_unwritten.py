@@ -45,7 +45,7 @@ def machine(lab):
 
 
 @pytest.mark.parametrize("how", ["exception 1", "silence"])
-def test_what_is_not_written_is_not_called_compensated(machine, how):
+def test_without_writes_the_mode_is_not_compensating(machine, how):
     machine.controller.writes_become = how
     daemon = machine.daemon.start()
     status = eventually(lambda: daemon.status()["controller"]["write"][
@@ -71,7 +71,7 @@ def test_what_is_not_written_is_not_called_compensated(machine, how):
     assert any(output in event["what"] for event in events), events
 
 
-def test_a_refusal_while_running_holds_and_a_controller_that_takes_writes_again_goes_on(machine):
+def test_a_refusal_while_running_holds_until_writes_are_accepted_again(machine):
     daemon = machine.start()
     machine.warm_by(12.0)
     daemon.wait_for_offset(12.0)

@@ -54,7 +54,7 @@ def test_many_reloads_at_1_hz_starve_neither_watchdog_nor_clients(lab, manager):
     daemon.end()
 
 
-def test_the_watchdog_is_not_fed_while_the_cycle_stands_still(lab, manager):
+def test_the_watchdog_is_not_fed_while_the_cycle_hangs(lab, manager):
     stall = Stall(lab.folder / "stall")
     machine = Machine(lab)
     machine.daemon.environment = {**manager.environment, **stall.environment}

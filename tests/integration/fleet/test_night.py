@@ -73,7 +73,7 @@ def test_a_night_names_who_departs_and_why(workshop):
     assert "DEPARTS" in workshop.fleet("status", status=1)
 
 
-def test_a_night_that_fails_is_told_tried_again_and_stops_nobody(store, tmp_path):
+def test_a_failed_night_is_reported_and_retried_and_stops_no_other(store, tmp_path):
     for name in ("mill_0", "mill_1"):
         store.add(name)
         store.fleet("load", name, write_day(tmp_path / "day.csv", 1, 5.0), "--begin",

@@ -164,7 +164,7 @@ def test_a_release_shows_the_newest_score_of_its_candidate(page, browser):
     assert len(steps) == 4 and "promoted" in steps[-1]
 
 
-def test_a_machine_is_judged_beside_its_sisters(page):
+def test_a_machine_is_compared_with_its_sisters(page):
     machines = {machine["name"]: machine for machine in page.json("/api/machines")}
     assert len(machines) == MACHINES
     odd = machines[ODD]
@@ -182,7 +182,7 @@ def test_a_machine_is_judged_beside_its_sisters(page):
     assert len(apart) > 300 and all(4.0 < each < 6.0 for each in apart)
 
 
-def test_what_is_not_there_is_refused(page):
+def test_missing_objects_are_refused(page):
     for path, status in (("/api/machine?name=nobody", 404), ("/api/machine", 404), ("/api/other", 404),
                          ("/api/curves?name=nobody&column=head_degC&seconds=86400", 404),
                          (f"/api/curves?name={ODD}&column=head_degC&seconds=nan", 400),

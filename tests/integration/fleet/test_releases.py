@@ -159,7 +159,7 @@ def test_an_approved_release_is_promoted_and_taken_back(lab, store):
     assert_replays_exactly(mill.daemon.history, lab.folder / "out.csv")
 
 
-def test_what_does_not_fit_is_refused_with_the_reason(lab, store):
+def test_unsuitable_models_are_refused_with_the_reason(lab, store):
     mill = Mill(lab, store, "--central").probe()
     mill.ends_with(mill.offer(WORSE), "refused", "is worse here than the model in use: z_um: leaves")
     mill.ends_with(mill.offer(OTHER_TYPE), "refused", "ram_degC")
@@ -243,7 +243,7 @@ def test_where_operators_approve_the_server_promotes_nothing(lab, store):
     mill.ends_with(withdrawn, "refused", "withdrawn")
 
 
-def test_without_probings_two_models_that_state_no_error_cannot_be_told_apart(lab, store):
+def test_without_probings_two_models_without_claimed_error_are_not_compared(lab, store):
     mill = Mill(lab, store)
     mill.machine.warm_by(9.0)
     mill.daemon.wait_for_offset(9.0, 0.05)

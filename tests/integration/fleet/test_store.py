@@ -90,7 +90,7 @@ REFUSED = {
 }
 
 
-def test_a_machine_is_refused_what_is_not_its_own(two_machines):
+def test_a_machine_cannot_access_rows_of_others(two_machines):
     own, other = number(two_machines, "mill_1"), number(two_machines, "mill_2")
     release = {machine: two_machines.value(f"SELECT id FROM fleet.release WHERE machine = {machine}")
                for machine in (own, other)}
@@ -134,7 +134,7 @@ def test_who_approves_is_decided_by_the_machine(two_machines):
         ["machine_mill_1"], ["person_maria"]]
 
 
-def test_in_the_clear_nobody_gets_in(two_machines):
+def test_without_tls_no_login_succeeds(two_machines):
     store = two_machines
     def connect(tls):
         return store.server.run_sql("SELECT 1", conninfo=store.remote("machine_mill_1", tls=tls),

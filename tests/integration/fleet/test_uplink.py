@@ -58,7 +58,7 @@ def test_everything_recorded_arrives_once(machine):
     assert machine.progress() == (2 * len(machine.means), 0, len(machine.means))
 
 
-def test_probings_have_what_the_model_said(machine):
+def test_probings_have_the_models_value(machine):
     machine.send()
     assert machine.store.value("SELECT count(*) FROM fleet.probing WHERE modelled_um IS NULL") == "0"
     assert machine.store.value("SELECT max(abs(modelled_um)) > 1 FROM fleet.probing") == "t"
@@ -66,7 +66,7 @@ def test_probings_have_what_the_model_said(machine):
                                "JOIN fleet.document ON checksum = model") == "t"
 
 
-def test_another_start_of_the_daemon_goes_on(machine):
+def test_another_start_of_the_daemon_is_followed(machine):
     machine.send()
     more = machine.record(hours_ago=5, hours=2)
     machine.means = machine.recorded()
@@ -76,7 +76,7 @@ def test_another_start_of_the_daemon_goes_on(machine):
     assert machine.progress() == (len(machine.means), 0, 0)
 
 
-def test_a_history_that_was_begun_anew_is_sent_from_its_beginning(machine):
+def test_a_new_history_is_sent_from_its_beginning(machine):
     machine.send()
     for file in machine.folder.glob("history.db*"):
         file.unlink()
@@ -166,7 +166,7 @@ def test_a_cable_that_is_pulled_loses_nothing(machine):
     assert_all_there_once(machine)
 
 
-def test_a_clock_that_is_wrong_costs_its_own_rows_and_is_told(store):
+def test_a_wrong_clock_loses_only_its_own_rows_and_is_reported(store):
     machine = Machine(store, "mill_1")
     machine.expected = machine.record(hours_ago=20, hours=3, clock=(3600, 400 * 86400))
     machine.means = machine.recorded()
@@ -236,7 +236,7 @@ def test_many_uplinks_at_once(store, day):
     assert_all_there_once(machines[7])
 
 
-def test_in_the_clear_only_where_it_is_asked_for(machine):
+def test_without_tls_only_if_configured(machine):
     server = machine.store.server
     plain = f"host=localhost port={server.port} dbname={machine.store.name}"
     machine.configure(plain)  # no authority: the certificate cannot be verified
@@ -248,7 +248,7 @@ def test_in_the_clear_only_where_it_is_asked_for(machine):
     assert_all_there_once(machine)
 
 
-def test_a_segment_that_is_damaged_costs_itself_and_is_told(machine):
+def test_a_damaged_segment_loses_only_itself_and_is_reported(machine):
     base = sqlite3.connect(machine.history)
     [segment] = base.execute("SELECT id FROM segment ORDER BY id LIMIT 1 OFFSET 1").fetchone()
     base.execute("UPDATE chunk SET records = x'00' WHERE segment = ? AND number % 50 = 7", [segment])

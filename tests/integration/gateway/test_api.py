@@ -46,7 +46,7 @@ def test_a_browser_that_takes_gzip_gets_the_same_bytes_in_fewer(gateway):
     assert "Content-Encoding" not in gateway.ask("/api/commands", headers={"Accept-Encoding": "gzip"})[1]
 
 
-def test_the_stream_follows_the_machine_and_says_what_to_do(machine, gateway):
+def test_the_stream_follows_the_machine_with_advice(machine, gateway):
     first = gateway.wait_for(lambda s: s["here"], "a state")
     assert first["machine"] == "mill_3"
     assert first["verdict"]["compensating"] and first["verdict"]["level"] == "good", first["problems"]
@@ -65,7 +65,7 @@ def test_the_stream_follows_the_machine_and_says_what_to_do(machine, gateway):
     assert any("lasted" in event["text"] for event in again["events"])
 
 
-def test_a_daemon_that_is_away_is_told_and_found_again(machine, gateway):
+def test_a_lost_daemon_is_reported_and_reconnected(machine, gateway):
     gateway.wait_for(lambda s: s["here"], "a state")
     with gateway.events() as next_state:
         next_state()
@@ -142,14 +142,14 @@ def test_history_has_probings_and_when_nothing_was_compensated(machine, gateway)
     assert abs(settled["probings"][0]["needed_um"] - 4.5) < 0.2  # 6 um left 1.5 um
     machine.daemon.call("disable")
     result = eventually(lambda: next((t for t in [gateway.json("/api/history?from=-60&points=60")]
-                                    if t["modes"] and t["modes"][-1]["mode"] == "disabled"), None),
-                      "the mode is committed")
+                                      if t["modes"] and t["modes"][-1]["mode"] == "disabled"), None),
+                        "the mode is committed")
     probing, = result["probings"]
     assert probing["axis"] == "z" and probing["left_um"] == 1.5
     assert any(event["text"].startswith("measured z 1.5 um") for event in result["events"])
 
 
-def test_a_machine_at_rest_costs_little_to_watch(machine, gateway):
+def test_a_page_of_a_machine_at_rest_uses_little_cpu(machine, gateway):
     gateway.wait_for(lambda s: s["verdict"]["level"] == "good", "a state")
     with contextlib.closing(gateway.connect()) as link:
         link.request("GET", "/api/events")
@@ -220,10 +220,10 @@ def test_check_refuses_the_files_that_the_start_refuses(lab, machine, gateway):
 
     assert answers(right)[0][0] == 0
     for wrong, output in (({"passwords": empty}, f"{empty}: must have at least one line user:hash"),
-                        ({"passwords": words}, f"{words}:1: maria: must be user:hash"),
-                        ({"certificate": words}, f"{words}: must be a certificate in PEM"),
-                        ({"key": certificate}, f"{certificate}: must be a private key in PEM"),
-                        ({"key": other_key}, "must be the key of the certificate")):
+                          ({"passwords": words}, f"{words}:1: maria: must be user:hash"),
+                          ({"certificate": words}, f"{words}: must be a certificate in PEM"),
+                          ({"key": certificate}, f"{certificate}: must be a private key in PEM"),
+                          ({"key": other_key}, "must be the key of the certificate")):
         (status, _, err), changed = answers(right | wrong)
         assert status == 2 and output in err and f"http.{next(iter(wrong))} = " in err, (wrong, err)
         started = subprocess.run([str(gateway.process.args[0]), str(changed)], capture_output=True,
@@ -240,7 +240,7 @@ def test_the_example_is_complete_and_right(lab):
     assert "127.0.0.1 port 8420" in out
 
 
-def test_a_port_that_is_taken_is_told(lab, machine, gateway):
+def test_a_port_in_use_is_reported(lab, machine, gateway):
     other = Gateway(lab, machine.daemon)
     other.config.write_text(other.config.read_text().replace("port = 0",
                                                              f"port = {gateway.port}"))

@@ -78,7 +78,7 @@ def test_oversize_is_refused(gateway):
     assert serves(gateway)
 
 
-def test_what_is_no_http_is_refused(gateway):
+def test_other_protocols_than_http_are_refused(gateway):
     for junk in (b"\x16\x03\x01\x02\x00\x01" + bytes(200), b"\r\n" * 1000, b"GET\r\n\r\n",
                  b"GET / HTTP/9.9\r\n\r\n", b"DELETE / HTTP/1.1\r\nHost: localhost\r\n\r\n",
                  b"GET / HTTP/1.1\r\nHost: localhost\r\nHost: evil\r\n\r\n",
@@ -145,7 +145,7 @@ def asks_in_vain_at_most(gateway):
             return link.getresponse().status == 200
 
 
-def test_a_page_that_does_not_read_is_let_go_and_costs_no_memory(gateway):
+def test_a_page_that_does_not_read_is_closed_and_uses_no_memory(gateway):
     def resident_kB():
         with open(f"/proc/{gateway.process.pid}/status") as text:
             return int(next(line.split()[1] for line in text if line.startswith("VmRSS")))
@@ -186,7 +186,7 @@ def test_without_the_password_there_is_nothing(guarded):
     eventually(lambda: guarded.ask("/api/status", headers=MARIA)[0] == 200, "maria gets in")
 
 
-def test_a_storm_of_wrong_passwords_keeps_nobody_out_who_is_in(guarded):
+def test_wrong_passwords_do_not_lock_out_logged_in_users(guarded):
     assert guarded.ask("/api/status", headers=MARIA)[0] == 200
     began = time.monotonic()
     answers = [guarded.ask("/", headers=as_user("maria", f"guess {i}"))[0] for i in range(60)]
@@ -201,7 +201,7 @@ def post(gateway, body, headers):
     return status, json.loads(answer)
 
 
-def test_nobodys_unconfirmed_commands_are_in_anothers_way(lab, machine):
+def test_unconfirmed_commands_of_one_user_do_not_block_another(lab, machine):
     gateway = guarded_gateway(lab, machine.daemon, {"maria": "long and secret", "otto": "asks and asks"},
                               'users = ["maria", "otto"]\nmethods = ["disable"]')
     otto = as_user("otto", "asks and asks")
@@ -245,7 +245,7 @@ def test_a_body_of_two_lengths_is_refused(gateway):
         assert answer.count(b"HTTP/1.1 ") == 1 and status_of(answer) == 400, answer[:2000]
 
 
-def test_what_follows_a_body_that_is_too_large_is_no_request(gateway):
+def test_bytes_after_an_oversized_body_are_no_request(gateway):
     answer = gateway.raw(b"POST /api/command HTTP/1.1\r\nHost: localhost\r\nContent-Length: 5000\r\n"
                          b"Content-Type: application/json\r\n\r\n" + b"x" * 5000 + INNER)
     assert answer.count(b"HTTP/1.1 ") == 1 and status_of(answer) == 413, answer[:2000]
@@ -282,7 +282,7 @@ def fill_queue(path):
     raise AssertionError("the queue is never full")
 
 
-def test_it_ends_although_the_daemon_stands_still(machine, gateway):
+def test_it_ends_while_the_daemon_hangs(machine, gateway):
     serves(gateway)
     machine.daemon.process.send_signal(signal.SIGSTOP)
     try:
@@ -337,7 +337,7 @@ def test_a_deep_answer_ends_neither_gateway_nor_command(lab, machine):
         listener.shutdown(socket.SHUT_RDWR)
 
 
-def test_a_named_user_confirms_what_will_move(guarded, machine):
+def test_a_named_user_confirms_a_move(guarded, machine):
     offered = guarded.json("/api/commands", headers=MARIA)
     assert offered["commands"] == ["enable", "disable", "prove", "accept"]
     machine.warm_by(12.0)

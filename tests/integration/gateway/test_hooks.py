@@ -17,7 +17,7 @@ def start(lab, machine, script, more=""):
                                 f'raise_after_s = 0.3\nclear_after_s = 0.3\n{more}')).start()
 
 
-def test_each_alarm_is_told_once_raised_and_once_cleared(lab, machine):
+def test_each_alarm_is_raised_once_and_cleared_once(lab, machine):
     out = lab.folder / "alarms.txt"
     out.touch()
     gateway = start(lab, machine, HOOK.format(out=out))
@@ -38,7 +38,7 @@ def test_each_alarm_is_told_once_raised_and_once_cleared(lab, machine):
     assert reported("raised") == expected
 
 
-def test_a_command_that_hangs_is_ended_and_the_page_goes_on(lab, machine):
+def test_a_hanging_command_is_ended_and_the_page_continues(lab, machine):
     out = lab.folder / "hung.txt"
     gateway = start(lab, machine, f"#!/bin/sh\necho x >> {out}\nexec sleep 30\n", "command_s_max = 1")
     machine.module.stop()

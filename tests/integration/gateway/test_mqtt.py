@@ -52,7 +52,7 @@ def test_values_arrive_retained_and_the_last_will_ends_them(lab, machine, broker
                       "the last will")
 
 
-def test_an_orderly_end_says_offline_and_alarms_come_and_go(lab, machine, broker):
+def test_an_orderly_end_publishes_offline_and_alarms_are_raised_and_cleared(lab, machine, broker):
     gateway = publisher(lab, machine, broker)
     listener = lab.also_end(Subscriber(broker))
     listener.wait_for(lambda t, _, p: t == topic("status") and p.get("compensating"), "online")
@@ -70,7 +70,7 @@ def test_an_orderly_end_says_offline_and_alarms_come_and_go(lab, machine, broker
     listener.wait_for(lambda t, _, p: t == topic("status") and p == {"state": "offline"}, "offline")
 
 
-def test_a_broker_that_was_away_gets_what_happened_meanwhile(lab, machine, broker):
+def test_a_broker_that_was_away_gets_missed_events(lab, machine, broker):
     gateway = publisher(lab, machine, broker)
     first = lab.also_end(Subscriber(broker))
     first.wait_for(lambda t, _, p: t == topic("axis/z"), "an axis")
@@ -89,7 +89,7 @@ def test_a_broker_that_was_away_gets_what_happened_meanwhile(lab, machine, broke
     assert "thermocomp_gateway_mqtt_dropped_total 0\n" in gateway.text("/metrics")
 
 
-def test_user_password_and_certificate_are_asked_for(lab, machine):
+def test_user_password_and_certificate_are_required(lab, machine):
     certificate, key = make_certificate(lab.folder, "broker")
     passwords = lab.folder / "broker.passwords"
     subprocess.run(["mosquitto_passwd", "-b", "-c", str(passwords), "mill", "secret"], check=True,

@@ -106,7 +106,7 @@ def test_it_loads_without_an_error_and_fits_the_screen(machine, gateway, browser
     assert elsewhere == []
 
 
-def test_it_says_what_is_wrong_and_recovers(machine, gateway, browser):
+def test_it_reports_problems_and_recovers(machine, gateway, browser):
     show(browser, gateway, PHONE)
     machine.module.stop()
     took = {"sensors lost": within_s(lambda: text(browser, "answer") == "no", "it says no")}
@@ -153,7 +153,7 @@ def drawn(browser):
         "return document.querySelectorAll('.axis canvas').length") > 0, "a chart")
 
 
-def test_the_axis_card_says_what_is_taken_out_and_what_was_left(machine, gateway, browser):
+def test_the_axis_card_shows_offset_and_last_remainder(machine, gateway, browser):
     machine.warm_by(9.0)
     machine.daemon.wait_for_offset(9.0)
     show(browser, gateway, PHONE)
@@ -361,7 +361,7 @@ def test_everything_can_be_read_and_touched(machine, gateway, browser, scheme):
         "color-contrast", "button-name", "region"}  # outside main
 
 
-def test_a_broker_that_is_gone_is_told_and_found_again(lab, machine, browser):
+def test_a_lost_broker_is_reported_and_reconnected(lab, machine, browser):
     broker = lab.also_end(Broker(lab.folder)).start()
     gateway = lab.also_end(Gateway(lab, machine.daemon, "", f'[mqtt]\nhost = "localhost"\n'
                                    f'port = {broker.port}')).start()
@@ -377,7 +377,7 @@ def test_a_broker_that_is_gone_is_told_and_found_again(lab, machine, browser):
     print("the page showed it after", {name: f"{s:.1f} s" for name, s in took.items()})
 
 
-def test_a_clock_that_is_wrong_is_told(machine, gateway, browser):
+def test_a_wrong_clock_is_reported(machine, gateway, browser):
     resize(browser, PHONE)
     browser.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {
         "source": "const now = Date.now; Date.now = () => now() - 7230000;"})

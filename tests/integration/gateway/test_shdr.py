@@ -50,7 +50,7 @@ def test_values_and_conditions_follow_the_machine(machine, agent):
             assert value == "UNAVAILABLE" or NUMBER.fullmatch(value), (key, value)
 
 
-def test_ping_is_answered_and_what_is_no_line_ends_the_connection(gateway, agent):
+def test_ping_is_answered_and_other_bytes_end_the_connection(gateway, agent):
     agent.link.sendall(b"* PING\r\n* PING\nnonsense\n")
     agent.wait_for(lambda: len(agent.pongs) == 2, "two answers")
     assert agent.pongs[0] == "* PONG 10000"
@@ -82,7 +82,7 @@ def test_the_device_file_names_every_item(machine, gateway, agent):
     assert items["offset_z"]["units"] == "MILLIMETER"
 
 
-def test_who_knows_the_device_file_alone_refuses_no_line(machine, gateway, lab):
+def test_a_reader_of_the_device_file_accepts_every_line(machine, gateway, lab):
     """Warming, a bus disconnected, switching off and on, and a killed daemon."""
     reported = device_file(gateway)
     agent = lab.also_end(Agent(gateway.ready["shdr"], reported))
@@ -123,7 +123,7 @@ def test_who_knows_the_device_file_alone_refuses_no_line(machine, gateway, lab):
     ("2026-03-01T08:00:00Z|system|FAULT|a||AROUND|broken", "qualifier"),
     ("2026-03-01T08:00:00Z|system|BAD|a|||broken", "no item with a value"),
     ("* PONK", "no command")))
-def test_the_reader_refuses_what_is_none(machine, gateway, lab, line, why):
+def test_the_reader_refuses_invalid_lines(machine, gateway, lab, line, why):
     agent = lab.also_end(Agent(gateway.ready["shdr"], device_file(gateway)))
     with pytest.raises(Refused, match=why):
         agent.take(line)

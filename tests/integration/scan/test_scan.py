@@ -37,7 +37,7 @@ SENSORS = [
 
 
 @pytest.mark.parametrize("kind", ["modbus_tcp", "modbus_rtu"])
-def test_each_mistake_is_told_for_what_it_is(simulate, tmp_path, kind):
+def test_each_mistake_is_identified(simulate, tmp_path, kind):
     simulator = simulate(MACHINE)
     # Only the missing unit may ever time out.
     path = configuration(tmp_path, bus(simulator, kind, timeout_ms=3000.0), DEVICES, SENSORS)
@@ -63,7 +63,7 @@ def test_each_mistake_is_told_for_what_it_is(simulate, tmp_path, kind):
     assert not spindle["answers"] and "others on this bus do" in spindle["note"]
 
 
-def test_the_text_says_the_same(simulate, tmp_path):
+def test_the_text_agrees(simulate, tmp_path):
     simulator = simulate(MACHINE)
     path = configuration(tmp_path, bus(simulator, "modbus_rtu", timeout_ms=1500.0), DEVICES,
                          SENSORS)
@@ -94,7 +94,7 @@ def test_the_output_in_the_documentation_is_what_is_printed(simulate, tmp_path):
     assert part == printed[printed.index(part[0]):][:len(part)], done.stdout
 
 
-def test_a_search_finds_the_units_that_answer_and_says_what_it_sends(simulate, tmp_path):
+def test_a_search_finds_answering_units_and_reports_its_requests(simulate, tmp_path):
     simulator = simulate(MACHINE)
     sensors = [("spindle", {"device": "spindle_module", "address": 0})]
     devices = DEVICES[DEVICES.index('[[device]]\nname = "spindle_module"'):]
@@ -116,8 +116,8 @@ def test_a_bus_that_cannot_be_opened_and_a_name_that_is_none(simulate, tmp_path)
     assert "No such file" in report["buses"][0]["error"]
     assert seen["bed"]["fault"] == "no_answer"
     for arguments, output in (([path, "--bus", "other"], "other: no such bus in"),
-                            ([path, "--units", "9-3"], "9-3"),
-                            ([tmp_path / "none.toml"], "none.toml")):
+                              ([path, "--units", "9-3"], "9-3"),
+                              ([tmp_path / "none.toml"], "none.toml")):
         done = thermocomp("scan", *arguments)
         assert done.returncode == 2 and output in done.stderr, done.stderr
 

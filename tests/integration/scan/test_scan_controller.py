@@ -171,7 +171,7 @@ def test_a_register_that_is_not_there_is_named_with_the_exception(simulate, rela
     assert "channels give a temperature" not in done.stdout  # only the controller was tested
 
 
-def test_a_controller_that_is_silent_or_gone_is_told_so(simulate, relay, tmp_path):
+def test_a_silent_or_lost_controller_is_reported(simulate, relay, tmp_path):
     simulator = simulate(MACHINE)
     sensors = bus(simulator, "modbus_tcp", timeout_ms=3000.0)
     silent = controller(relay(simulator.port("cnc"), is_silent=True).port)

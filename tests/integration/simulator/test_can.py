@@ -87,7 +87,7 @@ def test_an_open_circuit_shows_its_code(simulate, bus):
     assert newest(bus, 0x181) == struct.pack("<h", -32768) + struct.pack(">h", 2125)
 
 
-def test_a_dropped_node_sends_nothing_while_the_controller_goes_on(simulate, bus):
+def test_a_dropped_node_sends_nothing_while_the_controller_continues(simulate, bus):
     simulate(MACHINE + event("drop", "node"))
     for _ in range(5):
         newest(bus, 0x300)

@@ -337,7 +337,7 @@ def test_a_controller_that_was_off_has_forgotten_its_offset(simulate):
     assert applied(link) == 700
 
 
-def test_junk_and_vanishing_clients_disturb_nobody(simulate):
+def test_junk_and_vanishing_clients_do_not_disturb_others(simulate):
     simulator = simulate(MACHINE)
     good = simulator.connect("cabinet")
     chance = random.Random(7)

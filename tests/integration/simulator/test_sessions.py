@@ -105,7 +105,7 @@ def test_plant_time_goes_by_the_factor_and_ends_by_itself(simulate, tmp_path):
                          f"compensated {rms:.2f} um")
 
 
-def test_time_stands_still_until_the_heartbeat(simulate):
+def test_time_starts_with_the_heartbeat(simulate):
     machine = MACHINE.replace('name = "x_mm"\nkind = "steps"\ntimes_s = [0]\nvalues = [-123.456]',
                               'name = "x_mm"\nkind = "steps"\ntimes_s = [0, 0.1]\nvalues = [1, 2]')
     simulator = simulate(machine.replace("heartbeat_timeout_s = 0", "heartbeat_timeout_s = 2"),
@@ -192,7 +192,7 @@ def test_the_same_seed_gives_the_same_truth(simulate, tmp_path):
     (["--row-period-ms", "-1"], "--row-period-ms"),
     (["--unknown"], "--unknown"),
 ])
-def test_bad_use_is_refused_with_a_line_that_says_why(tmp_path, options, expected):
+def test_a_usage_error_is_refused_with_its_reason(tmp_path, options, expected):
     (tmp_path / "machine.toml").write_text(REPLAY)
     (tmp_path / "other.csv").write_text("time_s,t1_degC\n0,1\n")
     run_file(tmp_path, 10)

@@ -13,7 +13,7 @@ def pytest_runtest_makereport(item, call):
     report = outcome.get_result()
     if report.failed:
         output = service.run("journalctl", "-b", "--no-pager", "-o", "short-monotonic", "-n", "120",
-                           check=False).stdout
+                             check=False).stdout
         report.sections.append(("journal of the guest", output))
 
 

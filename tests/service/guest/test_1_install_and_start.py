@@ -44,7 +44,7 @@ def test_the_example_beside_it_is_valid_and_the_manual_is_there():
         assert pathlib.Path("/usr/share/bash-completion/completions", program).exists()
 
 
-def test_a_configuration_that_is_wrong_fails_once_and_says_why():
+def test_a_wrong_configuration_fails_once_with_its_reason():
     CONFIG.write_text("format = 1\nno_such_key = 2\n")
     started = run("systemctl", "start", UNIT, check=False)
     assert started.returncode != 0
@@ -56,7 +56,7 @@ def test_a_configuration_that_is_wrong_fails_once_and_says_why():
     run("systemctl", "reset-failed", UNIT)
 
 
-def test_ready_is_said_only_when_cycles_run(machine):
+def test_ready_is_sent_only_when_cycles_run(machine):
     service.write_config(machine.config())
     service.drop_in("planted", "[Service]\nEnvironment=LD_PRELOAD=/opt/service-test/planted_hang.so\n")
     hold_back = STATE / "plant-slow-start"

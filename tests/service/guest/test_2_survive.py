@@ -61,7 +61,7 @@ def test_a_restart_is_bumpless(running):
     assert stayed_at(running.orders_since(orders), 9.0)
 
 
-def test_a_restart_on_the_way_goes_on_from_where_the_axis_is(running):
+def test_a_restart_during_a_move_continues_from_the_present_offset(running):
     orders = running.count()
     running.warm_by(24.0)
     for stop_um in (13.0, 18.0):

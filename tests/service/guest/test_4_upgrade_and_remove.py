@@ -130,7 +130,7 @@ def test_an_upgrade_keeps_what_the_site_has_written(running, newer):
     assert "# a line of the site" in example.read_text()
 
 
-def test_the_daemon_of_before_goes_on_where_the_next_version_refuses_its_configuration(running, newer):
+def test_the_previous_daemon_continues_if_the_next_version_refuses_its_configuration(running, newer):
     pid = service.main_pid()
     CONFIG.write_text(running.config() + "colour = 1\n")
     output = install(newer)

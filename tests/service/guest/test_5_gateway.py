@@ -58,7 +58,7 @@ def test_installed_it_starts_nothing_before_it_is_configured(machine):
     assert run("thermocomp", "check", example).stdout.rstrip().endswith("OK")
 
 
-def test_started_it_answers_with_what_the_daemon_says(machine):
+def test_started_it_answers_with_the_daemons_status(machine):
     SETTINGS.write_text(GATEWAY)
     run("systemctl", "start", UNIT)
     assert show("ActiveState") == "active"
@@ -83,7 +83,7 @@ def test_it_may_read_the_report_that_the_timer_makes():
     assert status == 200 and "report on the thermal compensation" in page, page[:500]
 
 
-def test_it_is_nobody_in_its_sandbox():
+def test_it_runs_without_rights_in_its_sandbox():
     pid = int(show("MainPID"))
     assert pathlib.Path(f"/proc/{pid}").stat().st_uid == pwd.getpwnam("thermocomp-gateway").pw_uid
     assert service.process_fact(pid, "NoNewPrivs") == "1"
@@ -111,7 +111,7 @@ def test_killed_it_is_started_again():
     assert service.status()["mode"] == "compensating"
 
 
-def test_a_configuration_that_is_wrong_fails_once_and_says_why():
+def test_a_wrong_configuration_fails_once_with_its_reason():
     SETTINGS.write_text(GATEWAY + "colour = 1\n")
     assert run("systemctl", "restart", UNIT, check=False).returncode != 0
     eventually(lambda: show("ActiveState") == "failed", "failed for good")

@@ -34,7 +34,7 @@ def rig(tmp_path_factory):
         lab.end()
 
 
-def test_error_passive_is_told_and_changes_nothing(rig):
+def test_error_passive_is_reported_and_changes_nothing(rig):
     for bus, interface in INTERFACES.items():
         write_error_frame(interface, rigs.CONTROLLER_PROBLEM, rigs.PASSIVE_BITS)
         eventually(lambda: rig.bus(bus)["state"] == "passive", "the state is reported")
@@ -79,7 +79,7 @@ def test_interface_down_and_up(rig, bus):
 
 
 @pytest.mark.parametrize("bus", BUSES)
-def test_interface_removed_and_made_anew(rig, bus):
+def test_interface_removed_and_recreated(rig, bus):
     rig.outage("interface removed, made anew", bus, lambda: ip("del", INTERFACES[bus]),
                lambda: set_up(INTERFACES[bus]),
                lambda: ip("add", "dev", INTERFACES[bus], "type", "vcan"))
@@ -139,7 +139,7 @@ def live_on_a_full_bus(rig):
     return modes
 
 
-def test_a_bus_full_of_others_frames_costs_nothing(rig):
+def test_a_bus_full_of_other_frames_has_no_effect(rig):
     """1 Mbit/s is some 7700 frames/s of 8 bytes with 11-bit identifiers. The kernel filters them
     for the daemon; our frames between them all arrive."""
     # A stall of the machine for a second makes readings stale too, but not each time.

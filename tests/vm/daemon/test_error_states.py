@@ -38,7 +38,7 @@ def adapter(tmp_path_factory):
         lab.end()
 
 
-def test_warning_and_passive_are_told_and_change_nothing(adapter):
+def test_warning_and_passive_are_reported_and_change_nothing(adapter):
     rig = adapter.rig
     for letter, state in (("w", "warning"), ("p", "passive"), ("w", "warning"), ("a", "active")):
         adapter.report_state(letter)
@@ -73,7 +73,7 @@ def test_cable_out_and_in(adapter):
     adapter.rig.outage("cable out, in (slcan)", "both", lambda: cut(True), lambda: cut(False))
 
 
-def test_a_daemon_that_starts_on_a_bus_that_is_off_says_so(adapter):
+def test_a_start_on_a_bus_that_is_off_is_reported(adapter):
     """Error frames do not report an earlier bus-off; the missing carrier does."""
     rig = adapter.rig
     bus_off(adapter)

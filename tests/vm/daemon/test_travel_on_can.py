@@ -154,11 +154,11 @@ class Listener:
 
 
 @pytest.mark.parametrize("form", ["line", "table"])
-def test_the_controller_interpolates_what_came_in_frames(lab, form):
+def test_the_controller_interpolates_sets_received_in_frames(lab, form):
     slide(lab, form, stay=False).assert_interpolates(form, 240)
 
 
-def test_a_daemon_that_was_killed_goes_on_half_way_round(lab):
+def test_a_killed_daemon_continues_half_way_round(lab):
     moving = slide(lab, "line")
     sets = lab.also_end(Listener("vcan1", K0, SLOPE))
     daemon = moving.daemon.start()

@@ -125,7 +125,7 @@ def test_a_switch_that_cannot_be_saved_is_not_called_done(machine, disk):
     assert daemon.status()["mode"] == "disabled"
 
 
-def test_a_daemon_killed_and_started_on_a_full_disk_compensates_and_the_gap_is_told(
+def test_a_daemon_restarted_on_a_full_disk_compensates_and_reports_the_gap(
         machine, disk, lab):
     daemon = machine.start()
     machine.warm_by(6.0)

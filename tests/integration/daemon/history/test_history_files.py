@@ -21,7 +21,7 @@ def chunks(history):
 
 @pytest.mark.parametrize("ends", (("-wal", "-shm"), ("-wal",), ("-shm",)))
 @pytest.mark.parametrize("at_once", (True, False))
-def test_what_was_committed_outlives_its_log(machine, lab, ends, at_once):
+def test_committed_data_outlives_its_log(machine, lab, ends, at_once):
     """`at_once`: killed before the next commit can detect it."""
     if at_once:
         machine.daemon.write_config(machine.config.replace("commit_s = 0.2", "commit_s = 2.0"))

@@ -104,7 +104,7 @@ def test_a_commanded_reference_comes_from_the_history_too(machine):
 
 @pytest.mark.parametrize("damage", [name for name in DAMAGE if name not in
                                     ("missing", "dangling_link")])
-def test_without_a_history_it_stays_off_and_says_what_to_do(machine, damage):
+def test_without_a_history_it_stays_off_with_advice(machine, damage):
     without_history(machine)
     daemon = machine.start()
     machine.warm_by(9.0)

@@ -38,7 +38,7 @@ def test_sigterm_leaves_the_offsets_where_they_are(machine):
     assert not daemon.socket.exists()
 
 
-def test_sigterm_takes_the_offsets_to_zero_where_it_is_told_to(machine, lab):
+def test_sigterm_ramps_offsets_to_zero_if_configured(machine, lab):
     machine.daemon.write_config(machine.config.replace("[compensation]\n",
                                                        '[compensation]\non_stop = "ramp_to_zero"\n'))
     daemon = machine.start()

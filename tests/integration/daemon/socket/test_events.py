@@ -20,7 +20,7 @@ def index_of(events, kind, subject="", what=""):
     return found[0]
 
 
-def test_a_shift_is_told_in_order_with_durations(lab):
+def test_events_of_a_shift_are_in_order_with_durations(lab):
     machine = Machine(lab)
     daemon = machine.start()
     machine.warm_by(3.0)
@@ -80,7 +80,7 @@ def test_a_shift_is_told_in_order_with_durations(lab):
     assert status == 0 and "Lately" in out and "Problems        : none" in out
 
 
-def test_a_first_start_that_is_switched_off_tells_no_faults_of_its_first_moments(lab):
+def test_a_first_start_switched_off_reports_no_initial_faults(lab):
     machine = Machine(lab)
     machine.daemon.write_config(machine.config.replace("enabled_at_first_start = true",
                                                        "enabled_at_first_start = false"))
@@ -132,7 +132,7 @@ def test_earlier_runs_are_in_the_history(lab):
     assert status == 2 and "none.db" in output
 
 
-def test_strict_sees_what_is_wrong_while_it_compensates(lab):
+def test_strict_reports_problems_while_compensating(lab):
     machine = Machine(lab)
     daemon = machine.start()
     eventually(lambda: daemon.cli("status", "--strict")[0] == 0, "every unit has answered")

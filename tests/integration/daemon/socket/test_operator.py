@@ -97,7 +97,7 @@ def test_a_broken_configuration_is_not_taken_over(machine):
     daemon.wait_for_offset(7.0, 0.05)
 
 
-def test_another_bus_needs_a_restart_and_is_said_so(machine):
+def test_another_bus_is_reported_to_need_a_restart(machine):
     daemon = machine.start()
     text = daemon.config.read_text()
     daemon.config.write_text(text.replace(f"port = {machine.module.port}", "port = 1"))
@@ -121,7 +121,7 @@ def test_a_changed_model_is_taken_over_without_a_jump(machine, lab):
     assert_slewed_exactly(times_s, offsets_um)
 
 
-def test_a_new_reference_makes_the_present_state_the_straight_one(machine):
+def test_a_new_reference_takes_the_present_state_as_zero(machine):
     daemon = machine.start()
     machine.warm_by(6.0)
     daemon.wait_for_offset(6.0, 0.05)
@@ -209,7 +209,7 @@ def test_a_measured_displacement_that_cannot_be_is_refused(machine, lab, value_u
     recorded(machine, lab)
 
 
-def test_a_value_beyond_the_claimed_error_is_asked_back(machine, lab):
+def test_a_value_beyond_the_claimed_error_needs_confirmation(machine, lab):
     """The model claims 1.5 um: a remainder of 12 um is a factor-of-ten mistake, 2 um are its error."""
     machine.model.write_text(MODEL + CLAIMS)
     daemon = machine.start()
