@@ -31,7 +31,7 @@ namespace thermocomp {
       static_cast<std::chrono::nanoseconds::rep>((time_s < year_s ? time_s : year_s) * 1e9)};
 }
 
-/// Stays signalled: every later sleep ends at once. signal() may come from any thread.
+/// Stays signalled: every later sleep ends at once. signal() may be called from any thread.
 class WakeEvent {
  public:
   /// @throws DriverError when the system has no more descriptors

@@ -70,7 +70,7 @@ struct Targets {
   std::span<const double> axis_um;  ///< one per axis; NaN: stay
   bool may_change{true};            ///< false: hold_while_cutting holds the offset
   bool waits_for_cut{false};        ///< the ramp to zero waits for the end of a cut
-  bool stand_where_unknown{false};  ///< an axis without a target has its offset as target
+  bool hold_where_unknown{false};   ///< an axis without a target keeps its offset
 };
 
 }  // namespace thermocomp

@@ -174,7 +174,7 @@ std::string events_text(const std::vector<Event>& events) {
     }
     text += "\n";
   }
-  return text.empty() ? "nothing has happened\n" : text;
+  return text.empty() ? "no events\n" : text;
 }
 
 }  // namespace thermocomp

@@ -145,7 +145,7 @@ class Causes {
     for (const UnitStatus& unit : bus.units)
       if (unit.answering && !unit.last_error.empty() && !status_.sensors_bad.empty())
         add("bus " + bus.name + ": " + unit.name + ": " + unit.last_error,
-            "look at what came, and at what may help", "thermocomp scan", subject);
+            "see the received bytes and suggested settings", "thermocomp scan", subject);
       else if (!unit.answering && bus.connected && !is_good_still(unit))
         add_silent(unit, is_network(bus.kind), subject);
   }
@@ -168,7 +168,7 @@ class Causes {
                             : " does not answer (" + unit.last_error + ")") +
             lost_with(unit.sensors, unit.blocks),
         is_on_network && !is_silent
-            ? "look at what came, and at what may help"
+            ? "see the received bytes and suggested settings"
             : code_text(is_silent ? Fault::no_answer : Fault::bad_frame).remedy,
         "thermocomp scan", subject);
   }

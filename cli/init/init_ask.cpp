@@ -132,7 +132,7 @@ void ask_for_modules(InitDraft& draft, Questions& questions, const InitEyes& eye
     if (eyes.find_units) units = eyes.find_units(draft.buses[bus]);
     if (units.empty())
       questions.ask_until(eyes.find_units
-                              ? "No unit answers on " + name + ". Units to use all the same"
+                              ? "No unit answers on " + name + ". Units to use nevertheless"
                               : "Units of the modules on " + name,
                           "1", [&](const std::string& text) { units = parse_numbers(text); });
     const std::size_t before = draft.modules.size();

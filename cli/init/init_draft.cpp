@@ -103,7 +103,7 @@ std::string blocks_text(const InitDraft& draft) {
       if (!is_wanted) {
         text += "# sensor " + channel.sensor +
                 " is in no block: the model does not use it, it is "
-                "recorded all the same\n";
+                "recorded only\n";
         continue;
       }
       text += "[[block]]\n" + key_text("name", channel.sensor) + key_text("input", input) +
@@ -126,7 +126,7 @@ std::string controller_text(const InitController& controller) {
   if (!controller.is_modbus()) {
     text += key_text("kind", controller.kind);
     if (controller.kind == "dry_run")
-      text += "# None yet: everything is computed and recorded, nothing is sent.\n";
+      text += "# No controller yet: offsets are computed and recorded, not sent.\n";
     else
       text += dry_run_text(controller);
     return text + "\n";
@@ -134,7 +134,8 @@ std::string controller_text(const InitController& controller) {
   text +=
       link_text(controller.link) + key_number("unit", controller.unit) + dry_run_text(controller);
   if (!controller.reads_gaps)
-    text += "gap_registers_max = 0 # it refuses to have registers between its values read along\n";
+    text +=
+        "gap_registers_max = 0 # it refuses requests that include registers between its values\n";
   if (const auto& valid = controller.valid_bits)
     text += "valid_bits = " + place_text(*valid, valid->address) + "\n";
   if (const auto& count = controller.heartbeat)

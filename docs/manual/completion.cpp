@@ -25,17 +25,17 @@ std::string joined(const std::vector<std::string>& words, const char* between) {
   return text;
 }
 
-/// What can be said of one App: its options, those that want a file, those that want another value.
+/// Options of one App, those with a file and those with another value.
 struct Words {
   std::vector<std::string> options;
   std::vector<std::string> with_file;
   std::vector<std::string> with_value;
-  bool files{false};  ///< something in a place of its own is a file
+  bool files{false};  ///< a positional argument is a file
 };
 
 Words words_of(const CLI::App& app) {
   Words words;
-  // What another program carries out has options that only that one knows.
+  // The other program's own options are unknown here.
   words.files = app.get_prefix_command();
   for (const CLI::Option* option : app.get_options()) {
     if (!option->nonpositional()) {

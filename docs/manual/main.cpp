@@ -203,7 +203,7 @@ void write_formats(const fs::path& examples, const fs::path& folder) {
       "relative to the folder of the file. After a change \"thermocomp reload\" takes over model,\n"
       "blocks, screening, smoothing, limits and the rules of the compensation, without a jump of "
       "the\n"
-      "axes; it says when a restart is needed instead.\n"
+      "axes, or reports that a restart is needed.\n"
       "\n"
       "The commented examples below are the reference; every key is shown with its default. They "
       "are\n"
@@ -236,15 +236,14 @@ void write_run_format(const fs::path& examples, const fs::path& folder) {
       "\"thermocomp export\" writes this form from a daemon's history: the model's inputs as the\n"
       "daemon computed with them, signals, the displacement where it was probed, and for each "
       "axis\n"
-      "_offset_um, _applied_um and _measured_um. Comments tell wall time, faults of sensors, "
+      "_offset_um, _applied_um and _measured_um. Comments contain wall time, faults of sensors, "
       "commands\n"
       "and gaps. \"inspect\", \"fit\", \"predict\", \"diagnose\" and \"covariance\" take it as it "
       "is.\n"
       "\n"
-      "Readers also take what people have: other separators, decimal commas, dates, units in\n"
-      "brackets; the interpretation is printed on stderr, and what may mean two things is asked "
-      "for\n"
-      "with the line to write into a file of --columns.\n";
+      "Readers also accept other separators, decimal commas, dates and units in brackets. They\n"
+      "print the interpretation on stderr. An ambiguity is an error that shows the line to add to\n"
+      "a file of --columns.\n";
   page.examples = {{"A RUN FILE", content(examples / "run.csv")},
                    {"A FILE OF --COLUMNS", content(examples / "columns.toml")}};
   page.see_also = {"thermocomp(1)", "thermocomp-modelling(1)"};

@@ -44,14 +44,14 @@ std::string escaped(std::string_view text) {
   return out;
 }
 
-/// As it stands, in a fixed font.
+/// The text unchanged, in a fixed font.
 std::string verbatim(std::string_view text) {
   std::string out = ".nf\n\\f(CW" + escaped(text);
   if (!out.ends_with('\n')) out += '\n';
   return out + "\\fP\n.fi\n";
 }
 
-/// A paragraph a line of blank text, and lines that begin with a blank as they stand.
+/// Paragraphs separated by blank lines; lines that begin with a blank stay unchanged.
 std::string paragraphs(std::string_view text) {
   std::string out;
   std::string shown;
@@ -119,7 +119,7 @@ std::vector<const CLI::App*> commands_of(const CLI::App& app) {
   return app.get_subcommands([](const CLI::App*) { return true; });
 }
 
-/// What --help prints of each command, and of the commands within it.
+/// The --help of each command and its subcommands.
 std::string commands_text(const CLI::App& app, const std::string& program) {
   std::string text;
   for (const CLI::App* command : commands_of(app)) {

@@ -1,5 +1,4 @@
-/// What is made from a program's declared command line and from commented examples: manual pages in
-/// man(7) and the completion of bash.
+/// Manual pages in man(7) and bash completion, from declared command lines and commented examples.
 #pragma once
 
 #include <string>

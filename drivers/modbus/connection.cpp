@@ -270,7 +270,7 @@ void ModbusConnection::Implementation::await_answer(nanoseconds deadline, Exchan
   const nanoseconds rest = rtu_ ? block : std::min<nanoseconds>(timeout_, rest_max);
   const nanoseconds end = deadline + rest;
   nanoseconds until = deadline;
-  bool is_over = false;  // unrelated bytes may come without end
+  bool is_over = false;  // unrelated bytes may arrive endlessly
   while (true) {
     const ModbusFrames::Found found = frames_.look();
     in_step_ = found != ModbusFrames::Found::no_frame;
@@ -312,7 +312,7 @@ void ModbusConnection::Implementation::judge_silence(Exchange& exchange) const {
   const std::string within =
       " within timeout_ms = " + std::to_string(std::chrono::round<milliseconds>(timeout_).count());
   const std::string came = frames_.came();
-  // In TCP the start of a frame is followed by its rest, or by nothing that could be told from it.
+  // In TCP, bytes after the start of a frame cannot be distinguished from its rest.
   const bool is_silent = came.empty() || (frames_.came_late() && (rtu_ || !frames_.has_part()));
   exchange.outcome = is_silent ? ExchangeOutcome::timeout : ExchangeOutcome::bad_frame;
   exchange.detail = came.empty()                       ? "no answer" + within

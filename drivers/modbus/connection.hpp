@@ -55,7 +55,7 @@ inline constexpr nanoseconds gateway_wait_max = std::chrono::seconds(3);
 /// Time of a frame of `bytes` bytes on the line; TCP: 0.
 [[nodiscard]] nanoseconds time_on_line(const ModbusLine& line, std::size_t bytes) noexcept;
 
-/// For one thread; only cancel() may come from another.
+/// For one thread, except cancel().
 ///
 /// Late answers. TCP: each request has its own transaction id; an answer with another id is
 /// discarded. RTU has no such id: after a request without answer, its unit is not asked again

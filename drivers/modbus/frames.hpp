@@ -42,9 +42,9 @@ class ModbusFrames {
   };
   [[nodiscard]] Found look();
   [[nodiscard]] std::span<const std::uint8_t> answer() const noexcept { return answer_; }
-  /// Bytes of an incomplete frame have come.
+  /// A frame is incomplete.
   [[nodiscard]] bool has_part() const noexcept { return received_ > begin_; }
-  /// As many bytes as the answer has came, without an answer among them: nothing more will come.
+  /// As many bytes as the answer has were received, without an answer: no more are expected.
   [[nodiscard]] bool is_full() const noexcept;
 
   /// Description of bytes received in place of the answer; empty: none.

@@ -25,7 +25,7 @@ struct PortBytes {
   std::size_t size{0};
 };
 
-/// For one thread; only cancel() may come from another. Closed at first.
+/// For one thread, except cancel(). Closed at first.
 class ModbusPort {
  public:
   ModbusPort() = default;

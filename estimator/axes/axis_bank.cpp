@@ -40,7 +40,7 @@ void AxisBank::step(const StepTime& time, const Targets& targets, const Signals&
     const bool moves = driven(span);
     for (std::size_t i = span.first; i < span.end(); ++i) {
       input.target_um = targets.axis_um[i];
-      if (targets.stand_where_unknown && !std::isfinite(input.target_um))
+      if (targets.hold_where_unknown && !std::isfinite(input.target_um))
         input.target_um = axes_[i].offset_um();
       moves ? axes_[i].move(input) : axes_[i].hold(time.now);
       command.offset_um[i] = axes_[i].offset_um();

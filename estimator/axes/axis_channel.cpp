@@ -31,8 +31,7 @@ constexpr double register_rounding_um = 0.1;
 /// Good read-backs that outweigh one unexplained one; a second one within them latches.
 constexpr std::uint8_t suspicion_of_one = 16;
 
-/// The one that comes with a new epoch, the one before its first command is written, and the one
-/// that shows it written.
+/// Of a new epoch: with its start, before its first command is written, and with that command.
 constexpr std::uint8_t read_backs_until_written = 3;
 
 /// On a link that was away for less, a read-back may be on its way to the offset sent last; set

@@ -106,7 +106,7 @@ Targets TargetRule::step(Mode mode, std::span<const double> axis_um,
   targets.may_change = !hold_while_cutting_ || signals.surely_not_cutting();
   targets.waits_for_cut = mode == Mode::ramping_to_zero && signals.may_be_cutting();
   // Before the first cycle end there is no target: an axis keeps its offset.
-  targets.stand_where_unknown = mode == Mode::compensating;
+  targets.hold_where_unknown = mode == Mode::compensating;
   const bool to_zero =
       mode == Mode::disabled || (mode == Mode::ramping_to_zero && !targets.waits_for_cut);
   const bool follows = mode == Mode::compensating && !displacement.held;

@@ -156,7 +156,7 @@ void LostBlocks::change_pattern(nanoseconds now, std::span<const double> temps_d
     // Noise of the last value and of the present one.
     state_.drift_K2[at(i, i)] = 2.0 * growth_.noise_K * growth_.noise_K + given_K2_[i];
   }
-  // Of a lost input, the last measured or estimated value.
+  // For a lost input, the last measured or estimated value.
   for (std::size_t i = 0; i < inputs_; ++i)
     state_.anchor_degC[i] = state_.lost[i] != 0 ? state_.temps_degC[i] : temps_degC[i];
   state_.anchored_at = now;

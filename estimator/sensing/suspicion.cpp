@@ -206,7 +206,7 @@ void Suspicion::look_for_jumps(nanoseconds now) noexcept {
   }
 }
 
-/// Change of the level, less that of the neighbours: next to nothing after a spike.
+/// Change of the level minus that of the neighbours; near 0 after a spike.
 double Suspicion::held_K(const Suspect& suspect, const NeighbourCheck::Answer& answer) noexcept {
   for (std::size_t i = 0; i < names_.size(); ++i)
     changes_K_[i] = level_K(i, 0) - level_K(i, line_ticks);

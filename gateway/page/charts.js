@@ -224,7 +224,7 @@ function showCursor(ms) {
   for (const [name, part] of axisParts) {
     const value = row ? row[columns.indexOf(name + '_offset_um')] : null;
     const probing = row && probings.find(each => each.axis === name && Math.abs(each.time_s * 1000 - ms) <= near_ms);
-    setText(part.then, row ? (isNumber(value) ? 'then ' + signed(value, 1) + ' ' + part.unit : 'then not known') +
+    setText(part.then, row ? (isNumber(value) ? 'then ' + signed(value, 1) + ' ' + part.unit : 'then unknown') +
       (probing ? ', probed: ' + fixed(Math.abs(probing.left_um), 1) + ' left' : '') : '');
   }
   showLegend(row);
@@ -309,7 +309,7 @@ function showOnly(sensor) {
 // Note if the range begins before the history.
 function recordedSince(from_s) {
   const first = table.find(row => row.some((value, c) => c > 0 && value !== null));
-  if (!first) return 'nothing was recorded in this time';
+  if (!first) return 'no data in this period';
   const since_s = first[0].getTime() / 1000;
   return since_s - from_s > 0.05 * range.seconds ? 'recorded since ' + minuteText(since_s) : '';
 }

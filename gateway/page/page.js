@@ -125,7 +125,7 @@ function showProblems(now) {
   if (Math.abs(off_s) > clockTolerance_s)
     problems.push({what: 'the clock of the machine\u2019s computer is ' + duration(Math.abs(off_s)) +
                          (off_s > 0 ? ' ahead of' : ' behind') + ' the one of this device',
-                   remedy: 'set the one that is wrong; the compensation itself needs no clock'});
+                   remedy: 'set the wrong one; the compensation needs no clock'});
   place('problems').hidden = problems.length === 0;
   const key = JSON.stringify(problems);
   const list = place('problem-list');
@@ -190,7 +190,7 @@ function axisSentence(axis, now_s) {
   return is + fixed(Math.abs(axis.offset), 1) + of + unit + (last ?
     '; ' + fixed(Math.abs(last.left_um), 1) + unit + ' left at the last probing, ' + duration(now_s - last.time_s) + ' ago'
     : !isNumber(recordedSince_s) ? '' : now_s - recordedSince_s > 30 * 86400
-    ? '; not probed in the last 30 days' : '; not probed since the records begin, ' + shortTime(recordedSince_s));
+    ? '; not probed in the last 30 days' : '; not probed since the start of the history, ' + shortTime(recordedSince_s));
 }
 
 const lastProbing = axis => probings.filter(each => each.axis === axis.name && isNumber(each.left_um)).pop();
@@ -371,7 +371,7 @@ function showEvents(events) {
       (isNumber(event.from_s) ? ', ' + clock(event.from_s) + ' to ' + clock(event.wall_s) : '')));
     return item;
   }));
-  if (events.length === 0) list.append(make('li', 'nothing has happened'));
+  if (events.length === 0) list.append(make('li', 'no events'));
 }
 
 // ------------------------------------------------------------------ commands

@@ -96,12 +96,12 @@ function showMachines(machines) {
   shown.sort((a, b) => order.indexOf(a.level) - order.indexOf(b.level) || a.name.localeCompare(b.name));
   const count = level => machines.filter(machine => machine.level === level).length;
   title([], machines.length + ' machines, ' + count('bad') + ' depart, ' + count('warning') + ' to look at, ' +
-        count('unknown') + ' not known');
+        count('unknown') + ' unknown');
   const section = make('section');
   const table = make('table', null, {id: 'machines'});
   const head = make('thead');
   const names = make('tr');
-  for (const [text, number] of [['machine'], ['verdict'], ['hall'], ['type'], ['left at last probing, of claimed', 1],
+  for (const [text, number] of [['machine'], ['verdict'], ['hall'], ['type'], ['error at last probing, of claimed', 1],
                                 ['outside in 30 d', 1], ['rank', 1], ['release'], ['sent', 1]])
     names.append(make('th', text, number ? {scope: 'col', class: 'number'} : {scope: 'col'}));
   head.append(names);
@@ -128,7 +128,7 @@ function section(heading, ...parts) {
 }
 
 function monthTable(months) {
-  if (!months.length) return make('p', 'no night was worked on yet', {class: 'note'});
+  if (!months.length) return make('p', 'no night evaluated yet', {class: 'note'});
   const table = make('table');
   const head = make('tr');
   for (const text of ['month', 'left (median)', 'claimed', 'nights', 'departs'])
@@ -188,12 +188,12 @@ function showMachine(machine, verdict) {
   const left = make('div');
   const right = make('div');
   left.append(section('Months', monthTable(machine.months)), section('Releases', releaseList(machine.releases)));
-  right.append(section('What happened', events));
+  right.append(section('Events', events));
   two.append(left, right);
   view.replaceChildren(section('Verdict', make('p', verdict ? verdict.verdict : '', {class: 'verdict ' + (verdict ? verdict.level : '')}),
                                make('p', words), findings),
-                       section('Places: its curve beside its sisters', columns.length ? places
-                         : make('p', 'nothing was sent yet', {class: 'note'})), two);
+                       section('Curves compared with the sisters', columns.length ? places
+                         : make('p', 'no data sent yet', {class: 'note'})), two);
 }
 
 // ------------------------------------------------------------------ one place
@@ -230,7 +230,7 @@ function chart(shown, name, column, cursor) {
   const height = window.innerWidth <= 700 ? 256 : 352;
   const svg = draw('svg', {viewBox: '0 0 ' + width + ' ' + height, role: 'img', 'aria-label': placeName(column) + ' of ' + name + ' and its sisters'});
   const all = shown.curves.flatMap(curve => curve.mean.filter(isNumber));
-  if (!all.length) return make('p', 'nothing was recorded in this time', {class: 'note'});
+  if (!all.length) return make('p', 'no data in this period', {class: 'note'});
   const low = all.reduce((a, b) => Math.min(a, b));
   const high = Math.max(all.reduce((a, b) => Math.max(a, b)), low + 0.1);
   const points = span[1] / shown.step_s;

@@ -67,7 +67,7 @@ def test_operator_commands_ask_the_right_method(daemon):
 def latched(applied_um, releasing):
     return status_answer(axes=[{"name": "z", "unit": "um", "driven": False, "applied": applied_um,
                                 "mismatch": {"sent_um": 14.67, "read_um": 26.67,
-                                             "likely": "changes without us",
+                                             "likely": "changes by itself",
                                              "releasing": releasing}}])
 
 

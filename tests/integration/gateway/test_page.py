@@ -158,7 +158,7 @@ def test_the_axis_card_shows_offset_and_last_remainder(machine, gateway, browser
     machine.daemon.wait_for_offset(9.0)
     show(browser, gateway, PHONE)
     eventually(lambda: "taken out 9.0 of at most 60 µm" in text(browser, "axes"), "what is taken out")
-    eventually(lambda: re.search(r"not probed since the records begin, \d\d:\d\d", text(browser, "axes")),
+    eventually(lambda: re.search(r"not probed since the start of the history, \d\d:\d\d", text(browser, "axes")),
                "the history is read")
     assert "never compared with a measurement" in text(browser, "axes")
     machine.daemon.call("measured", axis="z", value_um=1.2, confirm=True)

@@ -152,7 +152,7 @@ TEST_CASE("a TPDO on change becomes stale, or holds while heartbeats come", "[ca
     bus.put(0x185, {0xE1, 0x00});
     live(bus, 6, 0x05);
     CHECK(age(bus) == 6s);
-    CHECK_THAT(bus.error(), Catch::Contains("COB-ID 389 does not come") &&
+    CHECK_THAT(bus.error(), Catch::Contains("COB-ID 389 is not received") &&
                                 Catch::Contains("event timer") && Catch::Contains("pdo_on_change"));
     bus.put(0x185, {0xE1, 0x00});
     CHECK(bus.error().empty());

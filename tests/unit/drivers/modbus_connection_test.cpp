@@ -94,7 +94,7 @@ TEST_CASE("exceptions, silence and wrong answers are distinguished", "[connectio
   const Exchange other = outcome_of([](const auto& r) { return peer::exception(r, 200); });
   CHECK(own.exception_code == 13);
   CHECK(other.exception_code == 200);
-  CHECK_THAT(own.detail, Catch::Contains("does not know"));
+  CHECK_THAT(own.detail, Catch::Contains("not in the protocol"));
   const Exchange without_code = outcome_of([](const auto& r) { return peer::exception(r, 0); });
   CHECK(without_code.outcome == ExchangeOutcome::bad_frame);
 

@@ -138,7 +138,7 @@ TEST_CASE("a CPU that accepts no connection is reported", "[s7]") {
   };
   CHECK_THAT(why({{3, 0, 0, 11, 6, 0x80, 0, 0, 0, 1, 1}}),
              Catch::Contains("rack 0, slot 1") && Catch::Contains("reason 1"));
-  CHECK_THAT(why({Bytes{'H', 'T', 'T', 'P'}}), Catch::Contains("no ISO-on-TCP (48 54 54 50"));
+  CHECK_THAT(why({Bytes{'H', 'T', 'T', 'P'}}), Catch::Contains("not ISO-on-TCP (48 54 54 50"));
   CHECK_THAT(why({}), Catch::Contains("no answer"));
   CHECK_THAT(why({confirmed}), Catch::Contains("does not begin (no answer)"));
   CHECK_THAT(why({confirmed, granted(112)}), Catch::Contains("PDUs of 112 bytes"));

@@ -47,8 +47,8 @@ TEST_CASE("the target is the negative of the displacement, zero, or NaN (stay)",
   CHECK(targets(Mode::ramping_to_zero, {}).axis_um[0] == 0.0);
   CHECK(std::isnan(targets(Mode::holding, {}).axis_um[0]));
   CHECK(std::isnan(targets(Mode::starting, {}).axis_um[0]));
-  CHECK(targets(Mode::compensating, {}).stand_where_unknown);
-  CHECK_FALSE(targets(Mode::holding, {}).stand_where_unknown);
+  CHECK(targets(Mode::compensating, {}).hold_where_unknown);
+  CHECK_FALSE(targets(Mode::holding, {}).hold_where_unknown);
   EstimatorConfig reversed = small_config();
   reversed.axes[0].sign = -1.0;
   CHECK(targets(Mode::compensating, {}, reversed).axis_um[0] == 4.0);

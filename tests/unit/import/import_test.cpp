@@ -186,7 +186,7 @@ TEST_CASE("two files with dates are joined by their dates", "[import]") {
   CHECK(std::isnan(run.column("z_um")[2]));
   // Unknown after the last row of the first file.
   CHECK(std::isnan(run.column("head_degC")[5]));
-  CHECK(has_note(run, "2 of its 3 rows lie within"));
+  CHECK(has_note(run, "2 of its 3 rows are within"));
   // What is written reads back.
   CHECK(parse_run(write_run(run), "again").columns == run.columns);
 }

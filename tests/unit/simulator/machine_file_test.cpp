@@ -87,7 +87,7 @@ TEST_CASE("a broken machine file is refused with line, key and rule") {
   const auto broken = GENERATE(values<Broken>({
       {"format = 1", "format = 2", "format", ""},
       {"[plant]", "[plant]\nstep_min = 1", "step_min", ""},
-      {"values = [1000]", "values = [1000, 2]", "values", "as many numbers"},
+      {"values = [1000]", "values = [1000, 2]", "values", "one number per state"},
       {"times_s = [0]", "times_s = [1]", "times_s", "begin with 0"},
       {"name = \"z_um\"", "name = \"z\"", "name", "_um"},
       {"capacity_J_per_K = 1000", "capacity_J_per_K = 0", "capacity_J_per_K", "must be"},
@@ -102,7 +102,7 @@ TEST_CASE("a broken machine file is refused with line, key and rule") {
       {"name = \"spindle\"\ndevice", "name = \"column\"\ndevice", "name", "column of the plant"},
       {"output = \"z_um\"", "output = \"y_um\"", "output", "column of the plant"},
       {"scale = 0.01", "scale = 0", "scale", "must not be 0"},
-      {"kind = \"drop\"", "kind = \"spike\"\nchange_K = 1", "kind", "cannot happen"},
+      {"kind = \"drop\"", "kind = \"spike\"\nchange_K = 1", "kind", "does not apply"},
       {"kind = \"drop\"", "kind = \"explode\"", "kind", ""},
       {"target = \"module\"", "target = \"nobody\"", "target", "must name"},
       {"duration_s = 1\n", "", "duration_s", ""},
@@ -297,12 +297,12 @@ TEST_CASE("problems of a body, or of a machine with one, are named") {
   };
   const std::string lump = "[[node]]\nname = \"bed\"\ncapacity_J_per_K = 1.0\n";
   for (const auto& [machine, body, reported] : std::vector<Case>{
-           {machine_text(lump), body_text, "has no lumps"},
+           {machine_text(lump), body_text, "must be omitted with plant.body"},
            {without(machine_text(""), "node = \"nose\"", "node = \"nase\""), body_text, "nase"},
            {without(machine_text(""), "z_um", "y_um"), body_text, "the body has no such output"},
            {without(machine_text(""), "spindle_rpm", "drive_rpm"), body_text, "spindle_rpm"},
            {machine_text(""), without(body_text, "[[10.0, 0.0]", "[[10.0, 1.0]"), "symmetric"},
-           {machine_text(""), without(body_text, "[1.0, 2.0]", "[1.0]"), "as many numbers"},
+           {machine_text(""), without(body_text, "[1.0, 2.0]", "[1.0]"), "one number per state"},
            {machine_text(""), without(body_text, "20.0", "nan"), "finite"},
            {machine_text(""), without(body_text, "\"z_um\"", "\"z_mm\""), "must end in _um"}}) {
     CAPTURE(reported);

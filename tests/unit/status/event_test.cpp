@@ -54,7 +54,7 @@ TEST_CASE("each kind of event has its text", "[status][events]") {
   const std::string lines = events_text({mode, command});
   CHECK_THAT(lines, Catch::Contains("  mode      compensating -> holding"));
   CHECK(lines.find("holding") < lines.find("measured"));
-  CHECK(events_text({}) == "nothing has happened\n");
+  CHECK(events_text({}) == "no events\n");
 }
 
 TEST_CASE("a run that was not stopped is reported at the start of the next", "[status][events]") {

@@ -127,7 +127,7 @@ def test_earlier_runs_are_in_the_history(lab):
     status, out, _ = run_tool("events", daemon.history, "--from", "-1h")
     assert status == 0 and "  recovery  sensor column: " in out and ", by " in out
     status, out, _ = run_tool("events", daemon.history, "--to", "-1h")
-    assert status == 0 and out == "nothing has happened\n"
+    assert status == 0 and out == "no events\n"
     status, _, output = run_tool("events", lab.folder / "none.db")
     assert status == 2 and "none.db" in output
 

@@ -199,7 +199,7 @@ def test_only_a_latched_axis_is_released(machine, lab):
 def test_a_measured_displacement_that_cannot_be_is_refused(machine, lab, value_um):
     """The bound is 60 um; the model claims no error and expects no remainder."""
     daemon = machine.start()
-    with pytest.raises(Refused, match="nothing is taken over: .*Check the axis, the sign"):
+    with pytest.raises(Refused, match="value refused: .*Check axis, sign"):
         daemon.call("measured", axis="z", value_um=value_um)
     status, _, output = daemon.cli("measured", "z", str(value_um))
     assert status == 2 and "60.0 um" in output, output
