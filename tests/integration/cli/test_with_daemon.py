@@ -90,8 +90,8 @@ def test_a_release_contradicted_by_read_backs_is_reported(daemon):
     daemon.answers["status"] = [latched(26.67, False), latched(26.67, True), latched(26.67, False)]
     answer = run("--socket", daemon.path, "release", "z")
     assert answer.returncode == 1
-    assert ("NOT released: it reads back +26.67 um where +14.67 um was sent last (changes without "
-            "us)") in answer.stdout
+    assert ("NOT released: it reads back +26.67 um where +14.67 um was sent last (changes by "
+            "itself)") in answer.stdout
 
 
 def test_measured_shows_measured_and_expected_remainder(daemon):

@@ -87,7 +87,7 @@ TEST_CASE("a broken machine file is refused with line, key and rule") {
   const auto broken = GENERATE(values<Broken>({
       {"format = 1", "format = 2", "format", ""},
       {"[plant]", "[plant]\nstep_min = 1", "step_min", ""},
-      {"values = [1000]", "values = [1000, 2]", "values", "one number per state"},
+      {"values = [1000]", "values = [1000, 2]", "values", "as many numbers"},
       {"times_s = [0]", "times_s = [1]", "times_s", "begin with 0"},
       {"name = \"z_um\"", "name = \"z\"", "name", "_um"},
       {"capacity_J_per_K = 1000", "capacity_J_per_K = 0", "capacity_J_per_K", "must be"},

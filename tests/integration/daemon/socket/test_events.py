@@ -141,6 +141,6 @@ def test_strict_reports_problems_while_compensating(lab):
     assert daemon.cli("status")[0] == 0
     status, out, _ = daemon.cli("status", "--strict", "--json")
     listed = json.loads(out)
-    assert (status, listed["exit_status"], told["why"]) == (
+    assert (status, listed["exit_status"], listed["why"]) == (
         1, 1, ["at_bound", "axis z is at its bound"])
     assert json.loads(daemon.cli("status", "--json")[1])["why"] == []

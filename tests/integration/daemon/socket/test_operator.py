@@ -227,7 +227,7 @@ def test_a_value_beyond_the_claimed_error_needs_confirmation(machine, lab):
 def test_a_part_from_before_the_start_is_refused(machine, lab):
     daemon = machine.start()
     status, _, output = daemon.cli("measured", "z", "1.5", "--source", "part", "--ago", "100")
-    assert status == 1 and "where the axis was 100 min ago is not known" in output, output
+    assert status == 1 and "state 100 min ago is unknown" in output, output
     assert daemon.axis()["measured"] is None
     with pytest.raises(Refused, match="params.confirm must be true or false"):
         daemon.call("measured", axis="z", value_um=1.5, confirm=1)
