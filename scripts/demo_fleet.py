@@ -120,7 +120,7 @@ def reason(answer):
                  if output["departs"]]
     _, what, subjects = min(departing, key=lambda each: each[0])
     if not subjects:
-        return f"{what}: more is left"
+        return f"{what}: its residual is larger than its sisters'"
     return f"{what}: {subjects[0]['subject']}, {subjects[0]['effect_um']:.1f} um"
 
 
