@@ -29,6 +29,8 @@ part "packages of PETSc" scripts/setup.sh petsc
 for preset in release asan-ubsan-all tsan debug coverage; do
   part "$preset" ./test.sh --all --preset "$preset"
 done
+part "a new Debian" scripts/check-fresh.sh
+part "one definition" scripts/check-odr.sh
 part "includes" scripts/check_includes.py
 part "format" scripts/check-format.sh
 part "clang-tidy" scripts/check-tidy.sh
