@@ -293,7 +293,7 @@ def home_when_read(axis):
         axis.before_shown = lambda: None
         axis.reports_position(0.0)
     axis.before_shown = home
-    eventually(lambda: axis.mismatch, 5.0)
+    eventually(lambda: axis.first_reads, 5.0)
 
 
 @attack(links=("tcp", "rtu", "can", "can_travel"))
