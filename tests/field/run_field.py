@@ -465,6 +465,8 @@ class Case:
         # Cases without a controller may be well in dry run.
         self.beside = f"status {exit_status} {status['mode']} {','.join(status['reasons']) or '-'}"
         self.is_well = exit_status == 0 or (status["mode"] == "dry_run" and not status["reasons"])
+        if "scan" in self.expected:  # its exit status says the same; a daemon that has just started may not yet
+            self.compare("daemon", "is well", self.expected["scan"].get("exit", 0) == 0, self.is_well)
         if "status_exit" in wanted:
             self.compare("daemon", "exit status of `status`", wanted["status_exit"], exit_status)
         output = log.read_text() + json.dumps(status, ensure_ascii=False) + text
