@@ -253,7 +253,7 @@ void add_fit_command(CLI::App& app, std::function<int()>& action) {
   sub->add_flag("--free", options->free_choice,
                 "choose any places; default: at most two of a group, one of the largest group");
   sub->add_option("--threshold", options->threshold,
-                  "similarity above which places form one group; default: chosen by the fit")
+                  "largest S within a group of similar places; default: chosen by the fit")
       ->check(CLI::Range(0.0, 1.0));
   sub->add_flag("--lags", options->lags,
                 "add a lag to a term if it reduces the error in left-out tests");
@@ -274,7 +274,7 @@ void add_fit_command(CLI::App& app, std::function<int()>& action) {
                      "--sensor-error-K", "--stretches");
   sub->add_option(
          "--drift-percent", options->drift_percent,
-         "with --years: yearly drift of the prior's prediction, as a share of the displacement")
+         "with --years: yearly drift of the prior's prediction, in percent of the displacement")
       ->check(CLI::Range(0.0, 100.0))
       ->needs(prior);
   sub->add_option("--years", options->years,

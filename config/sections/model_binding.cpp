@@ -97,7 +97,7 @@ void check_signals(const TomlTable& root, const EstimatorConfig& config, const T
     else
       rule +=
           ", and kind = \"dry_run\" has none: give the controller's kind and dry_run = true, or "
-          "for now a model without signals";
+          "use a model without signals";
     root.problem("controller.signal", signal, rule);
   }
 }

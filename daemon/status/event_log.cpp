@@ -175,8 +175,7 @@ void EventLog::note_mismatches(const Report& report, const EstimatorConfig& conf
           {.subject = subject, .code = "mismatch_latched", .detail = likely_text(mismatch)});
       spdlog::error(
           "axis {}: sent {:.3f} um, read back {:.3f} um: {}; not driven until the cause is removed "
-          "and "
-          "released (thermocomp release {})",
+          "and released (thermocomp release {})",
           config.axes[i].name, mismatch.sent_um, mismatch.read_um, likely_text(mismatch),
           config.axes[i].name);
     } else {

@@ -31,7 +31,7 @@ constexpr double register_rounding_um = 0.1;
 /// Good read-backs that outweigh one unexplained one; a second one within them latches.
 constexpr std::uint8_t suspicion_of_one = 16;
 
-/// Of a new epoch: with its start, before its first command is written, and with that command.
+/// Read-backs of a new epoch: at its start, before its first command is written, with that command.
 constexpr std::uint8_t read_backs_until_written = 3;
 
 /// On a link that was away for less, a read-back may be on its way to the offset sent last; set

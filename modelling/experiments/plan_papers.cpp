@@ -150,8 +150,7 @@ std::string test_sheet(const TestPlan& plan) {
   text.append(coverage_text(plan))
       .append(
           "\nBefore each test, leave the machine at rest until its temperature is uniform. Take "
-          "the "
-          "first row of a run file before anything runs: it is the reference.\n");
+          "the first row of a run file before anything runs: it is the reference.\n");
   for (std::size_t place = 0; place < plan.order.size(); ++place) {
     const std::size_t test = plan.order[place];
     text.append("\n## ").append(std::to_string(place + 1)).append(". test ");

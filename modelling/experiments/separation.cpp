@@ -165,7 +165,7 @@ std::string separation_text(const Separation& separation) {
   }
   for (const std::string& signal : separation.unmoved)
     text.append("\n").append(signal).append(
-        " was constant within each run, or changed once: record a run in which it goes up and "
+        " was constant within each run, or went one way only: record a run in which it goes up and "
         "down.\n");
   if (!separation.moves.empty())
     text.append(printed("\n%.3g h in all, from a cold machine. ", separation.hours()))

@@ -281,11 +281,14 @@ Ways ways_of(const MeasuredTests& tests, std::size_t signal) {
 /// from that of time.
 void find_unmoved(MeasuredTests& tests) {
   for (std::size_t i = 0; i < tests.signals.size(); ++i) {
-    const bool constant = is_constant(tests, i);
+    if (is_constant(tests, i)) {
+      tests.unmoved.push_back(tests.signals[i]);
+      continue;
+    }
     const Ways ways = ways_of(tests, i);
-    if (!constant && ways.count > 1) continue;
+    if (ways.count > 1) continue;
     tests.unmoved.push_back(tests.signals[i]);
-    if (!constant && ways.largest_step < gradual_share) tests.gradual.push_back(tests.signals[i]);
+    if (ways.largest_step < gradual_share) tests.gradual.push_back(tests.signals[i]);
   }
 }
 

@@ -68,8 +68,8 @@ struct PriorJudgement {
 
   /// False unless the prior leaves a tenth less than no model, in geometric mean of the outputs.
   [[nodiscard]] bool holds() const;
-  /// Of four measured machines with this result on the first part of a run, all had the smaller
-  /// error with the prior on the rest: a reason to compare the two later, not to choose.
+  /// A reason to compare the two later, not to choose: all four measured machines with this result
+  /// on the first part of a run had the smaller error with the prior on the rest.
   [[nodiscard]] bool own_is_better() const;
   [[nodiscard]] std::string text(const std::vector<std::string>& outputs) const;
 };

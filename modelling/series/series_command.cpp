@@ -111,7 +111,7 @@ void add_series_command(CLI::App& app, std::function<int()>& action) {
   CLI::Option* machine =
       sub->add_option("--machine", options->machine,
                       "write statistics of this machine, of which all files are runs, instead of a "
-                      "series; they do not reveal the runs")
+                      "series; they do not contain the runs")
           ->type_name("NAME");
   CLI::Option* prior =
       sub->add_option("--prior", options->prior,

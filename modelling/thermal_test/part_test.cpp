@@ -382,8 +382,7 @@ std::string part_html(const PartTest& test) {
   if (tolerance_um)
     method.emplace_back(
         "The tolerance is kept if every interval is within it, exceeded if one is entirely "
-        "outside, "
-        "else undecided.");
+        "outside, else undecided.");
   for (const PartFigures* figures : {&before, after ? &*after : nullptr})
     if (figures != nullptr) {
       std::string scatter = figures->file + ": the standard deviation of one repeat is";

@@ -453,8 +453,7 @@ void add_warnings(const MeasuredTests& tests, FamiliesFit& fit) {
   if (tests.runs.size() < 2)
     fit.warnings.emplace_back(
         "judged within one run: the error on other days is unknown. Next: a run of another day "
-        "with "
-        "another course of speeds or loads; fit both, and each judges the other");
+        "with another course of speeds or loads; fit both, and each judges the other");
   const FamilyResult& chosen = fit.chosen_result();
   const FamilyResult& none = fit.results[index_of_family(Family::none)];
   for (const std::string& signal : fit.unmoved)
