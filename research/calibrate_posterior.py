@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Fits the weights of modelling/diagnosis/rank/posterior.cpp to the campaigns' answers.
+"""Fits the weights of modelling/diagnosis/rank/search.cpp to the campaigns' answers.
 
 Also evaluates them on machines that were left out.
 

@@ -2,12 +2,27 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <stdexcept>
 #include <utility>
 
+#include <CLI/CLI.hpp>
+
+#include "config/model/model_file.hpp"
+#include "config/runs/blunders.hpp"
+#include "modelling/diagnosis/answer/diagnosis_report.hpp"
 #include "modelling/diagnosis/answer/findings.hpp"
 #include "modelling/diagnosis/causes/cause.hpp"
 #include "modelling/diagnosis/rank/search.hpp"
-#include "modelling/diagnosis/report/diagnosis_report.hpp"
+#include "modelling/diagnosis/thermal_diagnosis.hpp"
+#include "report/output_file.hpp"
+#include "report/run_loader.hpp"
+#include "report/terminal.hpp"
+#ifdef THERMOCOMP_WITH_STRUCTURE
+#include "modelling/diagnosis/network/thermal_body.hpp"
+#endif
 
 namespace thermocomp::diagnosis {
 namespace {
@@ -185,6 +200,135 @@ Diagnosis diagnose(const ThermalModel& model, std::vector<RunFile> train,
     add_runs(*report, diagnosis, test_data, base, after, true);
   }
   return diagnosis;
+}
+
+namespace {
+
+struct Options {
+  std::string model;
+  std::string thermal;
+  std::string structure;
+  std::vector<std::string> train;
+  std::vector<std::string> test;
+  std::string columns;
+  std::string folder;
+  std::string json;
+  bool weighed{false};
+};
+
+constexpr const char* searching = "searching what the model gets wrong";
+
+Diagnosis thermal_diagnosis_of(const Options& options, const std::vector<RunFile>& train,
+                               const std::vector<RunFile>& test, const ThermalPlant& plant,
+                               ReportData* report, const NetworkView& view = nullptr) {
+  cli::Progress line(searching);
+  return diagnose_thermal(
+      plant, train, options.train, test, options.test, report, [&line] { line.update(-1.0); },
+      view);
+}
+
+#ifdef THERMOCOMP_WITH_STRUCTURE
+/// Also writes body.html into the folder.
+Diagnosis diagnosis_with_body(const Options& options, const std::vector<RunFile>& train,
+                              const std::vector<RunFile>& test, ReportData* report) {
+  const cli::ProgressLines lines;
+  ThermalBody body(options.structure, [&](std::string_view what) { lines.print(what); });
+  const Diagnosis diagnosis = thermal_diagnosis_of(
+      options, train, test, load_thermal_plant(options.thermal, &body.body()), report,
+      [&body](const ThermalRuns& runs, const HeatNetwork& before, const HeatNetwork& after) {
+        body.show(runs, before, after);
+      });
+  std::string note = "Rise of the temperature since the start of each test run.";
+  if (diagnosis.findings.empty()) note += " Nothing was found wrong.";
+  for (const NamedFinding& finding : diagnosis.findings)
+    note += " Found: " + title_of(finding.cause, finding.subject) + ".";
+  std::filesystem::create_directories(options.folder);
+  cli::write_file((std::filesystem::path(options.folder) / "body.html").string(),
+                  body.page(std::filesystem::path(options.thermal).stem().string(), note));
+  return diagnosis;
+}
+#endif
+
+Diagnosis diagnosis_of(const Options& options, ReportData* report) {
+  cli::RunLoader loader(options.columns);
+  std::vector<RunFile> train = loader.load(options.train);
+  std::vector<RunFile> test = loader.load(options.test);
+  refuse_overlap(train, test);
+#ifdef THERMOCOMP_WITH_STRUCTURE
+  if (!options.structure.empty()) return diagnosis_with_body(options, train, test, report);
+#endif
+  if (!options.thermal.empty())
+    return thermal_diagnosis_of(options, train, test, load_thermal_plant(options.thermal), report);
+  cli::Progress line(searching);
+  const auto progress = [&line] { line.update(-1.0); };
+  const ThermalModel model = load_model(options.model);
+  for (std::vector<RunFile>* runs : {&train, &test})
+    for (RunFile& run : *runs)
+      for (const Blunders& each : leave_out_blunders(run, model.outputs))
+        std::fprintf(stderr, "%s: %s\n", run.name.c_str(), each.text().c_str());
+  return diagnose(model, std::move(train), options.train, std::move(test), options.test, report,
+                  progress);
+}
+
+/// The report, and the model or machine file with the findings that the test runs do not
+/// contradict.
+void write_folder(const Options& options, const Diagnosis& diagnosis, const ReportData& report) {
+  const std::filesystem::path folder(options.folder);
+  std::filesystem::create_directories(folder);
+  std::vector<NamedFinding> confirmed = diagnosis.findings;
+  std::erase_if(confirmed, fails_on_test_runs);
+  if (options.thermal.empty())
+    cli::write_file((folder / "model.toml").string(), write_model(diagnosis.extended));
+  else if (const auto text = corrected_machine(options.thermal, confirmed))
+    cli::write_file((folder / "machine.toml").string(), *text);
+  cli::write_file((folder / "report.html").string(), report_html(diagnosis, report));
+}
+
+int run(const Options& options) {
+  if (options.model.empty() == options.thermal.empty())
+    throw std::runtime_error("diagnose needs either --model or --thermal");
+  if (!options.structure.empty() && (options.thermal.empty() || options.folder.empty()))
+    throw std::runtime_error("--structure needs --thermal and --out, where it writes body.html");
+  const std::filesystem::path corrected = std::filesystem::path(options.folder) / "machine.toml";
+  if (!options.folder.empty() && std::filesystem::exists(corrected) &&
+      std::filesystem::exists(options.thermal) &&
+      std::filesystem::equivalent(corrected, options.thermal))
+    throw std::runtime_error(corrected.string() + ": --out would write over the machine file");
+  ReportData report;
+  const Diagnosis diagnosis = diagnosis_of(options, options.folder.empty() ? nullptr : &report);
+  if (!options.folder.empty()) write_folder(options, diagnosis, report);
+  if (!options.json.empty())
+    cli::write_file(options.json, diagnosis_json(diagnosis, options.weighed));
+  if (options.json != "-") print(diagnosis);
+  return 0;
+}
+
+}  // namespace
+
+void add_diagnose_command(CLI::App& app, std::function<int()>& action) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* command =
+      app.add_subcommand("diagnose", "what a model gets wrong in measured runs, and why");
+  command->add_option("--model", options->model, "model file: displacements are compared");
+  command->add_option(
+      "--thermal", options->thermal,
+      "machine file with a [plant], in place of --model: temperatures are compared");
+#ifdef THERMOCOMP_WITH_STRUCTURE
+  command->add_option("--structure", options->structure,
+                      "structure file of the machine's body: --out also receives body.html, the "
+                      "test runs in three dimensions and what the findings change");
+#endif
+  command
+      ->add_option("--train", options->train, "runs from which causes are found: RUN.csv[@T0:T1]")
+      ->required();
+  command->add_option("--test", options->test, "runs on which the gain is measured")->required();
+  command->add_option("--columns", options->columns, cli::columns_help);
+  command->add_option("--out", options->folder,
+                      "folder for the report and the extended model or corrected machine");
+  command->add_option("--json", options->json, "file for the answer as JSON; - is the output");
+  command->add_flag("--weighed", options->weighed,
+                    "the JSON has every hypothesis that was weighed");
+  command->callback([options, &action] { action = [options] { return run(*options); }; });
 }
 
 }  // namespace thermocomp::diagnosis

@@ -1,5 +1,5 @@
 /// The result of a diagnosis: findings with parameters and intervals, the extended model, and its
-/// gain on runs that were not used.
+/// gain on runs that were not used. Its form in words, on the terminal and as JSON.
 #pragma once
 
 #include <map>
@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "estimator/thermal_model.hpp"
-#include "modelling/diagnosis/hypothesis/hypothesis.hpp"
+#include "modelling/diagnosis/causes/cause.hpp"
 
 namespace thermocomp::diagnosis {
 
@@ -54,7 +54,7 @@ struct Candidate {
   /// On test rows, as the only extension; not used for ranking. Empty if no term represents it.
   std::map<std::string, TestGain> test{};
   std::string would_decide{};  ///< experiment that separates it from the likeliest rival
-  /// Inputs of the probability (rank/posterior.hpp), by name.
+  /// Inputs of the probability (rank/search.hpp), by name.
   std::vector<std::pair<const char*, double>> figures{};
 };
 
@@ -106,6 +106,30 @@ struct Diagnosis {
   /// weighed so.
   std::map<std::string, double> families{};
 };
+
+/// Whether the finding improves no output of the test runs; the extended model then omits it.
+[[nodiscard]] bool fails_on_test_runs(const NamedFinding& finding);
+
+/// Two digits, three if the first is 1: "53", "0.0040", "1810".
+[[nodiscard]] std::string figure(double value);
+/// In s, min or h: "40 s", "53 min", "2.5 h".
+[[nodiscard]] std::string duration(double seconds);
+/// The name without its unit: "z_um" is "z".
+[[nodiscard]] std::string name_of_column(const std::string& column);
+/// "time constant 53 min (51 to 55 min)", for several outputs in sequence. The subject determines
+/// the unit in a denominator.
+[[nodiscard]] std::string parameter_words(const std::string& cause, const Parameter& parameter,
+                                          const std::string& subject);
+
+/// Short title with the subject.
+[[nodiscard]] std::string title_of(const std::string& cause, const std::string& subject);
+/// One or two sentences with the finding's figures.
+[[nodiscard]] std::string sentence_of(const NamedFinding& finding);
+[[nodiscard]] std::string what_to_do(const NamedFinding& finding);
+/// The experiment that separates two explanations.
+[[nodiscard]] std::string experiment_between(const Alternative& one, const Alternative& other);
+
+void print(const Diagnosis& diagnosis);
 
 /// The answer as JSON (indented, a newline at the end). Unknown numbers are null.
 /// @param weighed  adds every candidate with the inputs of its probability

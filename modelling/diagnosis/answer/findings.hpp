@@ -53,9 +53,6 @@ using Residuals = std::vector<Column>;
                                            double unexplained_fraction);
 /// The interval is bootstrapped over blocks of rows.
 [[nodiscard]] TestGain test_gain(const Residuals& before, const Residuals& after);
-/// Whether the finding improves no output of the test runs; the extended model then omits it.
-[[nodiscard]] bool fails_on_test_runs(const NamedFinding& finding);
-
 /// A bank for each output that it predicts better in cross-validation over eight blocks of the
 /// training rows: their residual RMS must fall by a tenth, about the run's mean too, and by more
 /// than its standard error over the blocks. Displacements are relative to the run's first row, as

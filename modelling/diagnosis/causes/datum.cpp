@@ -4,7 +4,7 @@
 #include <numbers>
 
 #include "modelling/diagnosis/causes/cause.hpp"
-#include "modelling/diagnosis/data/series.hpp"
+#include "modelling/diagnosis/data/measured_runs.hpp"
 
 namespace thermocomp::diagnosis::causes {
 namespace {

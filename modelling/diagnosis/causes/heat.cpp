@@ -3,7 +3,7 @@
 
 #include "config/text/units.hpp"
 #include "modelling/diagnosis/causes/cause.hpp"
-#include "modelling/diagnosis/data/series.hpp"
+#include "modelling/diagnosis/data/measured_runs.hpp"
 
 namespace thermocomp::diagnosis::causes {
 namespace {

@@ -4,7 +4,6 @@
 #include "config/text/units.hpp"
 #include "modelling/diagnosis/causes/cause.hpp"
 #include "modelling/diagnosis/data/measured_runs.hpp"
-#include "modelling/diagnosis/data/series.hpp"
 
 namespace thermocomp::diagnosis::causes {
 namespace {

@@ -7,9 +7,8 @@
 
 #include <Eigen/QR>
 
+#include "modelling/diagnosis/causes/cause.hpp"
 #include "modelling/diagnosis/data/measured_runs.hpp"
-#include "modelling/diagnosis/data/series.hpp"
-#include "modelling/diagnosis/rank/posterior.hpp"
 
 namespace thermocomp::diagnosis {
 namespace {
@@ -26,8 +25,6 @@ constexpr double fitted_factor = 1.1;
 /// Tolerance of the cosine of two proportional vectors, per element: short vectors are
 /// proportional by chance.
 constexpr double ridge_angle = 0.0015;
-constexpr int zooms = 2;
-constexpr int points_of_zoom = 9;
 
 Panel offsets_of(const OutputRows& rows) {
   Panel offsets = Panel::Zero(rows.size(), std::ssize(rows.runs()));
@@ -343,69 +340,6 @@ std::vector<Explanation> Fits::trials(const Hypothesis& hypothesis, const Shapes
   return all;
 }
 
-namespace {
-
-/// The best by `second` among the trials that are nearly the best by `first`.
-template <class First, class Second>
-std::size_t best_of(const std::vector<Explanation>& trials, First first, Second second) {
-  double most = -unknown;
-  for (const Explanation& trial : trials) most = std::max(most, first(trial));
-  std::size_t best = trials.size();
-  for (std::size_t i = 0; i < trials.size(); ++i)
-    if (first(trials[i]) >= most - as_much &&
-        (best == trials.size() || second(trials[i]) > second(trials[best])))
-      best = i;
-  return best;
-}
-
-double score_of(const Explanation& explanation) {
-  return explanation.score;
-}
-
-/// An effect of approximate form makes several values about equally likely; the one with the least
-/// cross-validated residual is taken.
-std::size_t likeliest_of(const std::vector<Explanation>& trials) {
-  return best_of(trials, score_of, [](const Explanation& each) { return each.left_out; });
-}
-
-}  // namespace
-
-Explanation Fits::weigh(const Hypothesis& hypothesis) const {
-  const std::vector<Explanation> all = trials(hypothesis, grid_of(hypothesis));
-  return all[best_of(all, utility, score_of)];
-}
-
-void Fits::refine(Explanation& explanation, By by) const {
-  const Hypothesis& hypothesis = *explanation.hypothesis;
-  for (std::size_t parameter = 0; parameter < hypothesis.shape.size(); ++parameter) {
-    const ShapeParameter& of = hypothesis.shape[parameter];
-    if (of.discrete || of.grid.size() < 2) continue;
-    auto at = std::min_element(of.grid.begin(), of.grid.end(), [&](double a, double b) {
-      return std::abs(a - explanation.shape[parameter]) <
-             std::abs(b - explanation.shape[parameter]);
-    });
-    double low = at == of.grid.begin() ? *at : *(at - 1);
-    double high = at + 1 == of.grid.end() ? *at : *(at + 1);
-    const bool logarithmic = of.logarithmic && low > 0;
-    for (int zoom = 0; zoom < zooms; ++zoom) {
-      Shapes shapes;
-      for (const double value : logarithmic ? logarithmic_grid(low, high, points_of_zoom)
-                                            : linear_grid(low, high, points_of_zoom)) {
-        shapes.push_back(explanation.shape);
-        shapes.back()[parameter] = value;
-      }
-      const std::vector<Explanation> all = trials(hypothesis, shapes);
-      const std::size_t best =
-          by == By::worth ? best_of(all, utility, score_of) : likeliest_of(all);
-      const double probability = explanation.probability;
-      explanation = all[best];
-      explanation.probability = probability;
-      low = shapes[best == 0 ? 0 : best - 1][parameter];
-      high = shapes[std::min(best + 1, shapes.size() - 1)][parameter];
-    }
-  }
-}
-
 void Fits::judge_left_out(const Hypothesis& hypothesis, std::size_t output, const Panel& columns,
                           std::vector<Explanation>& trials) const {
   const LeftOut& left_out = outputs_[output]->left_out;
@@ -457,6 +391,107 @@ double Fits::rms_left(std::size_t output, bool corrected) const {
   Column left = of.fit.remainder();
   if (corrected && of.coefficients.cols() > 0) left -= of.coefficients * coefficient_errors(output);
   return rms_beside(left, of.free);
+}
+
+namespace {
+
+constexpr double normal_95 = 1.96;
+/// The form of a column is approximate, so the error of a shape parameter is this many times its
+/// standard deviation. Jumps need no factor.
+constexpr double wider_on_machines = 4.5;
+/// For the same reason the error of a gain is a multiple of its standard deviation plus a share of
+/// the gain, set for a coverage of 93 % of 112 planted gains (seeds of research/README.md).
+constexpr double gain_wider = 2.0;
+constexpr double gain_share = 0.2;
+constexpr std::size_t fine_points = 33;
+
+Interval hull(const Interval& a, double low, double high) {
+  return {std::min(a.low, low), std::max(a.high, high)};
+}
+
+bool of_a_jump(const Hypothesis& hypothesis, const std::string& parameter) {
+  const CauseParameter* const known = find_parameter(cause_named(hypothesis.cause), parameter);
+  return known != nullptr && known->of_a_jump;
+}
+
+double wider(const Hypothesis& hypothesis, const std::string& parameter) {
+  return of_a_jump(hypothesis, parameter) ? 1.0 : wider_on_machines;
+}
+
+/// Standard deviation of a gain with model discrepancy.
+double gain_deviation(const Hypothesis& hypothesis, std::size_t number, double gain, double sd) {
+  return of_a_jump(hypothesis, hypothesis.gains[number])
+             ? sd
+             : std::hypot(gain_wider * sd, gain_share * gain);
+}
+
+/// The grid, three points in each of its intervals, and many points near the estimate; ascending.
+std::vector<double> values_of(const ShapeParameter& of, double found) {
+  std::vector<double> values = {found, of.grid.front()};
+  for (std::size_t i = 1; i < of.grid.size(); ++i)
+    for (const double share : {0.25, 0.5, 0.75, 1.0})
+      values.push_back(of.grid[i - 1] + share * (of.grid[i] - of.grid[i - 1]));
+  const auto above = std::upper_bound(of.grid.begin(), of.grid.end(), found);
+  const double low = above - of.grid.begin() >= 2 ? *(above - 2) : of.grid.front();
+  const double high = of.grid.end() - above >= 2 ? *(above + 1) : of.grid.back();
+  const std::vector<double> fine = of.logarithmic && low > 0
+                                       ? logarithmic_grid(low, high, fine_points)
+                                       : linear_grid(low, high, fine_points);
+  values.insert(values.end(), fine.begin(), fine.end());
+  std::sort(values.begin(), values.end());
+  return values;
+}
+
+}  // namespace
+
+bool set_spread(const Fits& fits, Finding& finding) {
+  Explanation& found = finding.explanation;
+  const Hypothesis& hypothesis = *found.hypothesis;
+  const Explanation best = fits.trials(hypothesis, {found.shape}).front();
+  found.gains = best.gains;
+  const auto gains_reach = [&](const Explanation& trial, std::size_t output, Eigen::Index i) {
+    const double gain = trial.gains[output][i];
+    const double reach = normal_95 * gain_deviation(hypothesis, static_cast<std::size_t>(i), gain,
+                                                    trial.gain_sd[output][i]);
+    return std::pair(gain - reach, gain + reach);
+  };
+  finding.shape_ci.assign(found.shape.size(), {});
+  finding.gains_ci.assign(found.gains.size(), {});
+  bool is_known = hypothesis.gains.empty();
+  if (!hypothesis.gains.empty())
+    for (std::size_t output = 0; output < found.gains.size(); ++output)
+      for (Eigen::Index i = 0; i < best.gains[output].size(); ++i) {
+        const auto [low, high] = gains_reach(best, output, i);
+        finding.gains_ci[output].push_back({low, high});
+        is_known = is_known || low > 0.0 || high < 0.0;
+      }
+  for (std::size_t parameter = 0; parameter < found.shape.size(); ++parameter) {
+    const ShapeParameter& of = hypothesis.shape[parameter];
+    finding.shape_ci[parameter] = {found.shape[parameter], found.shape[parameter]};
+    if (of.discrete) continue;
+    Shapes shapes;
+    const std::vector<double> values = values_of(of, found.shape[parameter]);
+    for (const double value : values) {
+      shapes.push_back(found.shape);
+      shapes.back()[parameter] = value;
+    }
+    const std::vector<Explanation> trials = fits.trials(hypothesis, shapes);
+    const double limit = best.score - 0.5 * std::pow(normal_95 * wider(hypothesis, of.name), 2);
+    for (std::size_t i = 0; i < trials.size(); ++i) {
+      if (trials[i].score < limit) continue;
+      // Up to the middle between it and the next value, which may be outside.
+      Interval& shape = finding.shape_ci[parameter];
+      shape = hull(shape, 0.5 * (values[i] + values[i == 0 ? 0 : i - 1]),
+                   0.5 * (values[i] + values[std::min(i + 1, values.size() - 1)]));
+      for (std::size_t output = 0; output < finding.gains_ci.size(); ++output)
+        for (std::size_t g = 0; g < finding.gains_ci[output].size(); ++g) {
+          if (trials[i].gains[output].size() == 0) continue;
+          const double gain = trials[i].gains[output][static_cast<Eigen::Index>(g)];
+          finding.gains_ci[output][g] = hull(finding.gains_ci[output][g], gain, gain);
+        }
+    }
+  }
+  return is_known;
 }
 
 }  // namespace thermocomp::diagnosis

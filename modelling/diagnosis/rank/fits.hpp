@@ -1,17 +1,41 @@
-/// Fits of a hypothesis to all outputs, given the accepted explanations.
+/// Fits of a hypothesis to all outputs, given the accepted explanations; intervals of a finding.
 #pragma once
 
 #include <map>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
+#include "modelling/diagnosis/causes/cause.hpp"
 #include "modelling/diagnosis/data/measured_runs.hpp"
-#include "modelling/diagnosis/fit/left_out.hpp"
-#include "modelling/diagnosis/fit/output_fit.hpp"
-#include "modelling/diagnosis/rank/posterior.hpp"
+#include "modelling/diagnosis/rank/output_fit.hpp"
 
 namespace thermocomp::diagnosis {
+
+struct Explanation {
+  const Hypothesis* hypothesis{nullptr};
+  Shape shape{};
+  std::vector<Eigen::VectorXd> gains{};    ///< one per output; empty: no effect on it
+  std::vector<Eigen::VectorXd> gain_sd{};  ///< their standard deviations
+  double score{0.0};    ///< ln L minus that of no effect and the penalty of its gains; with witness
+  double witness{0.0};  ///< its part from the reading itself, for a fault of a reading
+  /// ln of the cross-validated RMS before over after: sum over the outputs, and the largest of an
+  /// output.
+  double left_out{0.0};
+  double left_out_of_best{0.0};
+  double probability{0.0};  ///< of this hypothesis
+};
+
+struct Finding {
+  Explanation explanation;
+  std::vector<Interval> shape_ci{};               ///< 95 %, one per shape parameter
+  std::vector<std::vector<Interval>> gains_ci{};  ///< 95 %, of each output's gains
+  double probability{0.0};                        ///< of the cause at any place of the group
+  double family_probability{0.0};
+  std::vector<std::string> group{};    ///< indistinguishable places, the subject's first
+  std::vector<Explanation> weighed{};  ///< all hypotheses of its round, likeliest first
+};
 
 /// Residual of each reading of the model from its prediction by the other temperatures and the
 /// signals, which must also show the fault of a reading.
@@ -36,12 +60,6 @@ class Fits {
   /// Fits the hypothesis at each of the shapes.
   [[nodiscard]] std::vector<Explanation> trials(const Hypothesis& hypothesis,
                                                 const Shapes& shapes) const;
-  /// Fit at the best point of its grid.
-  [[nodiscard]] Explanation weigh(const Hypothesis& hypothesis) const;
-  /// Criterion for the values of shape parameters.
-  enum class By { worth, likelihood };
-  /// Refines the shape between the points of the grid.
-  void refine(Explanation& explanation, By by = By::worth) const;
 
   /// Whether the coefficients of an output were fitted to these rows.
   [[nodiscard]] bool fitted(std::size_t output) const {
@@ -81,5 +99,10 @@ class Fits {
   Readings& readings_;
   std::vector<std::optional<Output>> outputs_;
 };
+
+/// Sets the 95 % intervals: of a shape parameter by its profile likelihood, of a gain also over the
+/// shapes within these intervals.
+/// @return whether the interval of any gain at the best shape excludes 0; true without gains
+bool set_spread(const Fits& fits, Finding& finding);
 
 }  // namespace thermocomp::diagnosis

@@ -1,4 +1,5 @@
-/// Greedy search: fits and ranks all hypotheses, accepts the likeliest, and repeats.
+/// Greedy search: fits all hypotheses, ranks them by their probabilities among all and "no cause of
+/// the catalogue", accepts the likeliest, and repeats.
 #pragma once
 
 #include <functional>
@@ -7,9 +8,49 @@
 #include <vector>
 
 #include "modelling/diagnosis/rank/fits.hpp"
-#include "modelling/diagnosis/rank/posterior.hpp"
 
 namespace thermocomp::diagnosis {
+
+struct Posterior {
+  double none{1.0};                          ///< no cause of the catalogue
+  std::map<std::string, double> families{};  ///< `none` among them
+};
+
+enum class Round { first, later };
+
+/// ln of an explanation's weight among all, a weighted sum of
+///
+///   - A(score) and A(witness), A(x) = sign(x) ln(1 + |x| / 20), since rows are correlated,
+///   - the cross-validated reduction: ln of the RMS before over after, divided by the root of the
+///     number of outputs, and the relative reduction of the output with the largest,
+///   - the number of free parameters, and whether it acts in one run only,
+///
+/// and Hypothesis::log_prior.
+///
+/// The weights maximise the probability of the true causes of simulated, physical and measured
+/// campaigns; one answer in a hundred may be an outlier (research/calibrate_posterior.py).
+[[nodiscard]] double utility(const Explanation& explanation);
+/// Utilities that differ by less count as equal.
+inline constexpr double as_much = 1.0;
+
+/// Sets each probability: the probability of any effect, from the figures of the likeliest, times
+/// exp(utility) over the sum of all. It is 0 if a special case of the hypothesis explains as much.
+/// @param beside_fit  the coefficients were fitted to the rows
+[[nodiscard]] Posterior weigh_against_each_other(std::vector<Explanation>& explanations,
+                                                 Round round, bool beside_fit = false);
+
+/// The cause to name, and its probability.
+struct Choice {
+  std::size_t index{0};
+  double probability{0.0};
+  std::vector<std::string> other_subjects{};  ///< about as likely as its own
+};
+
+/// The likeliest cause at one place, summed over places that cannot be distinguished from it. If
+/// its probability is below 0.5, the likeliest cause summed over all of its places.
+/// @param explanations  at least one
+[[nodiscard]] Choice likeliest(const std::vector<Explanation>& explanations,
+                               const PlaceGroups& groups);
 
 struct SearchResult {
   std::vector<Finding> findings;  ///< in order of gain

@@ -14,8 +14,8 @@
 #include "config/model/model_file.hpp"
 #include "config/runs/run_file.hpp"
 #include "config/text/problems.hpp"
+#include "modelling/diagnosis/answer/diagnosis_report.hpp"
 #include "modelling/diagnosis/rank/search.hpp"
-#include "modelling/diagnosis/report/diagnosis_report.hpp"
 
 using namespace thermocomp;
 using namespace thermocomp::diagnosis;

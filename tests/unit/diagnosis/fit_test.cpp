@@ -7,7 +7,7 @@
 #include <Eigen/LU>
 #include <catch2/catch.hpp>
 
-#include "modelling/diagnosis/fit/output_fit.hpp"
+#include "modelling/diagnosis/rank/output_fit.hpp"
 
 using namespace thermocomp::diagnosis;
 

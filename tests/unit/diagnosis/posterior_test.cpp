@@ -1,9 +1,9 @@
-#include "modelling/diagnosis/rank/posterior.hpp"
-
 #include <string>
 #include <vector>
 
 #include <catch2/catch.hpp>
+
+#include "modelling/diagnosis/rank/search.hpp"
 
 using namespace thermocomp;
 using namespace thermocomp::diagnosis;

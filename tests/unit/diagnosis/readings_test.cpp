@@ -11,8 +11,8 @@
 #include <catch2/catch.hpp>
 
 #include "config/runs/run_file.hpp"
+#include "modelling/diagnosis/causes/cause.hpp"
 #include "modelling/diagnosis/data/measured_runs.hpp"
-#include "modelling/diagnosis/hypothesis/hypothesis.hpp"
 #include "modelling/diagnosis/rank/fits.hpp"
 
 using namespace thermocomp;

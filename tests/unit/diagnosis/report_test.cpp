@@ -7,8 +7,8 @@
 
 #include <catch2/catch.hpp>
 
+#include "modelling/diagnosis/answer/diagnosis_report.hpp"
 #include "modelling/diagnosis/causes/cause.hpp"
-#include "modelling/diagnosis/report/diagnosis_report.hpp"
 #include "report/svg_plot.hpp"
 
 using namespace thermocomp;

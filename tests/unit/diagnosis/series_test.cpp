@@ -1,6 +1,4 @@
 // The filters of many time constants at once against the estimator's, which take a value at a time.
-#include "modelling/diagnosis/data/series.hpp"
-
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -10,6 +8,7 @@
 
 #include "estimator/model/terms/low_pass.hpp"
 #include "estimator/model/terms/play.hpp"
+#include "modelling/diagnosis/data/measured_runs.hpp"
 
 namespace thermocomp::diagnosis {
 namespace {

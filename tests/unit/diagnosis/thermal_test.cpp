@@ -8,9 +8,9 @@
 #include <catch2/catch.hpp>
 
 #include "config/text/problems.hpp"
-#include "modelling/diagnosis/diagnosis.hpp"
+#include "modelling/diagnosis/answer/diagnosis_report.hpp"
 #include "modelling/diagnosis/network/network_simulation.hpp"
-#include "modelling/diagnosis/report/diagnosis_report.hpp"
+#include "modelling/diagnosis/thermal_diagnosis.hpp"
 
 using namespace thermocomp;
 using namespace thermocomp::diagnosis;

@@ -1,13 +1,211 @@
+#include "modelling/diagnosis/answer/diagnosis_report.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <span>
 
-#include "modelling/diagnosis/report/diagnosis_report.hpp"
+#include "config/runs/run_file.hpp"
+#include "config/text/units.hpp"
 #include "report/html_page.hpp"
 #include "report/svg_plot.hpp"
 
 namespace thermocomp::diagnosis {
 namespace {
+
+constexpr double change_lasts_s = 600.0;
+constexpr double slope_smoothing_s = 300.0;
+/// A slope below this share of the largest counts as steady.
+constexpr double slope_share_min = 0.08;
+
+/// Phase of each selected row: `change` in the ten minutes after a change of an operating signal,
+/// else by the slope of the inputs' mean rise and by whether any signal is on.
+std::vector<Phase> phases_of(const MeasuredRun& run, const MeasuredData& data) {
+  Column mean_K = Column::Zero(run.rows());
+  for (std::size_t input = 0; input < data.model.inputs.size(); ++input)
+    mean_K += run.temps_K[input];
+  const Column slope_K_per_s = slope(run.time_s, mean_K, slope_smoothing_s);
+  const double steepest = slope_K_per_s.cwiseAbs().maxCoeff();
+  std::vector<Phase> phases;
+  double changed_at_s = -1e300;
+  for (Eigen::Index row = 0; row < run.rows(); ++row) {
+    bool on = false;
+    for (std::size_t i = 0; i < data.signals.size(); ++i) {
+      if (kind_of(data.signals[i]) != QuantityKind::signal) continue;
+      const Column& signal = run.signals[i];
+      on = on || std::abs(signal[row]) > 0;
+      const double range = signal.maxCoeff() - signal.minCoeff();
+      if (row > 0 && std::abs(signal[row] - signal[row - 1]) > 0.05 * range)
+        changed_at_s = run.time_s[row];
+    }
+    if (row < run.begin) continue;
+    if (run.time_s[row] - changed_at_s < change_lasts_s)
+      phases.push_back(Phase::change);
+    else if (slope_K_per_s[row] > slope_share_min * steepest)
+      phases.push_back(Phase::heating);
+    else if (slope_K_per_s[row] < -slope_share_min * steepest)
+      phases.push_back(Phase::cooling);
+    else
+      phases.push_back(on ? Phase::steady : Phase::standstill);
+  }
+  return phases;
+}
+
+/// Indices of the model's inputs and of other temperatures in findings.
+std::vector<std::size_t> places_shown(const Diagnosis& diagnosis, const MeasuredData& data) {
+  std::vector<std::size_t> shown;
+  for (std::size_t place = 0; place < data.temperatures.size(); ++place) {
+    const std::string& name = data.temperatures[place];
+    if (place < data.model.inputs.size() ||
+        std::any_of(diagnosis.findings.begin(), diagnosis.findings.end(),
+                    [&](const NamedFinding& finding) {
+                      const SubjectColumns columns = subject_columns(finding.subject);
+                      return columns.first == name || columns.second == name;
+                    }))
+      shown.push_back(place);
+  }
+  return shown;
+}
+
+/// Whether the model was made from rows of the run; folders are ignored.
+bool is_of_the_model(const ThermalModel& model, const std::string& run) {
+  if (!model.made_from) return false;
+  const RunSelection of = parse_selection(run);
+  return std::any_of(model.made_from->runs.begin(), model.made_from->runs.end(),
+                     [&](const std::string& each) {
+                       const RunSelection known = parse_selection(each);
+                       return known.file.filename() == of.file.filename() &&
+                              known.from_s < of.to_s && of.from_s < known.to_s;
+                     });
+}
+
+}  // namespace
+
+void add_runs(ReportData& report, const Diagnosis& diagnosis, const MeasuredData& data,
+              const std::vector<Residuals>& before, const std::vector<Residuals>& after,
+              bool test) {
+  report.outputs = data.model.outputs;
+  report.signals = data.signals;
+  report.inputs.clear();
+  const std::vector<std::size_t> shown = places_shown(diagnosis, data);
+  for (const std::size_t place : shown) report.inputs.push_back(data.temperatures[place]);
+  for (std::size_t i = 0; i < data.runs.size(); ++i) {
+    const MeasuredRun& run = data.runs[i];
+    const Eigen::Index rows = run.rows() - run.begin;
+    ReportRun added{run.name, test, run.time_s.tail(rows), phases_of(run, data)};
+    added.of_the_model = is_of_the_model(data.model, run.name);
+    for (const Column& measured : run.measured_um)
+      added.measured_um.emplace_back(measured.tail(rows));
+    for (const Column& signal : run.signals) added.signals.emplace_back(signal.tail(rows));
+    for (const std::size_t place : shown)
+      added.inputs_K.emplace_back(run.temps_K[place].tail(rows));
+    for (const Residuals& each : before) added.before_um.push_back(each[i]);
+    for (const Residuals& each : after) added.after_um.push_back(each[i]);
+    report.runs.push_back(std::move(added));
+  }
+}
+
+namespace {
+
+constexpr std::size_t scatters_max = 3;
+constexpr std::size_t signals_max = 4;
+constexpr double output_height = 130.0;
+constexpr double error_height = 90.0;
+constexpr double signal_height = 40.0;
+constexpr const char* measured_colour = "#222";
+constexpr const char* model_colour = "#c53030";
+constexpr const char* extended_colour = "#2b6cb0";
+
+std::span<const double> all_of(const Column& column) {
+  return {column.data(), static_cast<std::size_t>(column.size())};
+}
+
+/// Correlation of two columns over the rows in which both have values.
+double correlation(const Column& a, const Column& b) {
+  const auto both = a.array().isFinite() && b.array().isFinite();
+  const double n = static_cast<double>(both.count());
+  if (!(n > 2)) return 0.0;
+  const Eigen::ArrayXd x = both.select(a.array(), 0.0);
+  const Eigen::ArrayXd y = both.select(b.array(), 0.0);
+  const double cross = (x * y).sum() / n - x.sum() * y.sum() / (n * n);
+  const double xx = x.square().sum() / n - std::pow(x.sum() / n, 2);
+  const double yy = y.square().sum() / n - std::pow(y.sum() / n, 2);
+  return xx > 0 && yy > 0 ? cross / std::sqrt(xx * yy) : 0.0;
+}
+
+PlotPanel temperatures_panel(const ReportRun& run, const ReportData& report) {
+  PlotPanel panel{"temperatures, rise", "K", {}, error_height};
+  for (std::size_t i = 0; i < run.inputs_K.size(); ++i)
+    panel.lines.push_back(
+        numbered_line(name_of_column(report.inputs[i]), i, all_of(run.inputs_K[i])));
+  return panel;
+}
+
+/// Measured, predicted and residual displacement of a run's outputs, operating signals and
+/// temperatures over one axis of time.
+/// @param units  one per output
+std::string course_picture(const ReportRun& run, const ReportData& report,
+                           const std::vector<std::string>& units) {
+  std::vector<Column> models;
+  models.reserve(2 * report.outputs.size());  // panels refer to its elements
+  std::vector<PlotPanel> panels;
+  for (std::size_t output = 0; output < report.outputs.size(); ++output) {
+    const std::string name = name_of_column(report.outputs[output]);
+    const Column& measured = run.measured_um[output];
+    const Column& model = models.emplace_back(measured - run.before_um[output]);
+    const Column& extended = models.emplace_back(measured - run.after_um[output]);
+    panels.push_back({name,
+                      units[output] == "K" ? "°C" : units[output],  // errors alone are differences
+                      {{"measured", measured_colour, all_of(measured)},
+                       {"model", model_colour, all_of(model)},
+                       {"extended model", extended_colour, all_of(extended)}},
+                      output_height});
+    panels.push_back({"error of " + name,
+                      units[output],
+                      {{"model", model_colour, all_of(run.before_um[output])},
+                       {"extended model", extended_colour, all_of(run.after_um[output])}},
+                      error_height});
+  }
+  for (std::size_t i = 0; i < std::min(signals_max, run.signals.size()); ++i) {
+    const std::string name = name_of_column(report.signals[i]);
+    const std::string unit =
+        report.signals[i].substr(std::min(report.signals[i].size(), name.size() + 1));
+    panels.push_back({name, unit, {{"", "#444", all_of(run.signals[i])}}, signal_height});
+  }
+  if (!run.inputs_K.empty()) panels.push_back(temperatures_panel(run, report));
+  return panels_plot(all_of(run.time_s), panels);
+}
+
+/// Residual against the temperatures with the largest correlation.
+std::string scatter_pictures(const ReportRun& run, const ReportData& report, std::size_t output) {
+  std::vector<std::pair<double, std::size_t>> order;
+  for (std::size_t input = 0; input < report.inputs.size(); ++input)
+    order.emplace_back(-std::abs(correlation(run.inputs_K[input], run.before_um[output])), input);
+  std::sort(order.begin(), order.end());
+  std::string html = "<div class=\"few\">";
+  for (std::size_t i = 0; i < std::min(scatters_max, order.size()); ++i) {
+    const std::size_t input = order[i].second;
+    char title[80];
+    std::snprintf(title, sizeof title, "%.40s, correlation %.2f",
+                  name_of_column(report.inputs[input]).c_str(), -order[i].first);
+    html += scatter_plot(
+        {title, all_of(run.inputs_K[input]), "rise, K", all_of(run.before_um[output])});
+  }
+  return html + "</div>\n";
+}
+
+/// One bar per output with the parts of the model's error; empty if they are unknown.
+std::string headroom_picture(const Diagnosis& diagnosis) {
+  std::vector<NamedBar> bars;
+  for (const auto& [output, of] : diagnosis.outputs)
+    if (of.headroom)
+      bars.push_back({name_of_column(output),
+                      {{"named here", "#2b6cb0", of.headroom->named},
+                       {"predictable, without a name", "#b7791f", of.headroom->predictable},
+                       {"in nothing that was recorded", "#c53030", of.headroom->not_recorded},
+                       {"noise of a single value", "#a0aec0", of.headroom->noise}}});
+  return bars.empty() ? std::string() : html_figure(bars_plot(bars), "");
+}
 
 constexpr double support_reported_min = 0.05;
 /// Least share of the model's error that leads to an advice.
@@ -264,6 +462,23 @@ std::string phases_table(const ReportRun& run, const ReportData& report) {
     }
   }
   return html_table(table);
+}
+
+/// Time after which the autocorrelation of a residual is below 1/e; 0 if it is white.
+double correlation_time_s(const Column& time_s, const Column& residual) {
+  std::vector<Eigen::Index> present;
+  for (Eigen::Index row = 0; row < residual.size(); ++row)
+    if (std::isfinite(residual[row])) present.push_back(row);
+  const Eigen::Index n = std::ssize(present);
+  if (n < 8) return 0.0;
+  Column values = residual(present);
+  values.array() -= values.mean();
+  const double limit = values.squaredNorm() / static_cast<double>(n) / std::exp(1.0);
+  for (Eigen::Index lag = 1; lag < n / 2; ++lag)
+    if (values.head(n - lag).dot(values.tail(n - lag)) <= limit * static_cast<double>(n - lag))
+      return lag > 1 ? time_s[present[static_cast<std::size_t>(lag)]] - time_s[present.front()]
+                     : 0.0;
+  return 0.0;
 }
 
 std::string whiteness_table(const ReportRun& run, const ReportData& report) {

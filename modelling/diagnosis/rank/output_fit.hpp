@@ -1,4 +1,5 @@
-/// Likelihood of one output's residual under several noise models, with and without an effect.
+/// Fits to one output's residual: likelihood under several noise models, with and without an
+/// effect; cross-validation.
 #pragma once
 
 #include <vector>
@@ -7,8 +8,8 @@
 #include <Eigen/Core>
 #include <Eigen/SparseCore>
 
+#include "modelling/diagnosis/causes/cause.hpp"
 #include "modelling/diagnosis/data/measured_runs.hpp"
-#include "modelling/diagnosis/data/series.hpp"
 
 namespace thermocomp::diagnosis {
 
@@ -119,5 +120,38 @@ class OutputFit {
 
 /// ln of the mean of exp(values).
 [[nodiscard]] double log_mean_exp(const Eigen::VectorXd& values);
+
+/// Leaves out each eighth of the rows in turn; least squares of accepted and tried columns on the
+/// other rows.
+class LeftOut {
+ public:
+  /// @param accepted  shape (rows, p)
+  LeftOut(Column values, Panel accepted);
+
+  /// Sum of squared residuals of all eighths with the accepted columns only.
+  [[nodiscard]] double before() const { return before_; }
+  /// The same with each group of `width` columns in addition.
+  /// @param bounds  of the gain if a group has one column
+  [[nodiscard]] std::vector<double> after(const Panel& columns, Eigen::Index width,
+                                          const Interval& bounds) const;
+  /// Residual of columns, or of the values, from a fit of the accepted columns to all rows.
+  [[nodiscard]] Panel beside_accepted(const Panel& columns) const;
+  [[nodiscard]] const Column& values() const { return values_; }
+
+ private:
+  struct Eighth {
+    Eigen::Index begin{0};
+    Eigen::Index count{0};
+    Eigen::LLT<Eigen::MatrixXd> others;  ///< products of the accepted columns in the other rows
+    Eigen::VectorXd factors;             ///< of the accepted columns alone
+  };
+  [[nodiscard]] static Eigen::LLT<Eigen::MatrixXd> rooted(Eigen::MatrixXd products);
+
+  Column values_;
+  Panel accepted_;
+  Eigen::LLT<Eigen::MatrixXd> all_;
+  std::vector<Eighth> eighths_;
+  double before_{0.0};
+};
 
 }  // namespace thermocomp::diagnosis
