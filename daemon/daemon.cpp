@@ -23,7 +23,6 @@
 #include "drivers/sensors/make_source.hpp"
 #include "estimator/checks.hpp"
 #include "status/codes.hpp"
-#include "status/status_json.hpp"
 
 namespace thermocomp {
 namespace {
@@ -171,7 +170,7 @@ Daemon::Parts::Parts(const std::filesystem::path& config_file)
       operations({config, cycle, keeper, service, history.get(),
                   [this] { return status_line(supervisor.view()); }, &journal,
                   [this] { return server.caller(); }, start_state.state.reference_degC}),
-      supervisor({config, sources, *link, history.get(), keeper, server, signals, service,
+      supervisor({config, cycle, sources, *link, history.get(), keeper, server, signals, service,
                   operations, journal, locks.controller}) {
   if (history) journal.on_event([this](const Event& event) { history->note(event); });
   // Saved now: a kill before the first periodic save must not look like a first start.
@@ -191,20 +190,15 @@ std::unique_ptr<CycleParts> Daemon::Parts::first_parts() const {
 }
 
 DaemonActions Daemon::Parts::actions() {
-  DaemonActions all{
-      [this] { return supervisor.view(); },
-      [this](const Command& asked) { return operations.command(asked); },
-      [this](const auto& candidate) { return operations.reload(candidate); },
-      {},
-      [this](const std::string& name) { operations.note_asked_for(name); },
-      [this] {
-        return json_of(EventsAnswer{{journal.events().begin(), journal.events().end()}});
-      }};
+  DaemonActions all{[this] { return supervisor.view(); },
+                    [this](const Command& asked) { return operations.command(asked); },
+                    [this](const auto& candidate) { return operations.reload(candidate); },
+                    {},
+                    [this](const std::string& name) { operations.note_asked_for(name); }};
   if (auto* bridge = dynamic_cast<BridgeController*>(real_link(*link)))
     all.controller_state = [this, bridge](const nlohmann::json& params) {
       return answer_bridge(*bridge, std::get<BridgeControllerConfig>(config.controller),
-                           code_text(operations.cycle().report().mode, config.dry_run).name,
-                           params);
+                           code_text(cycle.report().mode, config.dry_run).name, params);
     };
   return all;
 }
@@ -266,7 +260,7 @@ void Daemon::run() {
   try {
     parts_->start();
     parts_->journal.daemon("started", THERMOCOMP_VERSION);
-    parts_->supervisor.wait_until_ready(parts_->cycle);
+    parts_->supervisor.wait_until_ready();
     parts_->supervisor.run();
   } catch (...) {
     parts_->stop();

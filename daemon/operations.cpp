@@ -206,8 +206,9 @@ void Operations::finish_loading() {
                                  "restart is needed for a change of {}",
                                  fmt::join(fixed, ", ")));
     add_recorder(*loaded->parts, loaded->config, parts_.history);
-    loaded->parts->estimator.plan_adoption(cycle_.estimator());
-    if (loaded->parts->candidate) loaded->parts->candidate->plan_adoption(cycle_.estimator());
+    loaded->parts->estimator.plan_adoption(parts_.cycle.parts().estimator);
+    if (loaded->parts->candidate)
+      loaded->parts->candidate->plan_adoption(parts_.cycle.parts().estimator);
     loaded->parts->promotes = parts_.config.candidate &&
                               parts_.config.candidate->checksum == loaded->config.model_checksum;
     reload_->next = std::move(loaded->config);
@@ -255,7 +256,8 @@ void Operations::finish_reload() {
     parts_.config = std::move(reload_->next);
     candidate_ = reload_->candidate;
     set_log_level(parts_.config.log_level);
-    note_reference(cycle_.estimator().persistent_state(cycle_.report()), ReferenceOrigin::reload);
+    note_reference(parts_.cycle.parts().estimator.persistent_state(parts_.cycle.report()),
+                   ReferenceOrigin::reload);
     if (parts_.journal != nullptr) parts_.journal->command(command_event("reload", reload_->by));
     spdlog::info("reloaded: model {} (SHA-256 {})", parts_.config.model_file.string(),
                  parts_.config.model_checksum);
@@ -278,15 +280,17 @@ void Operations::carried_out(const Command& done) {
     event.subject = {SubjectKind::sensor, parts_.config.estimator.sensors[done.axis].name};
   if (done.kind == CommandKind::measured || done.kind == CommandKind::prove)
     event.value = done.value_um;
-  if (Candidate* beside = cycle_.candidate(); beside && done.kind == CommandKind::measured)
+  if (const auto& beside = parts_.cycle.parts().candidate;
+      beside && done.kind == CommandKind::measured)
     event.candidate = candidate_of(parts_.config, &beside->score());
   spdlog::info("operator: {}", what_text(event));
   if (parts_.journal != nullptr) parts_.journal->command(std::move(event));
-  if (done.kind == CommandKind::reference && is_reference_whole(cycle_.report())) {
+  if (done.kind == CommandKind::reference && is_reference_whole(parts_.cycle.report())) {
     parts_.keeper.reference_taken();
     // Also recorded when the temperatures equal those of the previous reference.
     parts_.reference_before_degC.clear();
-    note_reference(cycle_.estimator().persistent_state(cycle_.report()), ReferenceOrigin::command);
+    note_reference(parts_.cycle.parts().estimator.persistent_state(parts_.cycle.report()),
+                   ReferenceOrigin::command);
   }
   // The client is answered once this is on disk: is_settled().
   save_state(true);
@@ -327,9 +331,9 @@ Operations::Asking Operations::take_asking(const Command& done) {
 }
 
 void Operations::save_state(bool at_once) {
-  PersistentState state = cycle_.estimator().persistent_state(cycle_.report());
+  PersistentState state = parts_.cycle.parts().estimator.persistent_state(parts_.cycle.report());
   note_reference(state, ReferenceOrigin::first_values);
-  if (Candidate* candidate = cycle_.candidate()) candidate->add_to(state.correction);
+  if (const auto& candidate = parts_.cycle.parts().candidate) candidate->add_to(state.correction);
   state.controller = controller_identity(parts_.config.controller);
   if (parts_.config.dry_run) {
     // A dry run sends nothing: the saved offsets stay valid.
@@ -352,7 +356,7 @@ void Operations::save_state(bool at_once) {
 /// Reports a newer state on disk to the estimator.
 /// @param again  reports an unchanged one too, if an axis waits and no write is under way
 void Operations::report_saved(bool again) {
-  const std::vector<AxisReport>& axes = cycle_.report().axes;
+  const std::vector<AxisReport>& axes = parts_.cycle.report().axes;
   const bool is_waited_for = again && !parts_.keeper.is_busy() && parts_.keeper.error().empty() &&
                              std::any_of(axes.begin(), axes.end(), [](const AxisReport& axis) {
                                return axis.waits_for_disk;

@@ -14,6 +14,7 @@
 #include <unistd.h>
 #include <utility>
 
+#include <nlohmann/json.hpp>
 #include <spdlog/spdlog.h>
 #include <sys/signalfd.h>
 
@@ -68,21 +69,28 @@ constexpr std::size_t recent_max = 8;
 
 }  // namespace
 
+Supervisor::Supervisor(const Parts& parts) : parts_(parts), events_(parts.journal) {
+  add_status_methods(parts_.server, [this] { return view(); });
+  parts_.server.add_method("events", AccessClass::read, [this](const nlohmann::json&) {
+    return json_of(EventsAnswer{{parts_.journal.events().begin(), parts_.journal.events().end()}});
+  });
+}
+
 void Supervisor::add_warning(const std::string& warning) {
   spdlog::warn("{}", warning);
   warnings_.push_back(warning);
 }
 
-void Supervisor::wait_until_ready(Cycle& running) {
+void Supervisor::wait_until_ready() {
   const auto period = std::chrono::duration<double>(1.0 / parts_.config.loop.rate_hz);
   const auto patience = ready_within + period * cycles_until_ready;
   const auto begun = Clock::now();
-  while (running.timing().cycles.load() < cycles_until_ready) {
+  while (parts_.cycle.timing().cycles.load() < cycles_until_ready) {
     if (Clock::now() - begun > patience) throw RealTimeError("the cycle does not run");
     std::this_thread::sleep_for(1ms);
   }
   // Start-up (threads, memory) must not count in the cycle's timing.
-  running.clear_timing();
+  parts_.cycle.clear_timing();
   look_at_health();
   parts_.service.ready(status_line(view()));
   if (parts_.config.dry_run)
@@ -130,10 +138,10 @@ bool Supervisor::take_signals() {
 
 void Supervisor::note_report() {
   next_note_ = Clock::now() + note_period_max;
-  events_.note_report(cycle().report(), parts_.config.estimator, parts_.config.dry_run);
-  events_.note_estimates(cycle().report(), parts_.config.estimator,
+  events_.note_report(parts_.cycle.report(), parts_.config.estimator, parts_.config.dry_run);
+  events_.note_estimates(parts_.cycle.report(), parts_.config.estimator,
                          parts_.config.model.temperature_columns());
-  const Report& report = cycle().report();
+  const Report& report = parts_.cycle.report();
   const bool all_driven = std::all_of(report.axes.begin(), report.axes.end(),
                                       [](const AxisReport& axis) { return axis.driven; });
   if (report.mode != Mode::compensating || !all_driven) idle_until_ = Clock::now();
@@ -149,7 +157,7 @@ void Supervisor::note_report() {
 
 void Supervisor::tick() {
   next_tick_ = Clock::now() + tick_period;
-  const std::uint64_t cycles = cycle().timing().cycles.load(std::memory_order_acquire);
+  const std::uint64_t cycles = parts_.cycle.timing().cycles.load(std::memory_order_acquire);
   if (cycles != cycles_seen_) parts_.service.alive();
   cycles_seen_ = cycles;
   if (Clock::now() >= next_health_) look_at_health();
@@ -163,8 +171,8 @@ void Supervisor::look_at_health() {
   for (const BusHealth& bus : buses_) events_.note_bus(bus);
   controller_health_ = parts_.link.health();
   events_.note_controller(controller_health_);
-  events_.note_missed(cycle().timing().missed.load());
-  events_.note_failed_sleeps(cycle().timing().failed_sleeps.load());
+  events_.note_missed(parts_.cycle.timing().missed.load());
+  events_.note_failed_sleeps(parts_.cycle.timing().failed_sleeps.load());
   events_.note_socket(parts_.server.statistics());
   events_.note_log(log_statistics().is_stalled);
   note_history();
@@ -181,7 +189,7 @@ void Supervisor::ramp_to_zero() {
   const double longest_s = parts_.config.estimator.compensation.stop_ramp_s_max;
   const auto end = Clock::now() + std::chrono::duration_cast<Clock::duration>(seconds_d(longest_s));
   parts_.service.stopping("taking the offsets to zero");
-  if (!cycle().send({CommandKind::stop, 0, 0.0}, Clock::now())) {
+  if (!parts_.operations.cycle().send({CommandKind::stop, 0, 0.0}, Clock::now())) {
     spdlog::warn("too many commands wait for the cycle: the offsets stay");
     return;
   }
@@ -204,7 +212,7 @@ void Supervisor::ramp_to_zero() {
 }
 
 bool Supervisor::at_zero() {
-  const Report& report = cycle().report();
+  const Report& report = parts_.cycle.report();
   // Without a controller no offset can be sent.
   if (has_reason(report.reasons, Reason::controller_offline)) return true;
   const double tolerance_um = parts_.config.estimator.compensation.mismatch_um;
@@ -221,7 +229,7 @@ StatusView Supervisor::view() {
         "the machine's reference is lost, compensation stays off: when the machine is cold and "
         "even, give `thermocomp reference`, then `thermocomp enable`");
   if (!parts_.keeper.error().empty()) all.push_back(parts_.keeper.error());
-  const std::vector<AxisReport>& axes = cycle().report().axes;
+  const std::vector<AxisReport>& axes = parts_.cycle.report().axes;
   for (std::size_t i = 0; i < axes.size() && !parts_.keeper.error().empty(); ++i)
     if (axes[i].waits_for_disk)
       all.push_back("axis " + parts_.config.estimator.axes[i].name +
@@ -233,9 +241,9 @@ StatusView Supervisor::view() {
   if (!statistics.last_error.empty()) all.push_back(statistics.last_error);
   StatusView view{
       parts_.config,
-      cycle().report(),
-      cycle().controller(),
-      cycle().timing(),
+      parts_.cycle.report(),
+      parts_.cycle.controller(),
+      parts_.cycle.timing(),
       buses_,
       controller_health_,
       statistics,
@@ -251,7 +259,7 @@ StatusView Supervisor::view() {
       parts_.keeper.is_reference_lost(),
       std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count(),
       std::chrono::duration<double>(Clock::now() - idle_until_).count()};
-  if (Candidate* candidate = cycle().candidate()) view.contest = &candidate->score();
+  if (const auto& candidate = parts_.cycle.parts().candidate) view.contest = &candidate->score();
   return view;
 }
 

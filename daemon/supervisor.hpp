@@ -47,6 +47,7 @@ class Supervisor {
   /// All must outlive this.
   struct Parts {
     const DaemonConfig& config;
+    Cycle& cycle;
     const std::vector<std::unique_ptr<SensorSource>>& sources;
     const ControllerLink& link;
     HistoryWriter* history;  ///< null: no history
@@ -58,7 +59,7 @@ class Supervisor {
     EventJournal& journal;
     std::vector<NameLock>& locks;
   };
-  explicit Supervisor(const Parts& parts) : parts_(parts), events_(parts.journal) {}
+  explicit Supervisor(const Parts& parts);
 
   /// Adds the warning to every status from now on.
   void add_warning(const std::string& warning);
@@ -66,7 +67,7 @@ class Supervisor {
 
   /// Reports readiness to the service manager once the cycle advances.
   /// @throws RealTimeError if it does not
-  void wait_until_ready(Cycle& running);
+  void wait_until_ready();
   /// Runs until a signal ends it; then, if so configured, ramps the offsets to zero.
   void run();
   /// Logs new messages of the history; to be called once more after its end.
@@ -85,7 +86,6 @@ class Supervisor {
   void look_at_health();
   void ramp_to_zero();
   [[nodiscard]] bool at_zero();
-  [[nodiscard]] CycleHandle& cycle() noexcept { return parts_.operations.cycle(); }
 
   Parts parts_;
   EventLog events_;

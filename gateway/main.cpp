@@ -31,7 +31,7 @@
 #include "gateway/shdr/shdr_adapter.hpp"
 #include "gateway/texts/shdr_text.hpp"
 #include "report/command.hpp"
-#include "status/status_json.hpp"
+#include "status/status.hpp"
 
 namespace thermocomp::gateway {
 namespace {

@@ -1,4 +1,4 @@
-/// The answers of the status socket as plain structures.
+/// The answers of the status socket as plain structures, and their JSON.
 ///
 /// `fields` gives each member its key in JSON; daemon/status fills it, each view shows it. Lengths
 /// without a unit in their name are in the axis' unit. NaN: unknown (null in JSON). docs/socket.md
@@ -10,6 +10,8 @@
 #include <optional>
 #include <string>
 #include <vector>
+
+#include <nlohmann/json_fwd.hpp>
 
 #include "estimator/pipeline/mode.hpp"
 #include "estimator/types.hpp"
@@ -600,5 +602,14 @@ struct EventsAnswer {
     visit("events", self.events);
   }
 };
+
+/// For any structure with `fields`, Event, and vectors of them.
+template <class Part>
+[[nodiscard]] nlohmann::json json_of(const Part& part);
+
+/// Tolerates any shape: missing members and those of another type keep the structure's defaults. A
+/// text is reduced to one line. An unknown reason becomes a warning.
+template <class Part>
+[[nodiscard]] Part part_from(const nlohmann::json& value);
 
 }  // namespace thermocomp

@@ -13,7 +13,6 @@
 
 #include "cli/admit/admission.hpp"
 #include "cli/commands.hpp"
-#include "cli/common/daemon_client.hpp"
 #include "cli/common/json_fields.hpp"
 #include "cli/observe/status_text.hpp"
 #include "cli/operate/promotion.hpp"
@@ -22,8 +21,9 @@
 #include "config/model/model_file.hpp"
 #include "config/toml/toml_reader.hpp"
 #include "daemon/history/replay/replay.hpp"
+#include "daemon/socket/status_client.hpp"
 #include "report/output_file.hpp"
-#include "status/status_json.hpp"
+#include "status/status.hpp"
 
 namespace thermocomp::cli {
 namespace {
@@ -147,8 +147,9 @@ class Admission {
  private:
   [[nodiscard]] fs::path candidate_file() const { return settings_.folder / "candidate.toml"; }
   [[nodiscard]] std::string checksum_in_use() const {
-    return text_of(object_of(ask_daemon(config_.socket.path, "status", json::object()), "model"),
-                   "checksum");
+    return text_of(
+        object_of(StatusClient(config_.socket.path).call("status", json::object()), "model"),
+        "checksum");
   }
 
   void receive() {
@@ -200,7 +201,7 @@ class Admission {
     if (checksum_in_use() == offer_.order.checksum) return steps_.add("promoted", done_by(false));
     if (offer_.withdrawn) return end_candidate("withdrawn");
     const auto status =
-        part_from<Status>(ask_daemon(config_.socket.path, "status", json::object()));
+        part_from<Status>(StatusClient(config_.socket.path).call("status", json::object()));
     if (!status.candidate || status.candidate->file != candidate_file())
       start_candidate(config_.socket.path, candidate_file());
     else if (const std::string score = score_text(*status.candidate); score != steps_.last_detail())

@@ -13,14 +13,13 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.hpp"
-#include "cli/common/daemon_client.hpp"
 #include "cli/observe/status_text.hpp"
 #include "cli/observe/watch_text.hpp"
 #include "config/text/clean_output.hpp"
 #include "daemon/history/reading/history_reader.hpp"
 #include "daemon/socket/status_client.hpp"
 #include "report/terminal.hpp"
-#include "status/status_json.hpp"
+#include "status/status.hpp"
 #include "status/verdict.hpp"
 
 namespace thermocomp::cli {
@@ -36,7 +35,7 @@ struct StatusOptions {
 };
 
 int run_status(const GlobalOptions& global, const StatusOptions& options) {
-  json answer = ask_daemon(global.socket, "status", json::object());
+  json answer = StatusClient(global.socket).call("status", json::object());
   const auto status = part_from<Status>(answer);
   const std::vector<std::string> why = why_not(status, options.strict);
   const int exit_status = why.empty() ? exit_success : exit_no;
@@ -67,7 +66,7 @@ json events_of(const GlobalOptions& global, const EventsOptions& options) {
   if (options.history.empty()) {
     if (!options.from.empty() || !options.to.empty())
       throw Failure("--from and --to need a history: thermocomp events HISTORY.db");
-    return ask_daemon(global.socket, "events", json::object());
+    return StatusClient(global.socket).call("events", json::object());
   }
   return {{"events", json_of(read_events(options.history, time_or_none(options.from),
                                          time_or_none(options.to)))}};
@@ -81,7 +80,7 @@ int run_events(const GlobalOptions& global, const EventsOptions& options) {
 }
 
 int run_sensors(const GlobalOptions& global, bool as_json) {
-  const json sensors = ask_daemon(global.socket, "sensors", json::object());
+  const json sensors = StatusClient(global.socket).call("sensors", json::object());
   if (as_json) {
     std::cout << sensors.dump(2) << '\n';
   } else {
@@ -103,7 +102,7 @@ void end_watch(int) {
   ::_exit(exit_success);
 }
 
-void watch_until_end(const GlobalOptions& global, const WatchOptions& options) {
+int run_watch(const GlobalOptions& global, const WatchOptions& options) {
   const bool terminal = stdout_is_terminal();
   if (terminal) std::signal(SIGINT, end_watch);
   const auto end = steady_clock::now() + std::chrono::duration<double>(options.for_s);
@@ -125,7 +124,7 @@ void watch_until_end(const GlobalOptions& global, const WatchOptions& options) {
     try {
       notification = client.next(options.for_s > 0.0 ? std::min(patience, remaining()) : patience);
     } catch (const ClientError&) {
-      if (over()) return;
+      if (over()) return exit_success;
       throw;
     }
     if (notification.value("method", "") != "status") continue;
@@ -138,16 +137,6 @@ void watch_until_end(const GlobalOptions& global, const WatchOptions& options) {
     else
       std::cout << log.next(status, row);
     std::cout.flush();
-  }
-}
-
-int run_watch(const GlobalOptions& global, const WatchOptions& options) {
-  try {
-    watch_until_end(global, options);
-  } catch (const RemoteError& error) {
-    throw Failure(error.what());
-  } catch (const ClientError& error) {
-    throw Failure(error.what());
   }
   return exit_success;
 }

@@ -10,9 +10,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "cli/common/daemon_client.hpp"
 #include "cli/common/json_fields.hpp"
 #include "cli/operate/prove_course.hpp"
+#include "daemon/socket/status_client.hpp"
 #include "report/terminal.hpp"
 #include "status/figures.hpp"
 
@@ -63,7 +63,7 @@ constexpr double patience_factor = 2.0;
 constexpr double patience_s = 10.0;
 
 json axis_now(const GlobalOptions& global, const std::string& name) {
-  const json offsets = ask_daemon(global.socket, "offsets", json::object());
+  const json offsets = StatusClient(global.socket).call("offsets", json::object());
   for (const json& axis : list_of(offsets, "axes"))
     if (text_of(axis, "name") == name || text_of(axis, "axis") == name) return axis;
   return json::object();
@@ -91,7 +91,7 @@ constexpr auto read_back_patience = 10s;
 
 /// Mismatch of the axis, or of its first node with one, with the present read-back; empty: none.
 json mismatch_now(const GlobalOptions& global, const std::string& name) {
-  const json status = ask_daemon(global.socket, "status", json::object());
+  const json status = StatusClient(global.socket).call("status", json::object());
   for (const json& axis : list_of(status, "axes")) {
     if (text_of(axis, "name") != name && text_of(axis, "axis") != name) continue;
     json mismatch = object_of(axis, "mismatch");
@@ -132,7 +132,8 @@ void warn_of_read_back(const json& before) {
 
 int run_prove(const GlobalOptions& global, const std::string& axis, double move_um) {
   const json before = axis_now(global, axis);
-  const json answer = ask_daemon(global.socket, "prove", {{"axis", axis}, {"value_um", move_um}});
+  const json answer =
+      StatusClient(global.socket).call("prove", {{"axis", axis}, {"value_um", move_um}});
   const double takes_s = number_of(answer, "takes_s");
   ProveCourse course(move_um, before);
   watch(global, axis, std::isfinite(takes_s) ? takes_s : takes_s_default, course);
@@ -144,7 +145,7 @@ int run_prove(const GlobalOptions& global, const std::string& axis, double move_
 
 int run_release(const GlobalOptions& global, const std::string& axis) {
   const json before = mismatch_now(global, axis);
-  ask_daemon(global.socket, "release", {{"axis", axis}});
+  StatusClient(global.socket).call("release", {{"axis", axis}});
   const json after = waited_for(global, axis);
   if (after.empty()) {
     std::cout << "axis " << axis << ": released\n";

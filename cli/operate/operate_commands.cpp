@@ -9,10 +9,10 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.hpp"
-#include "cli/common/daemon_client.hpp"
 #include "cli/common/json_fields.hpp"
 #include "cli/operate/axis_commands.hpp"
 #include "cli/operate/promotion.hpp"
+#include "daemon/socket/status_client.hpp"
 #include "status/figures.hpp"
 
 namespace thermocomp::cli {
@@ -44,7 +44,7 @@ struct AxisValue {
 };
 
 int run_plain(const GlobalOptions& global, const PlainCommand& command) {
-  const json answer = ask_daemon(global.socket, command.method, json::object());
+  const json answer = StatusClient(global.socket).call(command.method, json::object());
   const std::string checksum = text_of(answer, "checksum");
   std::cout << command.done;
   if (!checksum.empty()) std::cout << ", model SHA-256 " << checksum.substr(0, 16);
@@ -68,7 +68,7 @@ int run_measured(const GlobalOptions& global, const MeasuredValue& given) {
   if (given.source != "probe") params["source"] = given.source;
   if (given.ago_min > 0) params["ago_s"] = 60.0 * given.ago_min;
   if (given.confirm) params["confirm"] = true;
-  const json answer = ask_daemon(global.socket, "measured", params);
+  const json answer = StatusClient(global.socket).call("measured", params);
   const bool remains = text_of(answer, "meaning") == "remaining";
   const double predicted_um =
       number_of(answer, remains ? "predicted_remaining_um" : "predicted_um");
@@ -90,7 +90,7 @@ int run_reference(const GlobalOptions& global, bool force) {
   if (force) params["force"] = true;
   json answer;
   try {
-    answer = ask_daemon(global.socket, "reference", params);
+    answer = StatusClient(global.socket).call("reference", params);
   } catch (const Failure& refusal) {
     if (force || refusal.status() != exit_no) throw;
     throw Failure(refusal.what() + std::string(". thermocomp reference --force takes it "
@@ -108,7 +108,7 @@ int run_reference(const GlobalOptions& global, bool force) {
 }
 
 int run_accept(const GlobalOptions& global, const std::string& sensor) {
-  const json answer = ask_daemon(global.socket, "accept", {{"sensor", sensor}});
+  const json answer = StatusClient(global.socket).call("accept", {{"sensor", sensor}});
   std::cout << "sensor " << sensor << ": " << fixed(number_of(answer, "temp_degC"), 2)
             << " degC counts from now on";
   if (const double jump_K = number_of(answer, "jump_K"); jump_K != 0.0)

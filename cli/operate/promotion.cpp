@@ -2,11 +2,11 @@
 
 #include <nlohmann/json.hpp>
 
-#include "cli/common/daemon_client.hpp"
 #include "cli/common/json_fields.hpp"
 #include "config/daemon/daemon_config.hpp"
 #include "config/model/model_file.hpp"
 #include "config/toml/toml_reader.hpp"
+#include "daemon/socket/status_client.hpp"
 #include "report/command.hpp"
 #include "report/output_file.hpp"
 
@@ -38,7 +38,7 @@ void require_checksum(const fs::path& file, const std::string& text, const std::
 }
 
 json status_at(const fs::path& socket) {
-  return ask_daemon(socket, "status", json::object());
+  return StatusClient(socket).call("status", json::object());
 }
 
 /// Writes `next` to the model's file and reloads; on failure restores `now`.
@@ -46,7 +46,7 @@ void reload_with(const fs::path& socket, const fs::path& model, const std::strin
                  const std::string& now) {
   cli::write_file(model, next);
   try {
-    static_cast<void>(ask_daemon(socket, "reload", json::object()));
+    static_cast<void>(StatusClient(socket).call("reload", json::object()));
   } catch (...) {
     cli::write_file(model, now);
     throw;
@@ -56,7 +56,7 @@ void reload_with(const fs::path& socket, const fs::path& model, const std::strin
 }  // namespace
 
 void start_candidate(const fs::path& socket, const fs::path& file) {
-  static_cast<void>(ask_daemon(socket, "candidate", {{"file", file.string()}}));
+  static_cast<void>(StatusClient(socket).call("candidate", {{"file", file.string()}}));
   if (file.empty()) return;
   const json status = status_at(socket);
   if (!status.contains("candidate")) throw Failure(file.string() + ": is the model in use itself");

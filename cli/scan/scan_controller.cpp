@@ -20,7 +20,7 @@
 #include "drivers/modbus/connection.hpp"
 #include "drivers/modbus/register_codec.hpp"
 #include "estimator/estimator_config.hpp"
-#include "status/status_json.hpp"
+#include "status/status.hpp"
 
 namespace thermocomp::cli {
 namespace {

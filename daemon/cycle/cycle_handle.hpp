@@ -21,9 +21,9 @@ enum class Outcome {
 
 /// Nothing here blocks; poll() advances all operations. Main's thread only; time is an argument.
 ///
-/// A change-over is atomic: until poll() has finished it, parts() and report() are those of the old
-/// parts. A command or parts that the cycle does not take within `patience` are withdrawn in one
-/// atomic step: main and cycle always agree on what was carried out.
+/// A change-over is atomic: until poll() has finished it, Cycle::parts() and report() are those of
+/// the old parts. A command or parts that the cycle does not take within `patience` are withdrawn
+/// in one atomic step: main and cycle always agree on what was carried out.
 class CycleHandle {
  public:
   using Clock = std::chrono::steady_clock;
@@ -50,12 +50,6 @@ class CycleHandle {
   void poll(Clock::time_point now);
   /// Call after the cycle has ended. Marks finished operations and withdraws the rest.
   void settle();
-
-  [[nodiscard]] const Report& report() { return cycle_.report(); }
-  [[nodiscard]] const Estimator& estimator() { return cycle_.parts().estimator; }
-  [[nodiscard]] Candidate* candidate() { return cycle_.parts().candidate.get(); }
-  [[nodiscard]] const ControllerState& controller() { return cycle_.controller(); }
-  [[nodiscard]] const CycleTiming& timing() const { return cycle_.timing(); }
 
  private:
   struct SentCommand {

@@ -1,4 +1,4 @@
-/// The methods of the status socket: reads, commands and their permissions.
+/// The methods of the status socket that change something: commands and their permissions.
 #pragma once
 
 #include <functional>
@@ -29,11 +29,9 @@ struct DaemonActions {
   std::function<nlohmann::json(const nlohmann::json&)> controller_state{};
   /// Called before each command: the person the client gives it for; empty: not named.
   std::function<void(const std::string&)> asked_for{};
-  /// The events of this run, for `events`.
-  std::function<nlohmann::json()> events{};
 };
 
-/// Adds every method of CONTRACTS to `server`. @param actions  copied; must stay callable
+/// Adds the methods that change something to `server`. @param actions  copied; must stay callable
 void add_operator_methods(StatusServer& server, const DaemonActions& actions);
 
 /// The method `controller_state`: converts a bridge's JSON to its report, and returns the answer.

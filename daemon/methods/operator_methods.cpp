@@ -15,7 +15,6 @@
 #include "daemon/status/reference_rules.hpp"
 #include "estimator/estimator_config.hpp"
 #include "estimator/learning/probings.hpp"
-#include "status/status_json.hpp"
 
 namespace thermocomp {
 namespace {
@@ -75,21 +74,6 @@ void refuse_unless(bool holds, const std::string& why) {
   if (!holds) throw RpcError(rpc::refused, why);
 }
 
-void add_reads(StatusServer& server, const DaemonActions& actions) {
-  const auto add = [&](const char* name, auto answer) {
-    server.add_method(name, AccessClass::read,
-                      [actions, answer](const json&) { return answer(actions.view()); });
-  };
-  add("status", [](const StatusView& view) { return json_of(status_of(view)); });
-  add("sensors", [](const StatusView& view) { return json_of(sensors_of(view)); });
-  add("offsets", [](const StatusView& view) { return json_of(offsets_of(view)); });
-  add("timing", [](const StatusView& view) { return json_of(timing_of(view)); });
-  add("model", [](const StatusView& view) { return model_json(view.config); });
-  server.add_method("events", AccessClass::read, [actions](const json&) {
-    return actions.events ? actions.events() : json_of(EventsAnswer{});
-  });
-}
-
 RpcPending then(RpcPending pending, std::function<json()> result) {
   return [pending = std::move(pending), result = std::move(result)]() -> std::optional<json> {
     if (!pending()) return std::nullopt;
@@ -107,13 +91,16 @@ bool flag_in(const json& params, const char* key) {
 RpcPending take_reference(const DaemonActions& actions, const json& params) {
   const auto view = actions.view();
   const bool forced = flag_in(params, "force");
-  const auto lost = fmt::to_string(fmt::join(lost_for_reference(view), "; "));
+  const auto lost =
+      fmt::to_string(fmt::join(lost_for_reference(view.config.model, view.report), "; "));
   refuse_unless(lost.empty(), "no reference can be taken: " + lost);
-  const auto why = fmt::to_string(fmt::join(against_reference(view), "; "));
+  const auto why = fmt::to_string(fmt::join(
+      against_reference(view.config, view.report, view.controller_health, view.trend), "; "));
   refuse_unless(why.empty() || forced, "no reference is taken: " + why);
-  return then(actions.command({CommandKind::reference, 0, 0.0}), [why, watched = watched_s(view)] {
-    return json{{"done", true}, {"watched_s", watched}, {"although", why}};
-  });
+  return then(actions.command({CommandKind::reference, 0, 0.0}),
+              [why, watched = watched_s(view.report, view.trend)] {
+                return json{{"done", true}, {"watched_s", watched}, {"although", why}};
+              });
 }
 
 /// Refuses a measured displacement that differs from the expected one by more than the axis' bound
@@ -320,7 +307,6 @@ RpcPending candidate(const DaemonActions& actions, const json& params) {
 }  // namespace
 
 void add_operator_methods(StatusServer& server, const DaemonActions& actions) {
-  add_reads(server, actions);
   const auto add = [&](const char* name, RpcSlowHandler handler,
                        AccessClass access = AccessClass::operate) {
     server.add_slow_method(name, access, [actions, handler](const json& params) {

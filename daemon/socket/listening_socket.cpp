@@ -22,6 +22,14 @@
 namespace thermocomp {
 namespace {
 
+using Clock = std::chrono::steady_clock;
+
+constexpr auto groups_known_for = std::chrono::seconds(5);
+/// Time-outs of the name service, which is queried on a side thread: local groups are found at
+/// once, and a server that does not answer delays nobody.
+constexpr auto groups_first_within = std::chrono::seconds(2);
+constexpr auto groups_within = std::chrono::milliseconds(50);
+
 std::optional<gid_t> group_called(const std::string& name) {
   group entry{};
   group* found = nullptr;
@@ -82,6 +90,27 @@ PeerAccess access_of(const Peer& peer, uid_t daemon_user, const AccessGroups& gr
   access.bridge = allowed(groups.bridge);
   access.read = is_own_user || access.model || access.bridge || allowed(groups.read);
   return access;
+}
+
+AccessRules::AccessRules(const SocketConfig& config) : config_(config) {
+  ask_groups(groups_first_within);
+}
+
+PeerAccess AccessRules::of(const Peer& peer, Clock::time_point now) {
+  if (peer.user != 0 && now - asked_at_ > groups_known_for) ask_groups(groups_within);
+  return access_of(peer, geteuid(), groups_);
+}
+
+void AccessRules::ask_groups(Clock::duration at_most) {
+  if (found_) {
+    at_most = {};  // waited for already
+  } else {
+    found_ = std::make_shared<AccessGroups>();
+    thread_.start([found = found_, asked = config_] { *found = look_up_groups(asked); });
+  }
+  if (!thread_.wait(at_most)) return;  // collected at the next call
+  groups_ = *std::exchange(found_, nullptr);
+  asked_at_ = Clock::now();
 }
 
 namespace {

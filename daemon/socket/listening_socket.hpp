@@ -2,8 +2,10 @@
 /// for this folder's .cpp files.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,6 +14,7 @@
 
 #include "config/daemon/daemon_config.hpp"
 #include "daemon/socket/rpc.hpp"
+#include "daemon/threads/side_thread.hpp"
 
 namespace thermocomp {
 
@@ -20,6 +23,9 @@ struct Peer {
   gid_t group{0};
   std::vector<gid_t> groups;  ///< supplementary
 };
+
+/// Credentials at connect(), from the kernel. @return none if not available
+[[nodiscard]] std::optional<Peer> peer_of(int socket_fd);
 
 /// IDs of the configured groups; none for a group unknown to the system.
 struct AccessGroups {
@@ -31,10 +37,24 @@ struct AccessGroups {
 
 /// May query a network name service: too slow for every connection.
 [[nodiscard]] AccessGroups look_up_groups(const SocketConfig& config);
-/// Credentials at connect(), from the kernel. @return none if not available
-[[nodiscard]] std::optional<Peer> peer_of(int socket_fd);
 /// @param daemon_user  the effective user of the daemon
 [[nodiscard]] PeerAccess access_of(const Peer& peer, uid_t daemon_user, const AccessGroups& groups);
+
+/// The permissions of peers. Changes of the groups apply within seconds, without a restart.
+class AccessRules {
+ public:
+  explicit AccessRules(const SocketConfig& config);
+  [[nodiscard]] PeerAccess of(const Peer& peer, std::chrono::steady_clock::time_point now);
+
+ private:
+  void ask_groups(std::chrono::steady_clock::duration at_most);
+
+  SocketConfig config_;
+  AccessGroups groups_;
+  std::shared_ptr<AccessGroups> found_;  ///< owned by the thread while it is busy
+  std::chrono::steady_clock::time_point asked_at_{};
+  SideThread thread_{"groups"};  ///< the name service may be slow
+};
 
 class ListeningSocket {
  public:

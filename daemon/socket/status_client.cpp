@@ -15,6 +15,7 @@
 #include <sys/un.h>
 
 #include "config/text/outer_json.hpp"
+#include "daemon/socket/rpc.hpp"
 
 namespace thermocomp {
 namespace {
@@ -140,6 +141,9 @@ void StatusClient::Parts::keep(json notification) {
   notifications.push_back(std::move(notification));
   if (notifications.size() > notifications_max) notifications.pop_front();
 }
+
+RemoteError::RemoteError(int code, const std::string& message)
+    : cli::Failure(message, code == rpc::refused ? cli::exit_no : cli::exit_error), code_(code) {}
 
 StatusClient::StatusClient(const std::filesystem::path& path, std::chrono::milliseconds timeout)
     : parts_(std::make_unique<Parts>(path, Clock::now() + timeout)) {}

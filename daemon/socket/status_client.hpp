@@ -6,23 +6,25 @@
 #include <cstddef>
 #include <filesystem>
 #include <memory>
-#include <stdexcept>
 #include <string>
 
 #include <nlohmann/json_fwd.hpp>
 
+#include "report/command.hpp"
+
 namespace thermocomp {
 
 /// No daemon, no permission, connection lost, or time-out.
-class ClientError : public std::runtime_error {
+class ClientError : public cli::Failure {
  public:
-  using std::runtime_error::runtime_error;
+  using cli::Failure::Failure;
 };
 
-/// The daemon answered with an error.
-class RemoteError : public std::runtime_error {
+/// The daemon answered with an error. It ends a command with status 1 if the daemon refused a valid
+/// request.
+class RemoteError : public cli::Failure {
  public:
-  RemoteError(int code, const std::string& message) : std::runtime_error(message), code_(code) {}
+  RemoteError(int code, const std::string& message);
   [[nodiscard]] int code() const noexcept { return code_; }
 
  private:

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <deque>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -14,10 +16,9 @@
 #include <sys/socket.h>
 #include <sys/timerfd.h>
 
+#include "daemon/socket/input_limits.hpp"
 #include "daemon/socket/listening_socket.hpp"
 #include "daemon/socket/rpc.hpp"
-#include "daemon/socket/served_client.hpp"
-#include "daemon/threads/side_thread.hpp"
 
 namespace thermocomp {
 namespace {
@@ -34,14 +35,108 @@ constexpr ClientId first_client_id = 2;
 constexpr int accepted_a_turn = 64;
 constexpr auto time_outs_checked_every = std::chrono::milliseconds(250);
 constexpr auto answers_asked_every = std::chrono::milliseconds(1);
-constexpr auto groups_known_for = std::chrono::seconds(5);
-/// Time-outs of the name service, which is queried on a side thread: local groups are found at
-/// once, and a server that does not answer delays nobody.
-constexpr auto groups_first_within = std::chrono::seconds(2);
-constexpr auto groups_within = std::chrono::milliseconds(50);
 
 std::string seconds_text(Clock::duration duration) {
   return std::to_string(std::chrono::ceil<std::chrono::seconds>(duration).count()) + " s";
+}
+
+/// One connection: socket, buffers, rate limit and state.
+struct ServedClient {
+  /// Takes over the descriptor.
+  ServedClient(int fd_in, const PeerAccess& access_in, const TokenBucket& tokens_in,
+               Clock::time_point now);
+  ~ServedClient();
+  ServedClient(const ServedClient&) = delete;
+  ServedClient& operator=(const ServedClient&) = delete;
+
+  /// One read. May set input_ended or broken.
+  void receive(Clock::time_point now);
+  /// Sends what the socket accepts, keeps the rest. May set broken.
+  void send(std::string_view text, Clock::time_point now);
+  void flush(Clock::time_point now);
+  [[nodiscard]] bool has_unsent() const noexcept { return sent < output.size(); }
+  [[nodiscard]] std::size_t held_bytes() const noexcept {
+    return input.capacity_bytes() + output.capacity();
+  }
+  /// No request, answer or subscription is pending.
+  [[nodiscard]] bool is_idle() const noexcept {
+    return !subscription && !queued && !has_unsent() && !later;
+  }
+
+  int fd;
+  PeerAccess access;
+  std::int64_t user{-1};  ///< from the kernel; -1: unknown
+  TokenBucket tokens;
+  LineBuffer input;
+  std::string output;
+  std::size_t sent{0};  ///< bytes of `output` already sent
+
+  bool input_ended{false};  ///< the peer sends no more; answers may be pending
+  bool hung_up{false};      ///< the peer does not read either; received requests are still served
+  bool close_when_sent{false};
+  bool broken{false};  ///< unusable
+  bool ended{false};   ///< to be closed at the end of the turn
+  bool queued{false};  ///< waits for its turn or its rate limit
+  std::uint32_t watched{0};
+  std::size_t counted_bytes{0};  ///< last held_bytes() added to the statistics
+
+  std::function<bool(Answer&)> later;  ///< Answer::later of the request under way
+  std::optional<Subscription> subscription;
+  Clock::time_point notified_next{};
+  std::uint64_t missed{0};  ///< notifications since the last one sent
+
+  Clock::time_point last_request;  ///< or time of connection
+  Clock::time_point line_begun;    ///< while input.is_partial()
+  Clock::time_point last_taken;    ///< time when the peer took bytes or nothing was pending
+};
+
+ServedClient::ServedClient(int fd_in, const PeerAccess& access_in, const TokenBucket& tokens_in,
+                           Clock::time_point now)
+    : fd(fd_in),
+      access(access_in),
+      tokens(tokens_in),
+      last_request(now),
+      line_begun(now),
+      last_taken(now) {}
+
+ServedClient::~ServedClient() {
+  close(fd);
+}
+
+void ServedClient::receive(Clock::time_point now) {
+  std::array<char, std::size_t{16} * 1024> bytes{};
+  const ssize_t count = recv(fd, bytes.data(), bytes.size(), MSG_DONTWAIT);
+  if (count > 0) {
+    if (!input.is_partial()) line_begun = now;
+    input.add({bytes.data(), static_cast<std::size_t>(count)});
+  } else if (count == 0 || (hung_up && errno != EINTR)) {
+    input_ended = true;
+  } else if (errno != EAGAIN && errno != EINTR) {
+    broken = true;
+  }
+}
+
+void ServedClient::send(std::string_view text, Clock::time_point now) {
+  if (broken) return;
+  if (!has_unsent()) last_taken = now;
+  output.append(text);
+  flush(now);
+}
+
+void ServedClient::flush(Clock::time_point now) {
+  while (has_unsent()) {
+    const ssize_t count =
+        ::send(fd, output.data() + sent, output.size() - sent, MSG_NOSIGNAL | MSG_DONTWAIT);
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0 && errno != EAGAIN) broken = true;
+    if (count < 0) return;
+    sent += static_cast<std::size_t>(count);
+    last_taken = now;
+  }
+  line_begun = now;  // nothing was read from it until now
+  sent = 0;
+  output.clear();
+  if (output.capacity() > kept_bytes) output = std::string();
 }
 
 }  // namespace
@@ -63,10 +158,7 @@ struct StatusServer::Parts {
   Alarms resting;                 ///< clients over their rate limit, until then
   Alarms subscribers;             ///< time of the next notification
   std::vector<ClientId> broken;
-  AccessGroups groups;
-  std::shared_ptr<AccessGroups> groups_found;  ///< owned by the thread while it is busy
-  Clock::time_point groups_asked{};
-  SideThread groups_thread{"groups"};
+  AccessRules access;
   Clock::time_point time_outs_checked_next{};
   SocketStatistics statistics;
 
@@ -85,8 +177,6 @@ struct StatusServer::Parts {
   void accept_some();
   void take(int fd, Clock::time_point now);
   void refuse(int fd, const std::string& why);
-  [[nodiscard]] PeerAccess access(const Peer& peer, Clock::time_point now);
-  void ask_groups(Clock::duration at_most);
   [[nodiscard]] bool make_room(Clock::time_point now);
   void on_client(ClientId id, std::uint32_t events);
   void arrange(ClientId id, ServedClient& client);
@@ -111,7 +201,8 @@ StatusServer::Parts::Parts(const SocketConfig& config_in, const SocketLimits& li
       limits(limits_in),
       listener(config_in.path),
       dispatcher(config_in),
-      all_tokens(limits.all_requests_per_s, limits.all_requests_burst) {
+      all_tokens(limits.all_requests_per_s, limits.all_requests_burst),
+      access(config_in) {
   limits.clients_max = places_for_descriptors(limits.clients_max);
   limits.operator_places = std::min(limits.operator_places, limits.clients_max / 4);
   epoll_fd = epoll_create1(EPOLL_CLOEXEC);
@@ -121,7 +212,6 @@ StatusServer::Parts::Parts(const SocketConfig& config_in, const SocketLimits& li
     close_own();
     throw SocketError("status socket: epoll is not available");
   }
-  ask_groups(groups_first_within);
 }
 
 bool StatusServer::Parts::watch(int fd, ClientId id, std::uint32_t events,
@@ -150,7 +240,7 @@ void StatusServer::Parts::accept_some() {
 
 void StatusServer::Parts::take(int fd, Clock::time_point now) {
   const std::optional<Peer> peer = peer_of(fd);
-  const PeerAccess allowed = peer ? access(*peer, now) : PeerAccess{};
+  const PeerAccess allowed = peer ? access.of(*peer, now) : PeerAccess{};
   if (!allowed.any() && strangers >= limits.strangers_max) {
     return refuse(fd, "only for members of " + config.read_group);
   }
@@ -178,25 +268,6 @@ void StatusServer::Parts::refuse(int fd, const std::string& why) {
   static_cast<void>(::send(fd, line.data(), line.size(), MSG_NOSIGNAL | MSG_DONTWAIT));
   close(fd);
   ++statistics.refused;
-}
-
-/// Applies group changes within seconds, without a restart.
-PeerAccess StatusServer::Parts::access(const Peer& peer, Clock::time_point now) {
-  if (peer.user == 0) return PeerAccess::of_root();
-  if (now - groups_asked > groups_known_for) ask_groups(groups_within);
-  return access_of(peer, geteuid(), groups);
-}
-
-void StatusServer::Parts::ask_groups(Clock::duration at_most) {
-  if (groups_found) {
-    at_most = {};  // waited for already
-  } else {
-    groups_found = std::make_shared<AccessGroups>();
-    groups_thread.start([found = groups_found, asked = config] { *found = look_up_groups(asked); });
-  }
-  if (!groups_thread.wait(at_most)) return;  // collected at the next call
-  groups = *std::exchange(groups_found, nullptr);
-  groups_asked = Clock::now();
 }
 
 /// Closes the longest idle client if its idle time exceeds the limit.

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <fmt/format.h>
 
-#include "daemon/status/warm_up.hpp"
 #include "estimator/types.hpp"
 
 namespace thermocomp {
@@ -14,12 +13,13 @@ namespace {
 constexpr double at_nothing_um = 0.3;
 
 /// The larger of sent offset and read-back [um]; in a dry run the offset shown by the controller.
-double in_effect_um(const StatusView& view, std::size_t i) {
-  if (view.config.dry_run) {
-    const auto& shown_um = view.controller_health.shown_um;
+double in_effect_um(const DaemonConfig& config, const Report& report,
+                    const ControllerHealth& controller, std::size_t i) {
+  if (config.dry_run) {
+    const auto& shown_um = controller.shown_um;
     return shown_um && std::isfinite((*shown_um)[i]) ? (*shown_um)[i] : 0.0;
   }
-  const AxisReport& axis = view.report.axes[i];
+  const AxisReport& axis = report.axes[i];
   const bool is_read = std::isfinite(axis.applied_um);
   return is_read && std::abs(axis.applied_um) > std::abs(axis.offset_um) ? axis.applied_um
                                                                          : axis.offset_um;
@@ -31,14 +31,15 @@ std::string duration_min(double span_s) {
 }
 
 /// Names the largest of the offsets.
-void add_axes(const StatusView& view, std::vector<std::string>& why) {
+void add_axes(const DaemonConfig& config, const Report& report, const ControllerHealth& controller,
+              std::vector<std::string>& why) {
   std::size_t count = 0;
   double largest_um = 0.0;
   std::string largest;
-  for (std::size_t i = 0; i < view.report.axes.size(); ++i) {
-    const std::string& name = view.config.estimator.axes[i].name;
-    const double um = in_effect_um(view, i);
-    if (view.report.axes[i].proving) {
+  for (std::size_t i = 0; i < report.axes.size(); ++i) {
+    const std::string& name = config.estimator.axes[i].name;
+    const double um = in_effect_um(config, report, controller, i);
+    if (report.axes[i].proving) {
       why.push_back(fmt::format("axis {} is being proved: wait until it has returned", name));
     } else if (std::abs(um) > at_nothing_um) {
       ++count;
@@ -55,13 +56,14 @@ void add_axes(const StatusView& view, std::vector<std::string>& why) {
 }
 
 /// Names the column that changes fastest; the others mostly follow it.
-void add_warming(const StatusView& view, std::vector<std::string>& why) {
-  if (view.trend == nullptr) return;
-  const auto columns = view.config.model.temperature_columns();
+void add_warming(const ThermalModel& model, const Report& report, const TemperatureTrend* trend,
+                 std::vector<std::string>& why) {
+  if (trend == nullptr) return;
+  const auto columns = model.temperature_columns();
   TemperatureTrend::Change fastest;
   std::string name;
   for (std::size_t i = 0; i < columns.size(); ++i) {
-    const auto change = view.trend->change(i, view.report.now, view.report.inputs[i].temp_degC);
+    const auto change = trend->change(i, report.now, report.inputs[i].temp_degC);
     if (!change.is_uneven()) continue;
     if (!name.empty() && std::abs(change.rate_K_per_h) <= std::abs(fastest.rate_K_per_h)) continue;
     fastest = change;
@@ -77,31 +79,33 @@ void add_warming(const StatusView& view, std::vector<std::string>& why) {
 
 }  // namespace
 
-std::vector<std::string> lost_for_reference(const StatusView& view) {
+std::vector<std::string> lost_for_reference(const ThermalModel& model, const Report& report) {
   std::vector<std::string> lost;
-  const auto columns = view.config.model.temperature_columns();
+  const auto columns = model.temperature_columns();
   for (std::size_t i = 0; i < columns.size(); ++i)
-    if (!view.report.inputs[i].good) lost.push_back(columns[i] + " has no good sensor now");
+    if (!report.inputs[i].good) lost.push_back(columns[i] + " has no good sensor now");
   return lost;
 }
 
-std::vector<std::string> against_reference(const StatusView& view) {
+std::vector<std::string> against_reference(const DaemonConfig& config, const Report& report,
+                                           const ControllerHealth& controller,
+                                           const TemperatureTrend* trend) {
   std::vector<std::string> why;
-  add_axes(view, why);
+  add_axes(config, report, controller, why);
   // Without the controller it is held as if it were cutting.
-  if (has_reason(view.report.reasons, Reason::cutting) &&
-      !has_reason(view.report.reasons, Reason::controller_offline))
+  if (has_reason(report.reasons, Reason::cutting) &&
+      !has_reason(report.reasons, Reason::controller_offline))
     why.emplace_back("the controller reports cutting: wait for the end of the cut");
-  add_warming(view, why);
+  add_warming(config.model, report, trend, why);
   return why;
 }
 
-double watched_s(const StatusView& view) {
-  if (view.trend == nullptr) return 0.0;
+double watched_s(const Report& report, const TemperatureTrend* trend) {
+  if (trend == nullptr) return 0.0;
   double shortest_s = to_seconds(TemperatureTrend::window);
-  for (std::size_t i = 0; i < view.report.inputs.size(); ++i)
-    shortest_s = std::min(
-        shortest_s, view.trend->change(i, view.report.now, view.report.inputs[i].temp_degC).span_s);
+  for (std::size_t i = 0; i < report.inputs.size(); ++i)
+    shortest_s =
+        std::min(shortest_s, trend->change(i, report.now, report.inputs[i].temp_degC).span_s);
   return shortest_s;
 }
 

@@ -4,19 +4,27 @@
 #include <string>
 #include <vector>
 
-#include "daemon/status/status_inputs.hpp"
+#include "config/daemon/daemon_config.hpp"
+#include "daemon/status/warm_up.hpp"
+#include "drivers/controllers/controller_link.hpp"
+#include "estimator/pipeline/estimator.hpp"
 
 namespace thermocomp {
 
 /// The model's temperatures without a good sensor, one sentence each: no reference without them.
-[[nodiscard]] std::vector<std::string> lost_for_reference(const StatusView& view);
+[[nodiscard]] std::vector<std::string> lost_for_reference(const ThermalModel& model,
+                                                          const Report& report);
 
 /// The objections to a reference now, one sentence each: an axis is being proved, an offset is
 /// applied, the controller is cutting, the machine warms or cools. Unknown quantities do not count
 /// against it.
-[[nodiscard]] std::vector<std::string> against_reference(const StatusView& view);
+/// @param trend  nullptr: temperatures are not watched
+[[nodiscard]] std::vector<std::string> against_reference(const DaemonConfig& config,
+                                                         const Report& report,
+                                                         const ControllerHealth& controller,
+                                                         const TemperatureTrend* trend);
 
 /// Time for which all temperatures have been watched [s]; slow warming needs half an hour.
-[[nodiscard]] double watched_s(const StatusView& view);
+[[nodiscard]] double watched_s(const Report& report, const TemperatureTrend* trend);
 
 }  // namespace thermocomp

@@ -282,8 +282,9 @@ bool is_of_model_file(const StatusView& view) {
 
 ReferenceStatus reference_of(const StatusView& view) {
   ReferenceStatus status;
-  status.objections = lost_for_reference(view);
-  std::ranges::move(against_reference(view), std::back_inserter(status.objections));
+  status.objections = lost_for_reference(view.config.model, view.report);
+  std::ranges::move(against_reference(view.config, view.report, view.controller_health, view.trend),
+                    std::back_inserter(status.objections));
   status.lost = view.reference_lost;
   const auto columns = view.config.model.temperature_columns();
   for (std::size_t i = 0; i < columns.size(); ++i)
@@ -368,6 +369,18 @@ std::optional<ProbeDueStatus> probe_due_of(const StatusView& view) {
 }
 
 }  // namespace
+
+void add_status_methods(StatusServer& server, const std::function<StatusView()>& view) {
+  const auto add = [&](const char* name, auto answer) {
+    server.add_method(name, AccessClass::read,
+                      [view, answer](const json&) { return answer(view()); });
+  };
+  add("status", [](const StatusView& now) { return json_of(status_of(now)); });
+  add("sensors", [](const StatusView& now) { return json_of(sensors_of(now)); });
+  add("offsets", [](const StatusView& now) { return json_of(offsets_of(now)); });
+  add("timing", [](const StatusView& now) { return json_of(timing_of(now)); });
+  add("model", [](const StatusView& now) { return model_json(now.config); });
+}
 
 std::optional<CandidateStatus> candidate_of(const DaemonConfig& config,
                                             const ModelContest::Score* contest) {

@@ -7,8 +7,10 @@
 #include <stdexcept>
 #include <utility>
 
+#include <nlohmann/json.hpp>
+
 #include "config/model/model_file.hpp"
-#include "status/status_json.hpp"
+#include "status/status.hpp"
 
 namespace thermocomp::fleet {
 namespace {

@@ -14,7 +14,7 @@
 #include "gateway/feed/page_state.hpp"
 #include "gateway/http/http_server.hpp"
 #include "gateway/http/request_rules.hpp"
-#include "status/status_json.hpp"
+#include "status/status.hpp"
 
 namespace thermocomp::gateway {
 namespace {

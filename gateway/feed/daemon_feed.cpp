@@ -17,7 +17,7 @@
 #include "daemon/socket/status_client.hpp"
 #include "daemon/threads/side_thread.hpp"
 #include "gateway/feed/snapshot.hpp"
-#include "status/status_json.hpp"
+#include "status/status.hpp"
 
 namespace thermocomp::gateway {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "status/codes.hpp"
 #include "status/figures.hpp"
-#include "status/status_json.hpp"
+#include "status/status.hpp"
 #include "status/verdict.hpp"
 
 namespace thermocomp::gateway {

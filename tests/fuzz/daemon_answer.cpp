@@ -14,7 +14,7 @@
 #include "gateway/texts/metrics_text.hpp"
 #include "gateway/texts/mqtt_texts.hpp"
 #include "gateway/texts/shdr_text.hpp"
-#include "status/status_json.hpp"
+#include "status/status.hpp"
 #include "status/verdict.hpp"
 
 using namespace thermocomp;

@@ -45,6 +45,7 @@ class Rig {
     controller_.link_epoch = 1;
     controller_.applied_um.fill(0.0);
     step();
+    add_status_methods(server_, [this] { return view(); });
     add_operator_methods(
         server_, {[this] { return view(); }, [this](const Command& asked) { return take(asked); },
                   [](const std::optional<std::filesystem::path>&) -> RpcPending {

@@ -6,12 +6,13 @@
 #include <string>
 #include <utility>
 
+#include <nlohmann/json.hpp>
 #include <system_error>
 
 #include "daemon/history/format/chunk_codec.hpp"
 #include "daemon/history/format/database.hpp"
 #include "daemon/history/format/segments.hpp"
-#include "status/status_json.hpp"
+#include "status/status.hpp"
 
 namespace thermocomp {
 namespace {

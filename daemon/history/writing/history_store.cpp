@@ -7,12 +7,13 @@
 #include <fmt/format.h>
 #include <utility>
 
+#include <nlohmann/json.hpp>
 #include <sys/stat.h>
 #include <system_error>
 
 #include "daemon/history/format/database.hpp"
 #include "daemon/history/format/history_time.hpp"
-#include "status/status_json.hpp"
+#include "status/status.hpp"
 
 namespace thermocomp {
 namespace {

@@ -55,7 +55,7 @@ struct SteppedCycle {
   std::unique_ptr<CycleParts> next_parts(double gain,
                                          const std::vector<std::string>& axes = {"z"}) {
     auto made = parts(gain, axes);
-    made->estimator.plan_adoption(handle.estimator());
+    made->estimator.plan_adoption(cycle.parts().estimator);
     return made;
   }
   void step() {
@@ -63,7 +63,7 @@ struct SteppedCycle {
     cycle.step(next);
     next = cycle.next_after(next, grid.time_of(next));
   }
-  [[nodiscard]] double gain() { return handle.estimator().model().matrix_um_per_K[0][0]; }
+  [[nodiscard]] double gain() { return cycle.parts().estimator.model().matrix_um_per_K[0][0]; }
 
   SteadySource source;
   DryRunController controller;
@@ -110,7 +110,7 @@ TEST_CASE("a command is done with the step that takes it, and the report include
   stepped.handle.poll(stepped.now);
   CHECK(*outcome == Outcome::done);
   CHECK(stepped.done.size() == 1);
-  CHECK_FALSE(stepped.handle.report().enabled);
+  CHECK_FALSE(stepped.cycle.report().enabled);
   CHECK_FALSE(stepped.handle.is_busy());
 }
 
@@ -123,7 +123,7 @@ TEST_CASE("a command that is not taken in time is withdrawn permanently", "[cycl
   CHECK(*outcome == Outcome::withdrawn);
   for (int i = 0; i < 20; ++i) stepped.step();
   stepped.handle.poll(stepped.now + 2 * CycleHandle::patience);
-  CHECK(stepped.handle.report().enabled);
+  CHECK(stepped.cycle.report().enabled);
   CHECK(stepped.done.empty());
 }
 
@@ -141,13 +141,13 @@ TEST_CASE("new parts that are not taken in time are withdrawn, and the next ones
   REQUIRE(stepped.handle.send(disable, stepped.now));
   stepped.step();
   stepped.handle.poll(stepped.now);
-  CHECK_FALSE(stepped.handle.report().enabled);
+  CHECK_FALSE(stepped.cycle.report().enabled);
   auto again = stepped.handle.replace(stepped.next_parts(3.0), stepped.now);
   stepped.step();
   stepped.handle.poll(stepped.now);
   CHECK(*again == Outcome::done);
   CHECK(stepped.gain() == 3.0);
-  CHECK_FALSE(stepped.handle.report().enabled);
+  CHECK_FALSE(stepped.cycle.report().enabled);
 }
 
 TEST_CASE("a change-over that main sees late is completed late", "[cycle]") {
@@ -170,7 +170,7 @@ TEST_CASE("a command of the step in which the parts change is reported by the ne
   stepped.handle.poll(stepped.now);
   CHECK(*parts == Outcome::done);
   CHECK(*command == Outcome::done);
-  CHECK_FALSE(stepped.handle.estimator().persistent_state(stepped.handle.report()).enabled);
+  CHECK_FALSE(stepped.cycle.parts().estimator.persistent_state(stepped.cycle.report()).enabled);
 }
 
 TEST_CASE("new parts wait for commands that name an axis, as they may number axes differently",
@@ -182,11 +182,11 @@ TEST_CASE("new parts wait for commands that name an axis, as they may number axe
   CHECK(stepped.gain() == 1.0);
   stepped.handle.poll(stepped.now);
   CHECK(*command == Outcome::done);
-  CHECK(stepped.handle.report().axes[0].measured_um == 3.0);
+  CHECK(stepped.cycle.report().axes[0].measured_um == 3.0);
   stepped.step();
   stepped.handle.poll(stepped.now);
   CHECK(*parts == Outcome::done);
-  CHECK(stepped.handle.report().axes[1].measured_um == 3.0);
+  CHECK(stepped.cycle.report().axes[1].measured_um == 3.0);
 }
 
 TEST_CASE("commands beyond the queue's capacity are refused, not lost", "[cycle]") {
@@ -216,7 +216,7 @@ TEST_CASE("after the cycle's end exactly the commands it carried out are done", 
   CHECK(*taken == Outcome::done);
   CHECK(*parts == Outcome::done);
   CHECK(*left == Outcome::withdrawn);
-  CHECK_FALSE(stepped.handle.report().enabled);
+  CHECK_FALSE(stepped.cycle.report().enabled);
   auto unused = stepped.handle.replace(stepped.next_parts(3.0), stepped.now);
   stepped.handle.settle();
   CHECK(*unused == Outcome::withdrawn);

@@ -1,11 +1,12 @@
 // The status to JSON and back: random values and invalid JSON.
-#include "status/status_json.hpp"
+#include "status/status.hpp"
 
 #include <random>
 #include <set>
 #include <type_traits>
 
 #include <catch2/catch.hpp>
+#include <nlohmann/json.hpp>
 
 #include "status/codes.hpp"
 

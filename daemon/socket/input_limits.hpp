@@ -1,19 +1,17 @@
-/// One connection of the status server: socket, buffers, rate limit and state. Only for this
-/// folder's .cpp files.
+/// What a client of the status socket may send: the length of a line and the rate of requests. Only
+/// for this folder's .cpp files.
 #pragma once
 
 #include <algorithm>
 #include <chrono>
 #include <cstddef>
-#include <cstdint>
-#include <functional>
-#include <optional>
 #include <string>
 #include <string_view>
 
-#include "daemon/socket/rpc.hpp"
-
 namespace thermocomp {
+
+/// Buffer capacity that an idle client keeps.
+inline constexpr std::size_t kept_bytes = 2048;
 
 /// Splits input into lines; holds at most the longest line and one read.
 class LineBuffer {
@@ -39,6 +37,35 @@ class LineBuffer {
   std::size_t end_{std::string::npos};  ///< its '\n'
   std::size_t searched_{0};             ///< bytes before this were searched for '\n'
 };
+
+inline void LineBuffer::add(std::string_view bytes) {
+  bytes_.append(bytes);
+  if (!has_line()) find_end();
+}
+
+inline bool LineBuffer::take(std::string& line) {
+  if (!has_line() || is_too_long()) return false;
+  std::size_t length = end_ - begin_;
+  if (length > 0 && bytes_[begin_ + length - 1] == '\r') --length;
+  line.assign(bytes_, begin_, length);
+  begin_ = searched_ = end_ + 1;
+  find_end();
+  return true;
+}
+
+inline bool LineBuffer::is_too_long() const noexcept {
+  return (has_line() ? end_ : bytes_.size()) - begin_ > line_bytes_max;
+}
+
+/// Finds the next line end; releases unused capacity.
+inline void LineBuffer::find_end() {
+  end_ = bytes_.find('\n', searched_);
+  if (has_line()) return;
+  bytes_.erase(0, begin_);
+  begin_ = 0;
+  searched_ = bytes_.size();
+  if (bytes_.empty() && bytes_.capacity() > kept_bytes) bytes_ = std::string();
+}
 
 /// Rate limit with bursts: level l grows by `per_s` up to `burst`; taking one needs l >= 1.
 /// Time is an argument.
@@ -74,57 +101,6 @@ class TokenBucket {
   double burst_;
   double level_;
   Clock::time_point filled_at_{};
-};
-
-struct ServedClient {
-  using Clock = std::chrono::steady_clock;
-
-  /// Takes over the descriptor.
-  ServedClient(int fd_in, const PeerAccess& access_in, const TokenBucket& tokens_in,
-               Clock::time_point now);
-  ~ServedClient();
-  ServedClient(const ServedClient&) = delete;
-  ServedClient& operator=(const ServedClient&) = delete;
-
-  /// One read. May set input_ended or broken.
-  void receive(Clock::time_point now);
-  /// Sends what the socket accepts, keeps the rest. May set broken.
-  void send(std::string_view text, Clock::time_point now);
-  void flush(Clock::time_point now);
-  [[nodiscard]] bool has_unsent() const noexcept { return sent < output.size(); }
-  [[nodiscard]] std::size_t held_bytes() const noexcept {
-    return input.capacity_bytes() + output.capacity();
-  }
-  /// No request, answer or subscription is pending.
-  [[nodiscard]] bool is_idle() const noexcept {
-    return !subscription && !queued && !has_unsent() && !later;
-  }
-
-  int fd;
-  PeerAccess access;
-  std::int64_t user{-1};  ///< from the kernel; -1: unknown
-  TokenBucket tokens;
-  LineBuffer input;
-  std::string output;
-  std::size_t sent{0};  ///< bytes of `output` already sent
-
-  bool input_ended{false};  ///< the peer sends no more; answers may be pending
-  bool hung_up{false};      ///< the peer does not read either; received requests are still served
-  bool close_when_sent{false};
-  bool broken{false};  ///< unusable
-  bool ended{false};   ///< to be closed at the end of the turn
-  bool queued{false};  ///< waits for its turn or its rate limit
-  std::uint32_t watched{0};
-  std::size_t counted_bytes{0};  ///< last held_bytes() added to the statistics
-
-  std::function<bool(Answer&)> later;  ///< Answer::later of the request under way
-  std::optional<Subscription> subscription;
-  Clock::time_point notified_next{};
-  std::uint64_t missed{0};  ///< notifications since the last one sent
-
-  Clock::time_point last_request;  ///< or time of connection
-  Clock::time_point line_begun;    ///< while input.is_partial()
-  Clock::time_point last_taken;    ///< time when the peer took bytes or nothing was pending
 };
 
 }  // namespace thermocomp

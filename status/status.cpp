@@ -1,10 +1,12 @@
-#include "status/status_json.hpp"
+#include "status/status.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <concepts>
 #include <limits>
 #include <type_traits>
+
+#include <nlohmann/json.hpp>
 
 #include "status/codes.hpp"
 
