@@ -67,6 +67,19 @@ ThermalModel corrected(ThermalModel model, const std::vector<Eigen::VectorXd>& e
   return model;
 }
 
+/// Takes the fitted coefficients of the outputs that they and the finding leave no worse on the
+/// test runs. Fitted beside a finding of approximate form they fit its error, and are wrong
+/// elsewhere.
+void take_coefficients(Extended& longer, const ThermalModel& fitted, const Extended& before,
+                       const MeasuredData& test) {
+  longer.model.matrix_um_per_K = fitted.matrix_um_per_K;
+  const std::vector<Residuals> was = residuals(before, test);
+  const std::vector<Residuals> is = residuals(longer, test);
+  for (std::size_t output = 0; output < was.size(); ++output)
+    if (root_mean_square(is[output]) > root_mean_square(was[output]))
+      longer.model.matrix_um_per_K[output] = before.model.matrix_um_per_K[output];
+}
+
 /// Extends the model by one finding after another, its coefficients fitted anew with the first, and
 /// measures the gain of each. A finding that the test runs contradict is reported, not added.
 Extended extend(Diagnosis& diagnosis, const SearchResult& result, const MeasuredData& train,
@@ -76,9 +89,9 @@ Extended extend(Diagnosis& diagnosis, const SearchResult& result, const Measured
   for (const Finding& finding : result.findings) {
     NamedFinding name = named_finding(finding, train, parameters_of(finding, train));
     Extended longer = extended;
-    longer.model.matrix_um_per_K = fitted.matrix_um_per_K;
-    if (add_finding(longer, finding, train))
-      name.test = gains_on_test(extended, longer, name.outputs, test);
+    const bool acts = add_finding(longer, finding, train);
+    take_coefficients(longer, fitted, extended, test);
+    if (acts) name.test = gains_on_test(extended, longer, name.outputs, test);
     if (!fails_on_test_runs(name)) extended = std::move(longer);
     diagnosis.findings.push_back(std::move(name));
   }

@@ -462,6 +462,22 @@ TEST_CASE("test runs change no finding and no parameter", "[diagnosis]") {
   CHECK(write_model(a.extended) == write_model(b.extended));
 }
 
+TEST_CASE("an output keeps coefficients whose correction leaves it worse on the test runs",
+          "[diagnosis]") {
+  const auto jump_and_error = [](double, double rise_K, int row) {
+    return (row >= 300 ? 20.0 : 0.0) + 0.1 * rise_K;
+  };
+  const RunFile test = run_with(2, 400, [](double, double, int) { return 0.0; });
+  const Diagnosis answer =
+      diagnose(one_input(), {run_with(1, 600, jump_and_error)}, {"a"}, {test}, {"b"});
+  REQUIRE(answer.findings.size() == 1);
+  CHECK(answer.findings[0].cause == "displacement_step");
+  CHECK(answer.extended.matrix_um_per_K == one_input().matrix_um_per_K);
+
+  const Diagnosis borne_out = diagnosis_of(jump_and_error);
+  CHECK(borne_out.extended.matrix_um_per_K[0][0] == Approx(5.1).epsilon(0.005));
+}
+
 TEST_CASE("missing values are left out, and a run without any is refused", "[diagnosis]") {
   RunFile train = run_with(1, 600, [](double rpm, double, int) { return 4e-7 * rpm * rpm; });
   for (std::size_t row = 0; row < train.rows(); row += 3) train.values[3][row] = NAN;
