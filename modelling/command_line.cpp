@@ -4,19 +4,9 @@
 
 #include <CLI/CLI.hpp>
 
-#include "modelling/diagnosis/diagnosis.hpp"
-#include "modelling/experiments/plan_command.hpp"
-#include "modelling/fit_command.hpp"
-#include "modelling/identification/equation/group_command.hpp"
-#include "modelling/identification/gate/tiebar_command.hpp"
-#include "modelling/inspection/inspect_command.hpp"
-#include "modelling/series/series_command.hpp"
 #include "report/command.hpp"
 #ifdef THERMOCOMP_WITH_STRUCTURE
-#include "modelling/placement/place_command.hpp"
-#include "modelling/structure/structure_command.hpp"
 #endif
-#include "modelling/thermal_test/thermal_test_command.hpp"
 
 namespace thermocomp {
 namespace {

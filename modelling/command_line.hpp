@@ -14,4 +14,43 @@ namespace thermocomp {
 ///                status
 void declare_modelling_command_line(CLI::App& app, std::function<int()>& action);
 
+/// fit: sensors and equation from measured runs.
+void add_fit_command(CLI::App& app, std::function<int()>& action);
+
+namespace diagnosis {
+/// diagnose: what a model gets wrong in measured runs, and why.
+void add_diagnose_command(CLI::App& app, std::function<int()>& action);
+}  // namespace diagnosis
+namespace experiments {
+/// plan: tests from factors and levels.
+void add_plan_command(CLI::App& app, std::function<int()>& action);
+}  // namespace experiments
+namespace identification {
+/// group: places that warm alike.
+void add_group_command(CLI::App& app, std::function<int()>& action);
+/// tiebar: coefficients of a gate-shaped machine with one or more ties, and the ties with the
+/// smallest swing on measured temperatures.
+void add_tiebar_command(CLI::App& app, std::function<int()>& action);
+}  // namespace identification
+namespace inspection {
+/// inspect: faults of recordings and what they can identify.
+void add_inspect_command(CLI::App& app, std::function<int()>& action);
+}  // namespace inspection
+namespace placement {
+/// place: placement of sensors.
+void add_place_command(CLI::App& app, std::function<int()>& action);
+}  // namespace placement
+namespace series {
+/// series: model of a type from runs of its machines.
+void add_series_command(CLI::App& app, std::function<int()>& action);
+}  // namespace series
+namespace structure {
+/// structure: finite elements of a machine's structure.
+void add_structure_command(CLI::App& app, std::function<int()>& action);
+}  // namespace structure
+namespace thermal_test {
+/// thermal-test: plans and reports of tests to ISO 230-3.
+void add_thermal_test_command(CLI::App& app, std::function<int()>& action);
+}  // namespace thermal_test
+
 }  // namespace thermocomp

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "modelling/experiments/all_pairs.hpp"
+#include "modelling/experiments/designs.hpp"
 
 namespace {
 

@@ -22,7 +22,7 @@
 #include "config/toml/toml_reader.hpp"
 #include "daemon/history/replay/replay.hpp"
 #include "daemon/socket/status_client.hpp"
-#include "report/output_file.hpp"
+#include "report/files.hpp"
 #include "status/status.hpp"
 
 namespace thermocomp::cli {

@@ -12,8 +12,7 @@
 #include "config/runs/run_file.hpp"
 #include "daemon/history/replay/replay.hpp"
 #include "daemon/history/replay/run_replay.hpp"
-#include "report/output_file.hpp"
-#include "report/run_loader.hpp"
+#include "report/files.hpp"
 #include "report/terminal.hpp"
 
 namespace thermocomp::cli {

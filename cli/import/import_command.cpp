@@ -12,8 +12,7 @@
 #include "cli/commands.hpp"
 #include "cli/import/import_runs.hpp"
 #include "config/runs/run_file.hpp"
-#include "report/output_file.hpp"
-#include "report/run_loader.hpp"
+#include "report/files.hpp"
 
 namespace thermocomp::cli {
 namespace {

@@ -21,7 +21,7 @@
 #include "config/daemon/daemon_config.hpp"
 #include "config/model/model_file.hpp"
 #include "config/toml/toml_text.hpp"
-#include "report/output_file.hpp"
+#include "report/files.hpp"
 #include "report/terminal.hpp"
 
 namespace thermocomp::cli {

@@ -8,7 +8,7 @@
 #include "config/toml/toml_reader.hpp"
 #include "daemon/socket/status_client.hpp"
 #include "report/command.hpp"
-#include "report/output_file.hpp"
+#include "report/files.hpp"
 
 namespace thermocomp::cli {
 namespace {

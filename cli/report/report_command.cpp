@@ -10,7 +10,7 @@
 #include "cli/report/machine_week.hpp"
 #include "cli/report/week_page.hpp"
 #include "daemon/history/format/history_time.hpp"
-#include "report/output_file.hpp"
+#include "report/files.hpp"
 
 namespace thermocomp::cli {
 namespace {

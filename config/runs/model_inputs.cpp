@@ -3,11 +3,203 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <cstdio>
+#include <filesystem>
 #include <string_view>
 
+#include <system_error>
+
+#include "config/runs/robust.hpp"
+#include "config/text/printable_text.hpp"
 #include "config/text/problems.hpp"
+#include "config/text/units.hpp"
 
 namespace thermocomp {
+namespace {
+
+bool same_file(const std::string& a, const std::string& b) {
+  if (a == b) return true;
+  std::error_code failed;
+  return std::filesystem::equivalent(a, b, failed) && !failed;
+}
+
+[[noreturn]] void refuse(const RunFile& run, const RunFile& other, const char* rule) {
+  // The other one is named only if it is the same file by another path.
+  throw ConfigurationError(
+      {Problem{run.name, 0, "", other.name == run.name ? "" : other.name, rule}});
+}
+
+}  // namespace
+
+bool share_rows(const RunFile& a, const RunFile& b) {
+  return same_file(a.name, b.name) &&
+         std::max(a.selected_begin, b.selected_begin) < std::min(a.selected_end, b.selected_end);
+}
+
+void refuse_overlap(std::span<const RunFile> runs) {
+  for (std::size_t i = 0; i < runs.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      if (share_rows(runs[i], runs[j]))
+        refuse(runs[i], runs[j], "is given twice: rows that are left out would be fitted");
+}
+
+void refuse_overlap(std::span<const RunFile> train, std::span<const RunFile> test) {
+  for (const RunFile& judged : test)
+    for (const RunFile& fitted : train)
+      if (share_rows(judged, fitted))
+        refuse(judged, fitted,
+               "is judged on rows that are fitted: train and test must not overlap");
+}
+
+namespace {
+
+constexpr std::size_t side = 4;
+constexpr std::size_t rows_min = 2 * side + 1;
+constexpr double usual_deviations = 12.0;
+constexpr double share_of_way = 0.25;
+/// At an end, only its size distinguishes an outlier from a first step of the machine.
+constexpr double share_of_way_at_end = 0.5;
+constexpr double share_max = 0.1;  ///< of the values; more are the column's own course
+constexpr std::size_t stuck_rows_min = 10;
+constexpr std::size_t stuck_longer_min = 3;  ///< times the second longest stretch of one value
+constexpr std::size_t times_named_max = 6;
+
+using Values = std::vector<double>;
+
+/// Robust line (median of pairwise slopes) through the values next to an end, evaluated at the end.
+double line_at_end(const Values& values, bool front) {
+  const std::size_t count = 2 * side;
+  const auto at = [&](std::size_t i) { return front ? values[i] : values[values.size() - 1 - i]; };
+  Values slopes;
+  for (std::size_t i = 1; i <= side; ++i)
+    slopes.push_back((at(i + side) - at(i)) / static_cast<double>(side));
+  const double slope = median(slopes);
+  Values levels;
+  for (std::size_t i = 1; i <= count; ++i) levels.push_back(at(i) - slope * static_cast<double>(i));
+  return median(levels);
+}
+
+/// Deviation of each value from its neighbours.
+Values leaps_of(const Values& values) {
+  Values leaps(values.size());
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const bool at_end = i == 0 || i + 1 == values.size();
+    leaps[i] = values[i] - (at_end ? line_at_end(values, i == 0) : median_around(values, i, side));
+  }
+  return leaps;
+}
+
+/// Range of the running median, without 2 % at either end.
+double way_of(const Values& values, const Values& leaps) {
+  Values expected;
+  for (std::size_t i = 0; i < values.size(); ++i) expected.push_back(values[i] - leaps[i]);
+  std::sort(expected.begin(), expected.end());
+  const std::size_t rim = expected.size() / 50;
+  return expected[expected.size() - 1 - rim] - expected[rim];
+}
+
+Blunders blunders_of(const RunFile& run, const std::string& column) {
+  Blunders found;
+  found.column = column;
+  Values values;
+  Values times_s;
+  const Values& all = run.column(column);
+  for (std::size_t row = 0; row < all.size(); ++row) {
+    if (!std::isfinite(all[row])) continue;
+    values.push_back(all[row]);
+    times_s.push_back(run.time_s()[row]);
+  }
+  // Repeated without the outliers found: one next to an end bends the line there.
+  while (values.size() >= rows_min) {
+    const Values leaps = leaps_of(values);
+    const double usual_um = usual_deviations * robust_deviation(leaps);
+    const double way_um = way_of(values, leaps);
+    const double limit_um = std::max(usual_um, share_of_way * way_um);
+    const double limit_at_end_um = std::max(usual_um, share_of_way_at_end * way_um);
+    if (found.times_s.empty()) found.limit_um = limit_um;
+    std::vector<std::size_t> off;
+    for (std::size_t i = 0; i < leaps.size(); ++i) {
+      const bool at_end = i == 0 || i + 1 == leaps.size();
+      if (std::abs(leaps[i]) > (at_end ? limit_at_end_um : limit_um)) off.push_back(i);
+    }
+    if (off.empty()) break;
+    for (auto i = off.rbegin(); i != off.rend(); ++i) {
+      if (std::abs(leaps[*i]) > std::abs(found.size_um)) found.size_um = leaps[*i];
+      found.times_s.push_back(times_s[*i]);
+      values.erase(values.begin() + static_cast<std::ptrdiff_t>(*i));
+      times_s.erase(times_s.begin() + static_cast<std::ptrdiff_t>(*i));
+    }
+  }
+  const auto count = static_cast<double>(found.times_s.size());
+  if (count > share_max * (count + static_cast<double>(values.size()))) return Blunders{};
+  std::sort(found.times_s.begin(), found.times_s.end());
+  return found;
+}
+
+/// The longest stretch of one value, if it ends with a jump larger than any usual change.
+Blunders stuck_of(const RunFile& run, const std::string& column) {
+  Blunders found;
+  found.column = column;
+  found.stuck = true;
+  const Values& values = run.column(column);
+  const auto [still, second] = longest_still(values);
+  if (still.rows() < stuck_rows_min || still.rows() < stuck_longer_min * second ||
+      still.end >= values.size())
+    return found;
+  Values changes;
+  for (std::size_t i = 1; i < values.size(); ++i)
+    if ((i <= still.begin || i > still.end) && std::isfinite(values[i] - values[i - 1]))
+      changes.push_back(values[i] - values[i - 1]);
+  if (changes.size() < rows_min) return found;
+  Values finite = values;
+  std::erase_if(finite, [](double each) { return !std::isfinite(each); });
+  const auto [least, most] = std::minmax_element(finite.begin(), finite.end());
+  found.limit_um =
+      std::max(usual_deviations * robust_deviation(changes), share_of_way * (*most - *least));
+  found.size_um = values[still.end] - values[still.end - 1];
+  if (!(found.limit_um > 0 && std::abs(found.size_um) > found.limit_um)) return found;
+  for (std::size_t i = still.begin + 1; i < still.end; ++i)
+    found.times_s.push_back(run.time_s()[i]);
+  return found;
+}
+
+}  // namespace
+
+std::string Blunders::text() const {
+  const std::string unit(unit_of(column).symbol);
+  if (stuck)
+    return column + ": " + std::to_string(times_s.size()) + " values are left out, the same from " +
+           number_text(times_s.front()) + " to " + number_text(times_s.back()) +
+           " s, then a leap of " + number_text(std::round(10.0 * size_um) / 10.0) + " " + unit;
+  std::string text = column + ": " + std::to_string(times_s.size()) +
+                     (times_s.size() == 1 ? " value is" : " values are") +
+                     " left out, off the neighbours by up to ";
+  char size[32];
+  std::snprintf(size, sizeof size, "%+.4g ", size_um);
+  text += size + unit + " (limit " + number_text(std::round(10.0 * limit_um) / 10.0) + "), at ";
+  for (std::size_t i = 0; i < std::min(times_s.size(), times_named_max); ++i)
+    text += (i == 0 ? "" : ", ") + number_text(times_s[i]);
+  return text + (times_s.size() > times_named_max ? ", ... s" : " s");
+}
+
+std::vector<Blunders> leave_out_blunders(RunFile& run, const std::vector<std::string>& columns) {
+  std::vector<Blunders> all;
+  for (const std::string& column : columns) {
+    if (!run.find(column)) continue;
+    Blunders found = blunders_of(run, column);
+    if (!found.times_s.empty()) all.push_back(std::move(found));
+    Blunders stuck = stuck_of(run, column);
+    if (!stuck.times_s.empty()) all.push_back(std::move(stuck));
+  }
+  for (const Blunders& each : all) {
+    std::vector<double>& values = run.values[*run.find(each.column)];
+    for (std::size_t row = 0; row < values.size(); ++row)
+      if (std::binary_search(each.times_s.begin(), each.times_s.end(), run.time_s()[row]))
+        values[row] = std::nan("");
+  }
+  return all;
+}
+
 namespace {
 
 using Columns = std::vector<const std::vector<double>*>;

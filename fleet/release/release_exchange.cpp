@@ -9,7 +9,7 @@
 
 #include "config/daemon/daemon_config.hpp"
 #include "config/toml/toml_reader.hpp"
-#include "report/output_file.hpp"
+#include "report/files.hpp"
 
 namespace thermocomp::fleet {
 namespace {

@@ -20,7 +20,7 @@
 #include "daemon/history/format/history_time.hpp"
 #include "fleet/store/machine_rows.hpp"
 #include "fleet/store/store.hpp"
-#include "report/run_loader.hpp"
+#include "report/files.hpp"
 
 namespace thermocomp::fleet {
 namespace {

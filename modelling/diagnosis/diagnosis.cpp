@@ -11,14 +11,14 @@
 #include <CLI/CLI.hpp>
 
 #include "config/model/model_file.hpp"
-#include "config/runs/blunders.hpp"
+#include "config/runs/model_inputs.hpp"
+#include "modelling/command_line.hpp"
 #include "modelling/diagnosis/answer/diagnosis_report.hpp"
 #include "modelling/diagnosis/answer/findings.hpp"
 #include "modelling/diagnosis/causes/cause.hpp"
 #include "modelling/diagnosis/rank/search.hpp"
 #include "modelling/diagnosis/thermal_diagnosis.hpp"
-#include "report/output_file.hpp"
-#include "report/run_loader.hpp"
+#include "report/files.hpp"
 #include "report/terminal.hpp"
 #ifdef THERMOCOMP_WITH_STRUCTURE
 #include "modelling/diagnosis/network/thermal_body.hpp"

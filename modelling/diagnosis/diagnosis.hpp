@@ -1,4 +1,4 @@
-/// Diagnosis of measured runs; `thermocomp diagnose`.
+/// Diagnosis of measured runs.
 #pragma once
 
 #include <functional>
@@ -7,10 +7,6 @@
 
 #include "config/runs/run_file.hpp"
 #include "modelling/diagnosis/answer/answer.hpp"
-
-namespace CLI {  // NOLINT(readability-identifier-naming): the name is that of CLI11
-class App;
-}
 
 namespace thermocomp::diagnosis {
 
@@ -27,8 +23,5 @@ struct ReportData;
                                  const std::vector<std::string>& test_names,
                                  ReportData* report = nullptr,
                                  const std::function<void()>& progress = nullptr);
-
-/// @param action  set when the command line asks for this command; returns the exit status
-void add_diagnose_command(CLI::App& app, std::function<int()>& action);
 
 }  // namespace thermocomp::diagnosis

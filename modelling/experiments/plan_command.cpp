@@ -1,5 +1,3 @@
-#include "modelling/experiments/plan_command.hpp"
-
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -8,10 +6,10 @@
 
 #include <CLI/CLI.hpp>
 
+#include "modelling/command_line.hpp"
 #include "modelling/experiments/separation.hpp"
 #include "modelling/experiments/test_plan.hpp"
-#include "report/output_file.hpp"
-#include "report/run_loader.hpp"
+#include "report/files.hpp"
 
 namespace thermocomp::experiments {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "config/runs/blunders.hpp"
+#include "config/runs/model_inputs.hpp"
 #include "config/text/printable_text.hpp"
 #include "config/text/units.hpp"
 #include "modelling/identification/printed.hpp"

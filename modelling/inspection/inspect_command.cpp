@@ -1,5 +1,3 @@
-#include "modelling/inspection/inspect_command.hpp"
-
 #include <algorithm>
 #include <memory>
 #include <string>
@@ -7,10 +5,10 @@
 
 #include <CLI/CLI.hpp>
 
+#include "modelling/command_line.hpp"
 #include "modelling/inspection/inspection.hpp"
 #include "modelling/series/series.hpp"
-#include "report/output_file.hpp"
-#include "report/run_loader.hpp"
+#include "report/files.hpp"
 #include "report/terminal.hpp"
 
 namespace thermocomp::inspection {

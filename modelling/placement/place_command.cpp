@@ -1,5 +1,3 @@
-#include "modelling/placement/place_command.hpp"
-
 #include <map>
 #include <memory>
 #include <string>
@@ -7,9 +5,10 @@
 #include <CLI/CLI.hpp>
 
 #include "config/text/printable_text.hpp"
+#include "modelling/command_line.hpp"
 #include "modelling/placement/comparison.hpp"
 #include "modelling/structure/pictures.hpp"
-#include "report/output_file.hpp"
+#include "report/files.hpp"
 #include "report/terminal.hpp"
 
 namespace thermocomp::placement {

@@ -1,5 +1,3 @@
-#include "modelling/series/series_command.hpp"
-
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
@@ -9,10 +7,10 @@
 
 #include <CLI/CLI.hpp>
 
+#include "modelling/command_line.hpp"
 #include "modelling/identification/printed.hpp"
 #include "modelling/series/series.hpp"
-#include "report/output_file.hpp"
-#include "report/run_loader.hpp"
+#include "report/files.hpp"
 
 namespace thermocomp::series {
 namespace {

@@ -1,5 +1,3 @@
-#include "modelling/structure/structure_command.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -18,11 +16,11 @@
 #include "config/runs/model_inputs.hpp"
 #include "config/text/problems.hpp"
 #include "config/text/units.hpp"
+#include "modelling/command_line.hpp"
 #include "modelling/structure/heat_model.hpp"
 #include "modelling/structure/pictures.hpp"
 #include "modelling/structure/structure_model.hpp"
-#include "report/output_file.hpp"
-#include "report/run_loader.hpp"
+#include "report/files.hpp"
 #include "report/terminal.hpp"
 
 namespace thermocomp::structure {

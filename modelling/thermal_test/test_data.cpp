@@ -6,7 +6,6 @@
 #include <iterator>
 #include <optional>
 
-#include "config/runs/blunders.hpp"
 #include "config/runs/model_inputs.hpp"
 #include "config/text/problems.hpp"
 #include "config/text/units.hpp"

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "config/runs/run_file.hpp"
-#include "modelling/thermal_test/drift_course.hpp"
 
 namespace thermocomp::thermal_test {
 
@@ -46,6 +45,12 @@ struct TestPhases {
   double running_from_s{0.0};
   double running_to_s{0.0};
   std::string description;  ///< sentence on how the phases were found
+};
+
+/// Values of a probe without missing ones.
+struct MeasuredCourse {
+  std::vector<double> time_s;
+  std::vector<double> value;
 };
 
 struct TestAxis {

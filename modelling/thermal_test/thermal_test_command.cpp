@@ -1,5 +1,3 @@
-#include "modelling/thermal_test/thermal_test_command.hpp"
-
 #include <cstdio>
 #include <map>
 #include <memory>
@@ -9,13 +7,13 @@
 #include <CLI/CLI.hpp>
 
 #include "daemon/history/replay/record_loader.hpp"
+#include "modelling/command_line.hpp"
 #include "modelling/thermal_test/part_test.hpp"
 #include "modelling/thermal_test/test_data.hpp"
 #include "modelling/thermal_test/test_report.hpp"
 #include "modelling/thermal_test/test_sheet.hpp"
 #include "report/command.hpp"
-#include "report/output_file.hpp"
-#include "report/run_loader.hpp"
+#include "report/files.hpp"
 
 namespace thermocomp::thermal_test {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "config/runs/run_file.hpp"
-#include "report/run_loader.hpp"
+#include "report/files.hpp"
 
 namespace thermocomp::cli {
 

@@ -1,5 +1,3 @@
-#include "modelling/identification/equation/group_command.hpp"
-
 #include <cstdio>
 #include <memory>
 #include <string>
@@ -7,9 +5,9 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "modelling/command_line.hpp"
 #include "modelling/identification/equation/similarity.hpp"
-#include "report/output_file.hpp"
-#include "report/run_loader.hpp"
+#include "report/files.hpp"
 #include "report/svg_plot.hpp"
 
 namespace thermocomp::identification {

@@ -1,5 +1,3 @@
-#include "modelling/identification/gate/tiebar_command.hpp"
-
 #include <cstdio>
 #include <memory>
 #include <optional>
@@ -10,13 +8,12 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "modelling/command_line.hpp"
 #include "modelling/identification/gate/gate_file.hpp"
-#include "modelling/identification/gate/one_tie.hpp"
 #include "modelling/identification/gate/tie_course.hpp"
 #include "modelling/identification/gate/tied_columns.hpp"
 #include "modelling/identification/printed.hpp"
-#include "report/output_file.hpp"
-#include "report/run_loader.hpp"
+#include "report/files.hpp"
 
 namespace thermocomp::identification {
 namespace {

@@ -1,10 +1,74 @@
 #include "modelling/identification/gate/tied_columns.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 
 #include <Eigen/Cholesky>
 
+#include "estimator/checks.hpp"
+#include "modelling/identification/printed.hpp"
+#include "report/svg_plot.hpp"
+
 namespace thermocomp::identification {
+
+double ColumnBeam::thermal_deflection_mm_per_K(double height_mm) const {
+  const double l1 = heated_height_mm;
+  const double shape_mm2 = height_mm <= l1 ? height_mm * height_mm : l1 * (2.0 * height_mm - l1);
+  return curvature_per_mm_K * (shape_mm2 / 2.0 + foot_length_mm * height_mm);
+}
+
+double ColumnBeam::thermal_tilt_per_K(double height_mm) const {
+  return curvature_per_mm_K * (std::min(height_mm, heated_height_mm) + foot_length_mm);
+}
+
+double ColumnBeam::deflection_mm_per_N(double height_mm, double force_at_mm) const {
+  const double low = std::min(height_mm, force_at_mm);
+  const double high = std::max(height_mm, force_at_mm);
+  const double held_mm3 = poisson_ratio * foot_length_mm * low * high;
+  return (low * low * (3.0 * high - low) / 6.0 - held_mm3) / bending_stiffness_Nmm2 +
+         low * shear_compliance_per_N;
+}
+
+double ColumnBeam::deflection_per_N(double height_mm, double moment_at_mm) const {
+  const double low = std::min(height_mm, moment_at_mm);
+  const double held_mm2 = poisson_ratio * foot_length_mm * height_mm;
+  return (low * (2.0 * height_mm - low) / 2.0 - held_mm2) / bending_stiffness_Nmm2;
+}
+
+double ColumnBeam::tilt_per_Nmm(double height_mm, double moment_at_mm) const {
+  return (std::min(height_mm, moment_at_mm) - poisson_ratio * foot_length_mm) /
+         bending_stiffness_Nmm2;
+}
+
+double rectangle_shear_area_mm2(double width_mm, double depth_mm, double wall_mm) {
+  if (2.0 * wall_mm >= std::min(width_mm, depth_mm)) return 5.0 / 6.0 * width_mm * depth_mm;
+  const double h = width_mm - wall_mm;  // between the middles of the walls
+  const double b = depth_mm - wall_mm;
+  const double inertia_per_wall_mm3 = h * h * h / 6.0 + b * h * h / 2.0;
+  const double flow_per_wall_mm5 =
+      h * h * (b * b * b / 24.0 + h * b * b / 8.0 + h * h * b / 12.0 + h * h * h / 60.0);
+  return wall_mm * inertia_per_wall_mm3 * inertia_per_wall_mm3 / flow_per_wall_mm5;
+}
+
+double held_foot_length_mm(double width_mm, double depth_mm, double poisson_ratio) {
+  const double slender = depth_mm / width_mm;
+  return width_mm * poisson_ratio * (1.0 + 0.73 * poisson_ratio * poisson_ratio) *
+         (0.064 + 0.149 * slender + 0.023 * slender * slender);
+}
+
+double bonded_end_compliance_mm_per_N(double thickness_mm, double depth_mm, double column_width_mm,
+                                      double modulus_MPa, double poisson_ratio) {
+  const double a = thickness_mm;
+  const double b = depth_mm;
+  const double shape_mm =
+      a * std::asinh(b / a) + b * std::asinh(a / b) +
+      (std::pow(a, 3) + std::pow(b, 3) - std::pow(std::hypot(a, b), 3)) / (3.0 * a * b);
+  const double face = (1.0 - poisson_ratio * poisson_ratio) * 2.0 * shape_mm / (a * b);
+  const double axis = (1.0 + poisson_ratio) * (3.0 - 2.0 * poisson_ratio) / column_width_mm;
+  return std::max(0.0, face - axis) / (std::numbers::pi * modulus_MPa);
+}
+
 namespace {
 
 constexpr double um_per_mm = 1000.0;
@@ -142,6 +206,80 @@ TiedCoefficients tied_coefficients(const TiedColumns& columns) {
                             tie.expansion_per_K);
   }
   return k;
+}
+
+namespace {
+
+constexpr double lowest_tie = 0.2;  // of the working height
+constexpr double highest_tie = 3.0;
+constexpr int steps = 2800;
+
+/// One curve per beta; `value` is evaluated with the tie at l / a.
+template <class Value>
+Drawing curves_over_a(const TiedColumns& columns, const std::string& title, const std::string& unit,
+                      Value value) {
+  const double own_beta =
+      stiffness_ratio(columns) *
+      std::pow(columns.ties.front().height_mm / columns.working_height_mm, 3);  // km/kc = beta a^3
+  std::vector<double> ratios;
+  for (double a = 1.0 / highest_tie; a <= 1.0 / lowest_tie; a += 0.01) ratios.push_back(a);
+  const std::vector betas{own_beta, 0.01, 0.1, 0.5, 1.0};
+  const std::vector colours{"#000000", "#1b6ca8", "#c8502c", "#3a8a3a", "#7b4fa0"};
+  std::vector<std::vector<double>> values(betas.size());
+  PlotPanel panel{title, unit, {}, 250.0};
+  for (std::size_t i = 0; i < betas.size(); ++i) {
+    TiedColumns other = columns;
+    Tie& tie = other.ties.front();
+    tie.area_mm2 *= own_beta / betas[i];
+    for (const double a : ratios) {
+      tie.height_mm = columns.working_height_mm / a;
+      values[i].push_back(value(tied_coefficients(other)));
+    }
+    const bool own = i == 0;
+    panel.lines.push_back({printed(own ? "this machine, beta %.3g" : "beta %.2g", betas[i]),
+                           colours[i], values[i], false, own ? 0U : 1U});
+  }
+  return curves_drawing(ratios, "l / l4", {panel});
+}
+
+}  // namespace
+
+double stiffness_ratio(const TiedColumns& columns) {
+  THERMOCOMP_ENSURE(columns.ties.size() == 1);
+  const Tie& tie = columns.ties.front();
+  const double column =
+      3.0 * columns.column_modulus_MPa * columns.column_inertia_mm4 / std::pow(tie.height_mm, 3);
+  return column / (tie.area_mm2 * tie.modulus_MPa / tie.length_mm);
+}
+
+BestHeight best_tie_height(const TiedColumns& columns, double ratio) {
+  BestHeight best{0.0, INFINITY};
+  TiedColumns other = columns;
+  THERMOCOMP_ENSURE(other.ties.size() == 1);
+  Tie& tie = other.ties.front();
+  for (int step = 0; step <= steps; ++step) {
+    const double share = lowest_tie + (highest_tie - lowest_tie) * step / steps;
+    tie.height_mm = share * columns.working_height_mm;
+    const TiedCoefficients k = tied_coefficients(other);
+    const double displacement = k.ki_um_per_K - k.kc_um_per_K.front() * ratio;
+    if (std::abs(displacement) < std::abs(best.displacement_um_per_K))
+      best = {tie.height_mm, displacement};
+  }
+  return best;
+}
+
+std::string design_curves_svg(const TiedColumns& columns) {
+  TiedColumns free = columns;
+  free.ties.clear();
+  const double free_um_per_K = tied_coefficients(free).ki_um_per_K;
+  const Tie& tie = columns.ties.front();
+  const double tie_um_per_K = um_per_mm * tie.expansion_per_K * tie.length_mm;
+  return svg_file(
+      {curves_over_a(columns, "Ki relative to the column without a tie", "Ki / Ki0",
+                     [&](const TiedCoefficients& k) { return k.ki_um_per_K / free_um_per_K; }),
+       curves_over_a(
+           columns, "Kc relative to the expansion of the tie", "Kc / (alpha lc)",
+           [&](const TiedCoefficients& k) { return k.kc_um_per_K.front() / tie_um_per_K; })});
 }
 
 }  // namespace thermocomp::identification

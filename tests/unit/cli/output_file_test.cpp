@@ -1,5 +1,3 @@
-#include "report/output_file.hpp"
-
 #include <cstdlib>
 #include <fcntl.h>
 #include <filesystem>
@@ -14,6 +12,7 @@
 #include "../temp_folder.hpp"
 #include "cli/observe/watch_text.hpp"
 #include "report/command.hpp"
+#include "report/files.hpp"
 
 namespace {
 

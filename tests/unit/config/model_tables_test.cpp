@@ -2,7 +2,7 @@
 #include <fstream>
 
 #include "config/model/model_file.hpp"
-#include "config/runs/blunders.hpp"
+#include "config/runs/model_inputs.hpp"
 #include "files.hpp"
 
 using namespace thermocomp;

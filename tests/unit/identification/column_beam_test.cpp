@@ -1,8 +1,8 @@
-#include "modelling/identification/gate/column_beam.hpp"
-
 #include <cmath>
 
 #include <catch2/catch.hpp>
+
+#include "modelling/identification/gate/tied_columns.hpp"
 
 namespace thermocomp::identification {
 namespace {

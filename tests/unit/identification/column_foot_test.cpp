@@ -5,7 +5,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "modelling/identification/gate/column_beam.hpp"
+#include "modelling/identification/gate/tied_columns.hpp"
 #include "modelling/identification/printed.hpp"
 #include "modelling/structure/solve/statics.hpp"
 #include "modelling/structure/structure_model.hpp"

@@ -6,8 +6,6 @@
 
 #include <catch2/catch.hpp>
 
-#include "modelling/identification/gate/one_tie.hpp"
-
 namespace thermocomp::identification {
 namespace {
 

@@ -1,5 +1,3 @@
-#include "modelling/fit_command.hpp"
-
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -13,12 +11,12 @@
 #include "config/model/model_file.hpp"
 #include "config/runs/model_inputs.hpp"
 #include "config/text/units.hpp"
+#include "modelling/command_line.hpp"
 #include "modelling/identification/equation/fit.hpp"
 #include "modelling/identification/families/families.hpp"
 #include "modelling/inspection/inspection.hpp"
 #include "modelling/series/series.hpp"
-#include "report/output_file.hpp"
-#include "report/run_loader.hpp"
+#include "report/files.hpp"
 #include "report/terminal.hpp"
 
 namespace thermocomp {
