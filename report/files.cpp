@@ -23,6 +23,7 @@ RunLoader::RunLoader(const std::string& columns)
 
 RunFile RunLoader::load(const std::string& argument) {
   RunFile run = load_run(parse_selection(argument), has_map_ ? &map_ : nullptr);
+  run.argument = argument;
   print_interpretation(run);
   return run;
 }

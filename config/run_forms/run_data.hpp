@@ -19,6 +19,7 @@ struct WallZero {
 /// selection; results are for the rows [selected_begin, selected_end).
 struct RunFile {
   std::string name;                         ///< the file, for messages
+  std::string argument;                     ///< with its selection, as given to a command
   std::vector<std::string> columns;         ///< in header order, including time_s
   std::vector<std::vector<double>> values;  ///< shape (columns, rows); NaN: missing
   std::size_t selected_begin{0};

@@ -179,13 +179,11 @@ Headroom headroom(double noise, double unexplained, double predictable) {
 
 }  // namespace
 
-Diagnosis diagnose(const ThermalModel& model, std::vector<RunFile> train,
-                   const std::vector<std::string>& train_names, std::vector<RunFile> test,
-                   const std::vector<std::string>& test_names, ReportData* report,
-                   const std::function<void()>& progress) {
+Diagnosis diagnose(const ThermalModel& model, std::vector<RunFile> train, std::vector<RunFile> test,
+                   ReportData* report, const std::function<void()>& progress) {
   const SharedColumns columns = shared_columns(model, train, test);
-  const MeasuredData train_data = measured_data(model, train, train_names, columns);
-  const MeasuredData test_data = measured_data(model, test, test_names, columns);
+  const MeasuredData train_data = measured_data(model, train, columns);
+  const MeasuredData test_data = measured_data(model, test, columns);
   train.clear();
   test.clear();
   const std::vector<Hypothesis> all = hypotheses(train_data);
@@ -231,13 +229,12 @@ struct Options {
 
 constexpr const char* searching = "searching what the model gets wrong";
 
-Diagnosis thermal_diagnosis_of(const Options& options, const std::vector<RunFile>& train,
-                               const std::vector<RunFile>& test, const ThermalPlant& plant,
-                               ReportData* report, const NetworkView& view = nullptr) {
+Diagnosis thermal_diagnosis_of(const std::vector<RunFile>& train, const std::vector<RunFile>& test,
+                               const ThermalPlant& plant, ReportData* report,
+                               const NetworkView& view = nullptr) {
   cli::Progress line(searching);
   return diagnose_thermal(
-      plant, train, options.train, test, options.test, report, [&line] { line.update(-1.0); },
-      view);
+      plant, train, test, report, [&line] { line.update(-1.0); }, view);
 }
 
 #ifdef THERMOCOMP_WITH_STRUCTURE
@@ -246,11 +243,10 @@ Diagnosis diagnosis_with_body(const Options& options, const std::vector<RunFile>
                               const std::vector<RunFile>& test, ReportData* report) {
   const cli::ProgressLines lines;
   ThermalBody body(options.structure, [&](std::string_view what) { lines.print(what); });
-  const Diagnosis diagnosis = thermal_diagnosis_of(
-      options, train, test, load_thermal_plant(options.thermal, &body.body()), report,
-      [&body](const ThermalRuns& runs, const HeatNetwork& before, const HeatNetwork& after) {
-        body.show(runs, before, after);
-      });
+  const Diagnosis diagnosis =
+      thermal_diagnosis_of(train, test, load_thermal_plant(options.thermal, &body.body()), report,
+                           [&body](const ThermalRuns& runs, const HeatNetwork& before,
+                                   const HeatNetwork& after) { body.show(runs, before, after); });
   std::string note = "Rise of the temperature since the start of each test run.";
   if (diagnosis.findings.empty()) note += " Nothing was found wrong.";
   for (const NamedFinding& finding : diagnosis.findings)
@@ -271,7 +267,7 @@ Diagnosis diagnosis_of(const Options& options, ReportData* report) {
   if (!options.structure.empty()) return diagnosis_with_body(options, train, test, report);
 #endif
   if (!options.thermal.empty())
-    return thermal_diagnosis_of(options, train, test, load_thermal_plant(options.thermal), report);
+    return thermal_diagnosis_of(train, test, load_thermal_plant(options.thermal), report);
   cli::Progress line(searching);
   const auto progress = [&line] { line.update(-1.0); };
   const ThermalModel model = load_model(options.model);
@@ -279,8 +275,7 @@ Diagnosis diagnosis_of(const Options& options, ReportData* report) {
     for (RunFile& run : *runs)
       for (const Blunders& each : leave_out_blunders(run, model.outputs))
         std::fprintf(stderr, "%s: %s\n", run.name.c_str(), each.text().c_str());
-  return diagnose(model, std::move(train), options.train, std::move(test), options.test, report,
-                  progress);
+  return diagnose(model, std::move(train), std::move(test), report, progress);
 }
 
 /// The report, and the model or machine file with the findings that the test runs do not

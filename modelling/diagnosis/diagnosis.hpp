@@ -13,15 +13,11 @@ namespace thermocomp::diagnosis {
 struct ReportData;
 
 /// @param train, test  by value: their memory is released before the search
-/// @param train_names, test_names  the runs' arguments as given
 /// @param report    if given, receives the data of the report
 /// @param progress  if given, called during the search
 /// @throws ConfigurationError when a run lacks a column of the model or any measured value
 [[nodiscard]] Diagnosis diagnose(const ThermalModel& model, std::vector<RunFile> train,
-                                 const std::vector<std::string>& train_names,
-                                 std::vector<RunFile> test,
-                                 const std::vector<std::string>& test_names,
-                                 ReportData* report = nullptr,
+                                 std::vector<RunFile> test, ReportData* report = nullptr,
                                  const std::function<void()>& progress = nullptr);
 
 }  // namespace thermocomp::diagnosis

@@ -297,15 +297,13 @@ std::vector<Residuals> residuals_of(const HeatNetwork& network, const ThermalRun
 }  // namespace
 
 Diagnosis diagnose_thermal(const ThermalPlant& plant, const std::vector<RunFile>& train,
-                           const std::vector<std::string>& train_names,
-                           const std::vector<RunFile>& test,
-                           const std::vector<std::string>& test_names, ReportData* report,
+                           const std::vector<RunFile>& test, ReportData* report,
                            const std::function<void()>& progress, const NetworkView& view) {
   std::vector<RunFile> all = train;
   all.insert(all.end(), test.begin(), test.end());
   const std::vector<std::string> signals = shared_signals(all);
-  const ThermalRuns train_runs = thermal_runs(plant, train, train_names, signals);
-  const ThermalRuns test_runs = thermal_runs(plant, test, test_names, signals);
+  const ThermalRuns train_runs = thermal_runs(plant, train, signals);
+  const ThermalRuns test_runs = thermal_runs(plant, test, signals);
   const MeasuredData train_data = data_of(plant, train_runs);
   const auto catalogue = std::make_shared<NetworkHypotheses>(plant, train_runs, train_data.rows);
   const std::vector<Hypothesis> hypotheses = NetworkHypotheses::all(catalogue);

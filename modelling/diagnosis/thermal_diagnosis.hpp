@@ -25,11 +25,12 @@ using NetworkView = std::function<void(const ThermalRuns&, const HeatNetwork&, c
 ///         parameters hold the corrected values
 /// @param view  if given, called at the end
 /// @throws ConfigurationError when a run lacks the room, a signal of the network or every sensor
-[[nodiscard]] Diagnosis diagnose_thermal(
-    const ThermalPlant& plant, const std::vector<RunFile>& train,
-    const std::vector<std::string>& train_names, const std::vector<RunFile>& test,
-    const std::vector<std::string>& test_names, ReportData* report = nullptr,
-    const std::function<void()>& progress = nullptr, const NetworkView& view = nullptr);
+[[nodiscard]] Diagnosis diagnose_thermal(const ThermalPlant& plant,
+                                         const std::vector<RunFile>& train,
+                                         const std::vector<RunFile>& test,
+                                         ReportData* report = nullptr,
+                                         const std::function<void()>& progress = nullptr,
+                                         const NetworkView& view = nullptr);
 
 /// Multiplies films, conductances, capacities and heats by their factors, and adds missing sources
 /// and lags of thermocouples. Findings without a key become comments at the top; comments of the

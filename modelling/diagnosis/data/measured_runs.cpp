@@ -166,7 +166,7 @@ void take_displacements(const RunFile& file, const std::vector<std::size_t>& row
   }
 }
 
-MeasuredRun measured_run(const RunFile& file, const std::string& name, const MeasuredData& data) {
+MeasuredRun measured_run(const RunFile& file, const MeasuredData& data) {
   const ModelInputs inputs = model_inputs(data.model, file);
   std::vector<std::size_t> rows = inputs.rows;
   rows.erase(std::lower_bound(rows.begin(), rows.end(), file.selected_end), rows.end());
@@ -174,7 +174,7 @@ MeasuredRun measured_run(const RunFile& file, const std::string& name, const Mea
     throw ConfigurationError({{file.name, 0, key, "(missing)", rule}});
   };
   MeasuredRun run;
-  run.name = name;
+  run.name = file.argument;
   run.begin = std::lower_bound(rows.begin(), rows.end(), file.selected_begin) - rows.begin();
   if (run.begin == static_cast<Eigen::Index>(rows.size()))
     refuse("selection", "must have a row in which no input of the model is missing");
@@ -286,9 +286,9 @@ Column MeasuredData::coefficient(const MeasuredRun& run, std::size_t output,
 }
 
 MeasuredData measured_data(const ThermalModel& model, const std::vector<RunFile>& runs,
-                           const std::vector<std::string>& names, const SharedColumns& columns) {
+                           const SharedColumns& columns) {
   MeasuredData data{model, columns.temperatures, columns.signals, {}, {}, {}, coefficient_sd};
-  for (std::size_t i = 0; i < runs.size(); ++i) data.add(measured_run(runs[i], names[i], data));
+  for (const RunFile& run : runs) data.add(measured_run(run, data));
   return data;
 }
 

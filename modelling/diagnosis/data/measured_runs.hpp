@@ -52,7 +52,7 @@ struct Block {
 /// One run: its rows in which no input of the model is missing, from the file's first such row to
 /// the end of the selection. Missing values of other columns are held at the last one.
 struct MeasuredRun {
-  std::string name;       ///< command line argument
+  std::string name;       ///< RunFile::argument
   std::size_t number{0};  ///< among MeasuredData::runs
   Column time_s;
   Eigen::Index begin{0};               ///< first selected row
@@ -106,12 +106,10 @@ struct SharedColumns {
 [[nodiscard]] std::vector<Column> model_over(const ThermalModel& model, const MeasuredRun& run,
                                              const MeasuredData& data);
 
-/// @param names  the runs' arguments as given
 /// @throws ConfigurationError when a run lacks an input or signal of the model, or has no measured
 ///         value of any output
 [[nodiscard]] MeasuredData measured_data(const ThermalModel& model,
                                          const std::vector<RunFile>& runs,
-                                         const std::vector<std::string>& names,
                                          const SharedColumns& columns);
 
 /// Index of the room's temperature by its name: one that the model does not use, else an input.

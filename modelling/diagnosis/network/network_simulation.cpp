@@ -183,7 +183,6 @@ std::vector<std::string> shared_signals(const std::vector<RunFile>& files) {
 }
 
 ThermalRuns thermal_runs(const ThermalPlant& plant, const std::vector<RunFile>& files,
-                         const std::vector<std::string>& names,
                          const std::vector<std::string>& signals) {
   ThermalRuns all{signals, {}};
   const auto add_signal = [&](const std::string& signal) {
@@ -192,10 +191,9 @@ ThermalRuns thermal_runs(const ThermalPlant& plant, const std::vector<RunFile>& 
       all.signals.push_back(signal);
   };
   for (const NetworkSource& source : plant.network.sources) add_signal(source.signal);
-  for (std::size_t i = 0; i < files.size(); ++i) {
-    const RunFile& file = files[i];
+  for (const RunFile& file : files) {
     ThermalRun run;
-    run.name = names[i];
+    run.name = file.argument;
     run.begin = static_cast<Eigen::Index>(file.selected_begin);
     run.time_s = held(file, "time_s");
     run.room_degC = held(file, plant.room_column);

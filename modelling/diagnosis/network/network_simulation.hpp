@@ -30,10 +30,8 @@ struct ThermalRuns {
   std::vector<ThermalRun> runs;
 };
 
-/// @param names  the runs' arguments as given
 /// @throws ConfigurationError when a run lacks the room, a signal of the network or every sensor
 [[nodiscard]] ThermalRuns thermal_runs(const ThermalPlant& plant, const std::vector<RunFile>& files,
-                                       const std::vector<std::string>& names,
                                        const std::vector<std::string>& signals);
 
 /// Operating signals (no positions) that every one of the files has.

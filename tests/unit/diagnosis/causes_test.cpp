@@ -162,8 +162,7 @@ TEST_CASE("shape grids lie within the physical range of their parameters", "[dia
   model.matrix_um_per_K = {{5.0, 1.0}};
   const std::vector<RunFile> runs = {machine_run(900), machine_run(900, 18.0),
                                      machine_run(900, 23.0)};
-  const MeasuredData data =
-      measured_data(model, runs, {"1.csv", "2.csv", "3.csv"}, shared_columns(model, runs));
+  const MeasuredData data = measured_data(model, runs, shared_columns(model, runs));
   Names tried;
   for (const Hypothesis& each : hypotheses(data)) {
     const Cause& cause = cause_named(each.cause);

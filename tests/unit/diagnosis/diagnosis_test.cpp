@@ -56,8 +56,7 @@ RunFile run_with(unsigned seed, int rows, Hidden hidden) {
 
 template <class Hidden>
 Diagnosis diagnosis_of(Hidden hidden) {
-  return diagnose(one_input(), {run_with(1, 600, hidden)}, {"train.csv"},
-                  {run_with(2, 400, hidden)}, {"test.csv"});
+  return diagnose(one_input(), {run_with(1, 600, hidden)}, {run_with(2, 400, hidden)});
 }
 
 struct FoundGain {
@@ -73,8 +72,7 @@ FoundGain found_gain(Hidden hidden) {
   // Without the speed, whose heat would be as good a name.
   runs[0].columns.erase(runs[0].columns.begin() + 2);
   runs[0].values.erase(runs[0].values.begin() + 2);
-  const MeasuredData data =
-      measured_data(one_input(), runs, {"train.csv"}, shared_columns(one_input(), runs));
+  const MeasuredData data = measured_data(one_input(), runs, shared_columns(one_input(), runs));
   const std::vector<Hypothesis> all = hypotheses(data);
   const SearchResult result = search(data, all);
   REQUIRE_FALSE(result.findings.empty());
@@ -108,8 +106,7 @@ Diagnosis diagnosis_of_days(Hidden hidden) {
   return diagnose(one_input(),
                   {day_from(1, 16.0, hidden), day_from(2, 20.0, hidden), day_from(3, 25.0, hidden),
                    day_from(4, 22.0, hidden)},
-                  {"a", "b", "c", "d"}, {day_from(5, 18.0, hidden), day_from(6, 24.0, hidden)},
-                  {"e", "f"});
+                  {day_from(5, 18.0, hidden), day_from(6, 24.0, hidden)});
 }
 
 /// A machine that the readings move, each of which follows the speed in its own time.
@@ -177,7 +174,7 @@ RunFile along_axis(const MeasuredMachine& machine, unsigned seed, double um_per_
 Diagnosis diagnosis_along_axis(const MeasuredMachine& machine, double um_per_K_mm) {
   return diagnose(machine.model(),
                   {along_axis(machine, 1, um_per_K_mm), along_axis(machine, 2, um_per_K_mm)},
-                  {"a", "b"}, {along_axis(machine, 3, um_per_K_mm)}, {"c"});
+                  {along_axis(machine, 3, um_per_K_mm)});
 }
 
 /// With a room that swings by 2 K; the body that the speed heats follows it in the same 100 min.
@@ -198,8 +195,8 @@ RunFile in_a_room(const MeasuredMachine& machine, unsigned seed, double um_per_K
 
 Diagnosis diagnosis_in_a_room(const MeasuredMachine& machine, double um_per_K) {
   return diagnose(machine.model(),
-                  {in_a_room(machine, 1, um_per_K), in_a_room(machine, 2, um_per_K)}, {"a", "b"},
-                  {in_a_room(machine, 3, um_per_K)}, {"c"});
+                  {in_a_room(machine, 1, um_per_K), in_a_room(machine, 2, um_per_K)},
+                  {in_a_room(machine, 3, um_per_K)});
 }
 
 /// A machine of six readings, which are more alike than the causes that they are to be told from.
@@ -210,8 +207,7 @@ MeasuredMachine six_readings(std::vector<double> factor) {
 }
 
 Diagnosis diagnosis_of_machine(const MeasuredMachine& machine) {
-  return diagnose(machine.model(), {machine.run(1), machine.run(2)}, {"a", "b"}, {machine.run(3)},
-                  {"c"});
+  return diagnose(machine.model(), {machine.run(1), machine.run(2)}, {machine.run(3)});
 }
 
 /// Thirty readings of one output, of which one has an error from the 300th row of the first run on.
@@ -228,7 +224,7 @@ Diagnosis diagnosis_of_false_reading(std::size_t sensor, Error error_K) {
   std::vector<double>& reading = train.values[3 + sensor];
   for (std::size_t row = 300; row < reading.size(); ++row)
     reading[row] += error_K(static_cast<double>(row - 300));
-  return diagnose(machine.model(), {train}, {"train"}, {machine.run(2)}, {"test"});
+  return diagnose(machine.model(), {train}, {machine.run(2)});
 }
 
 }  // namespace
@@ -268,8 +264,7 @@ TEST_CASE("the interval of a rarely sampled period covers the true period", "[di
   const int each = GENERATE(1, 30);
   CAPTURE(each);
   const RunFile test = run_with(2, 400, hidden);
-  const Diagnosis answer =
-      diagnose(one_input(), {probed(each)}, {"train.csv"}, {test}, {"test.csv"});
+  const Diagnosis answer = diagnose(one_input(), {probed(each)}, {test});
   REQUIRE_FALSE(answer.findings.empty());
   REQUIRE(answer.findings[0].cause == "periodic_disturbance");
   const Interval period = answer.findings[0].parameters.front().ci95.at("");
@@ -309,8 +304,9 @@ TEST_CASE("a gain's interval includes a fifth of the gain, that of a jump does n
 
 TEST_CASE("a jump of the datum in one run is a fault of that run and no term", "[diagnosis]") {
   RunFile train = run_with(1, 600, [](double, double, int row) { return row >= 300 ? 8.0 : 0.0; });
+  train.argument = "train.csv@0:";
   const RunFile test = run_with(2, 400, [](double, double, int) { return 0.0; });
-  const Diagnosis answer = diagnose(one_input(), {train}, {"train.csv@0:"}, {test}, {"test.csv"});
+  const Diagnosis answer = diagnose(one_input(), {train}, {test});
   REQUIRE(answer.findings.size() == 1);
   CHECK(answer.findings[0].cause == "displacement_step");
   CHECK(answer.findings[0].run == "train.csv@0:");
@@ -398,7 +394,7 @@ TEST_CASE(
   machine.heat_um = 30.0;
   const std::vector<RunFile> runs = {machine.run(1), machine.run(2)};
   const auto fitted = [&](const ThermalModel& model) {
-    const MeasuredData data = measured_data(model, runs, {"a", "b"}, shared_columns(model, runs));
+    const MeasuredData data = measured_data(model, runs, shared_columns(model, runs));
     const std::vector<Hypothesis> all = hypotheses(data);
     const SearchResult result = search(data, all);
     CHECK_FALSE(result.findings.empty());
@@ -407,7 +403,7 @@ TEST_CASE(
   };
   ThermalModel model = machine.model();
   CHECK(fitted(model) == std::vector<bool>{false});
-  const MeasuredData data = measured_data(model, runs, {"a", "b"}, shared_columns(model, runs));
+  const MeasuredData data = measured_data(model, runs, shared_columns(model, runs));
   const Panel readings = stacked(data, [](const MeasuredRun& run) -> Panel {
     Panel both(run.rows(), 2);
     both << run.temps_K[0], run.temps_K[1];
@@ -435,8 +431,7 @@ TEST_CASE("the report shows temperatures of findings beside those of the model",
     return run;
   };
   ReportData report;
-  const Diagnosis answer =
-      diagnose(model, {run_of(1), run_of(2)}, {"a", "b"}, {run_of(3)}, {"c"}, &report);
+  const Diagnosis answer = diagnose(model, {run_of(1), run_of(2)}, {run_of(3)}, &report);
   REQUIRE(answer.findings.size() == 1);
   CHECK(answer.findings[0].cause == "missing_temperature");
   CHECK(answer.findings[0].subject == "t2_degC");
@@ -456,8 +451,8 @@ TEST_CASE("test runs change no finding and no parameter", "[diagnosis]") {
   const RunFile train = run_with(1, 600, hidden);
   const RunFile same = run_with(2, 400, hidden);
   const RunFile other = run_with(3, 200, [](double, double, int row) { return 0.3 * row; });
-  const Diagnosis a = diagnose(one_input(), {train}, {"a"}, {same}, {"b"});
-  const Diagnosis b = diagnose(one_input(), {train}, {"a"}, {other}, {"b"});
+  const Diagnosis a = diagnose(one_input(), {train}, {same});
+  const Diagnosis b = diagnose(one_input(), {train}, {other});
   REQUIRE(a.findings.size() == b.findings.size());
   CHECK(write_model(a.extended) == write_model(b.extended));
 }
@@ -468,8 +463,7 @@ TEST_CASE("an output keeps coefficients whose correction leaves it worse on the 
     return (row >= 300 ? 20.0 : 0.0) + 0.1 * rise_K;
   };
   const RunFile test = run_with(2, 400, [](double, double, int) { return 0.0; });
-  const Diagnosis answer =
-      diagnose(one_input(), {run_with(1, 600, jump_and_error)}, {"a"}, {test}, {"b"});
+  const Diagnosis answer = diagnose(one_input(), {run_with(1, 600, jump_and_error)}, {test});
   REQUIRE(answer.findings.size() == 1);
   CHECK(answer.findings[0].cause == "displacement_step");
   CHECK(answer.extended.matrix_um_per_K == one_input().matrix_um_per_K);
@@ -483,11 +477,11 @@ TEST_CASE("missing values are left out, and a run without any is refused", "[dia
   for (std::size_t row = 0; row < train.rows(); row += 3) train.values[3][row] = NAN;
   for (std::size_t row = 100; row < 110; ++row) train.values[1][row] = NAN;
   const RunFile test = run_with(2, 400, [](double, double, int) { return 0.0; });
-  const Diagnosis answer = diagnose(one_input(), {train}, {"a"}, {test}, {"b"});
+  const Diagnosis answer = diagnose(one_input(), {train}, {test});
   REQUIRE_FALSE(answer.findings.empty());
   CHECK(answer.findings[0].cause == "speed_growth");
   train.values[3].assign(train.rows(), NAN);
-  CHECK_THROWS_AS(diagnose(one_input(), {train}, {"a"}, {test}, {"b"}), ConfigurationError);
+  CHECK_THROWS_AS(diagnose(one_input(), {train}, {test}), ConfigurationError);
 }
 
 TEST_CASE("an output that no run has a value of is left out", "[diagnosis]") {
@@ -495,8 +489,7 @@ TEST_CASE("an output that no run has a value of is left out", "[diagnosis]") {
   model.outputs.insert(model.outputs.begin(), "a_um");
   model.matrix_um_per_K.insert(model.matrix_um_per_K.begin(), {3.0});
   const auto hidden = [](double rpm, double, int) { return 4e-7 * rpm * rpm; };
-  const Diagnosis answer =
-      diagnose(model, {run_with(1, 600, hidden)}, {"a"}, {run_with(2, 400, hidden)}, {"b"});
+  const Diagnosis answer = diagnose(model, {run_with(1, 600, hidden)}, {run_with(2, 400, hidden)});
   REQUIRE(answer.findings.size() == 1);
   CHECK(answer.findings[0].cause == "speed_growth");
   CHECK(answer.findings[0].outputs == std::vector<std::string>{"z_um"});

@@ -70,7 +70,7 @@ ThermalModel model_with_bank() {
 
 MeasuredData data_of(const ThermalModel& model, int rows) {
   const std::vector<RunFile> runs = {two_bodies(rows)};
-  return measured_data(model, runs, {"run.csv"}, shared_columns(model, runs));
+  return measured_data(model, runs, shared_columns(model, runs));
 }
 
 }  // namespace

@@ -71,9 +71,7 @@ MeasuredData data_of(const std::vector<RunFile>& runs) {
   model.inputs = {"t1_degC", "t2_degC", "t3_degC"};
   model.outputs = {"z_um"};
   model.matrix_um_per_K = {{0.5, 5.0, 0.5}};
-  std::vector<std::string> names;
-  for (const RunFile& run : runs) names.push_back(run.name);
-  return measured_data(model, runs, names, shared_columns(model, runs));
+  return measured_data(model, runs, shared_columns(model, runs));
 }
 
 /// ln L that the reading adds for a fault of the first run from a moment on.

@@ -56,7 +56,7 @@ RunFile machine(unsigned seed, double lags_um, double noise_um) {
 }
 
 MeasuredData data_of(const ThermalModel& model, const RunFile& run) {
-  return measured_data(model, {run}, {run.name}, shared_columns(model, {run}));
+  return measured_data(model, {run}, shared_columns(model, {run}));
 }
 
 std::optional<RemainderBank> bank_of(const RunFile& run) {

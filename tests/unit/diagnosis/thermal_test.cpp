@@ -105,7 +105,7 @@ TEST_CASE("quantisation steps are noise, not structure", "[diagnosis][thermal]")
   for (RunFile* run : {&train, &test})
     for (const std::size_t column : {3U, 4U})
       for (double& value : run->values[column]) value = std::round(2.0 * value) / 2.0;
-  CHECK(diagnose_thermal(plant, {train}, {"a"}, {test}, {"b"}).verdict == "none");
+  CHECK(diagnose_thermal(plant, {train}, {test}).verdict == "none");
 }
 
 TEST_CASE("runs without columns of the thermal network are refused", "[diagnosis][thermal]") {
@@ -119,12 +119,12 @@ TEST_CASE("runs without columns of the thermal network are refused", "[diagnosis
     for (std::string& column : bad.columns)
       if (column == missing) column = "other_on";
     CAPTURE(missing);
-    CHECK_THROWS_AS(diagnose_thermal(plant, {good}, {"a"}, {bad}, {"b"}), ConfigurationError);
+    CHECK_THROWS_AS(diagnose_thermal(plant, {good}, {bad}), ConfigurationError);
   }
   RunFile blind = good;
   for (const std::size_t column : {3U, 4U})
     for (double& value : blind.values[column]) value = NAN;
-  CHECK_THROWS_AS(diagnose_thermal(plant, {blind}, {"a"}, {good}, {"b"}), ConfigurationError);
+  CHECK_THROWS_AS(diagnose_thermal(plant, {blind}, {good}), ConfigurationError);
 }
 
 TEST_CASE("the corrected machine file has the findings, and comments for the others",
@@ -174,7 +174,7 @@ TEST_CASE("rows may come at any times and readings may be missing", "[diagnosis]
   }
   thinned.selected_end = thinned.rows();
   thinned.values[3][10] = NAN;
-  const ThermalRuns runs = thermal_runs(plant, {run, thinned}, {"a", "b"}, {"spindle_rpm"});
+  const ThermalRuns runs = thermal_runs(plant, {run, thinned}, {"spindle_rpm"});
   const NetworkSimulation simulation(plant.network);
   CHECK(simulation.readings_degC(runs, 0)[0].tail(1)[0] ==
         Approx(simulation.readings_degC(runs, 1)[0].tail(1)[0]).margin(0.15));
