@@ -279,9 +279,8 @@ void add_fit_command(CLI::App& app, std::function<int()>& action) {
                   "age of the prior; default: 0 for a series, 1 for a model")
       ->check(CLI::Range(0.0, 50.0))
       ->needs(prior);
-  CLI::Option* report =
-      sub->add_option("--report", options->report, "page with curves and the choice (HTML)");
-  prior->excludes(report);
+  prior->excludes(
+      sub->add_option("--report", options->report, "page with curves and the choice (HTML)"));
   sub->add_flag("--json", options->json, "print the result as JSON");
   sub->callback([options, terms, &action] {
     options->terms_given = terms->count() > 0;
