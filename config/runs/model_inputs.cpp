@@ -123,11 +123,12 @@ Blunders blunders_of(const RunFile& run, const std::string& column) {
       if (std::abs(leaps[i]) > (at_end ? limit_at_end_um : limit_um)) off.push_back(i);
     }
     if (off.empty()) break;
-    for (auto i = off.rbegin(); i != off.rend(); ++i) {
-      if (std::abs(leaps[*i]) > std::abs(found.size_um)) found.size_um = leaps[*i];
-      found.times_s.push_back(times_s[*i]);
-      values.erase(values.begin() + static_cast<std::ptrdiff_t>(*i));
-      times_s.erase(times_s.begin() + static_cast<std::ptrdiff_t>(*i));
+    for (std::size_t last = off.size(); last-- > 0;) {
+      const std::size_t i = off[last];
+      if (std::abs(leaps[i]) > std::abs(found.size_um)) found.size_um = leaps[i];
+      found.times_s.push_back(times_s[i]);
+      values.erase(values.begin() + static_cast<std::ptrdiff_t>(i));
+      times_s.erase(times_s.begin() + static_cast<std::ptrdiff_t>(i));
     }
   }
   const auto count = static_cast<double>(found.times_s.size());
