@@ -243,7 +243,7 @@ Diagnosis diagnosis_with_body(const Options& options, const std::vector<RunFile>
                               const std::vector<RunFile>& test, ReportData* report) {
   const cli::ProgressLines lines;
   ThermalBody body(options.structure, [&](std::string_view what) { lines.print(what); });
-  const Diagnosis diagnosis =
+  Diagnosis diagnosis =
       thermal_diagnosis_of(train, test, load_thermal_plant(options.thermal, &body.body()), report,
                            [&body](const ThermalRuns& runs, const HeatNetwork& before,
                                    const HeatNetwork& after) { body.show(runs, before, after); });
