@@ -8,7 +8,7 @@
 #include "daemon/controller_lock.hpp"
 #include "daemon/history/replay/segment_walk.hpp"
 #include "daemon/state/state_file.hpp"
-#include "estimator/sensing/screening.hpp"
+#include "estimator/sensing/sensor.hpp"
 
 namespace thermocomp {
 namespace {

@@ -14,8 +14,8 @@
 #include "daemon/status/status_view.hpp"
 #include "daemon/status/warm_up.hpp"
 #include "daemon/system/service_manager.hpp"
+#include "drivers/bus.hpp"
 #include "drivers/controllers/controller_link.hpp"
-#include "drivers/sensors/sensor_source.hpp"
 
 namespace thermocomp {
 

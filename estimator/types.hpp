@@ -145,4 +145,50 @@ enum class StartEvidence : std::uint8_t {
 /// Name in JSON.
 [[nodiscard]] std::string_view to_string(StartEvidence evidence) noexcept;
 
+/// Time of a step.
+struct StepTime {
+  nanoseconds now{};
+  double dt_s{0.0};   ///< since the previous step; 0 at the first
+  bool first{false};  ///< no earlier step, not even of an adopted estimator
+};
+
+enum class Mode : std::uint8_t {
+  starting,  ///< never compensated since the start; offsets stay
+  disabled,  ///< by an operator or the controller's switch; offsets at zero or on the way
+  compensating,
+  holding,         ///< data lost: offsets stay
+  ramping_to_zero  ///< daemon stopping, or data lost for hold_s and on_loss = ramp_to_zero
+};
+[[nodiscard]] std::string_view to_string(Mode mode) noexcept;
+
+/// Reasons and warnings of a step; a set of bits.
+enum class Reason : std::uint32_t {
+  operator_disabled = 1u << 0,
+  controller_disabled = 1u << 1,  ///< disable_signal is 1
+  block_lost = 1u << 2,           ///< no good sensor in a block that the model needs
+  signal_lost = 1u << 3,  ///< a position or operating signal that the model needs is missing
+  no_reference = 1u << 4,
+  controller_offline = 1u << 5,
+  not_synced = 1u << 6,  ///< the applied offset is not known yet
+  mismatch = 1u << 7,    ///< applied and sent differ
+  cutting = 1u << 8,     ///< hold_while_cutting holds the offset
+  at_bound = 1u << 9,
+  applied_out_of_bound = 1u << 10,  ///< read-back beyond all our bounds: axis is not driven
+  block_estimated = 1u << 11,       ///< a warning: compensating with an estimate of a lost block
+  mismatch_latched = 1u << 12,      ///< unexplained read-backs: not driven until released
+  no_target = 1u << 13,             ///< the model's displacement is not finite
+  outside_domain = 1u << 14,
+  sensor_suspected = 1u << 15,    ///< a warning: good values that the neighbours contradict
+  not_written = 1u << 16,         ///< the controller answers, but confirms no write of offsets
+  sensor_unconfirmed = 1u << 17,  ///< an unconfirmed reading contradicts the earlier ones
+  start_unknown = 1u << 18        ///< the last sent offset is not known
+};
+inline constexpr std::size_t reasons_count = 19;
+[[nodiscard]] std::string_view to_string(Reason reason) noexcept;
+
+/// True if a set of reasons (Report::reasons) holds `reason`.
+[[nodiscard]] constexpr bool has_reason(std::uint32_t reasons, Reason reason) noexcept {
+  return (reasons & static_cast<std::uint32_t>(reason)) != 0;
+}
+
 }  // namespace thermocomp

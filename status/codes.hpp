@@ -7,7 +7,6 @@
 #include <string_view>
 #include <vector>
 
-#include "estimator/pipeline/mode.hpp"
 #include "estimator/types.hpp"
 
 namespace thermocomp {

@@ -13,7 +13,6 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "estimator/pipeline/mode.hpp"
 #include "estimator/types.hpp"
 #include "status/event.hpp"
 

@@ -19,7 +19,7 @@
 
 #include "drivers/controllers/kinds/modbus/modbus_layout.hpp"
 #include "drivers/controllers/travel_values.hpp"
-#include "drivers/modbus/register_codec.hpp"
+#include "drivers/modbus/modbus_codec.hpp"
 #include "estimator/pipeline/estimator.hpp"
 #include "simulator/devices/simulated_cnc.hpp"
 

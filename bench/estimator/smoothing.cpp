@@ -3,8 +3,6 @@
 ///
 /// Spikes, per sensor and row (15 s): 0.5 % single ones of +-1..10 K; 0.05 % begin a burst of 2 to
 /// 4 rows, each with its own amplitude of +-1..10 K. Without screening.
-#include "estimator/sensing/smoothing.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -20,6 +18,7 @@
 
 #include "config/model/model_file.hpp"
 #include "config/runs/run_file.hpp"
+#include "estimator/sensing/sensor.hpp"
 
 namespace thermocomp {
 namespace {

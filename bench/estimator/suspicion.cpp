@@ -6,7 +6,7 @@
 /// half, and a sensor that comes loose and then shows 0.4 of the change (every 4 h, until the half
 /// ends). Found: the sensor is suspected; wrong: another one is, alone or in addition.
 ///
-/// Parameters of the check and their origin (estimator/sensing/neighbour_check.cpp and
+/// Parameters of the check and their origin (estimator/sensing/neighbours.cpp and
 /// suspicion.cpp). Before any replay: ticks of 60 s, lines of 5 ticks, ages 1, 4 and 12 h, floor
 /// 0.1 K, clean share 0.75, end below 0.35 for 10 ticks. From hours 0-16 of the spindle with the
 /// covariance of hours 16-32, the half printed as "set_from": the limits, 4 (jump) and 6 (creep)

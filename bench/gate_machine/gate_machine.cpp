@@ -21,7 +21,7 @@
 #include "cli/model/course_fit.hpp"
 #include "config/model/model_file.hpp"
 #include "config/runs/run_file.hpp"
-#include "estimator/learning/running_correction.hpp"
+#include "estimator/learning/probings.hpp"
 #include "estimator/model/displacement_model.hpp"
 #include "estimator/model/terms/low_pass.hpp"
 #include "gate_structure.hpp"

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "config/runs/model_inputs.hpp"
+#include "estimator/learning/probings.hpp"
 #include "estimator/learning/recorded_course.hpp"
-#include "estimator/learning/running_correction.hpp"
 #include "estimator/model/displacement_model.hpp"
 
 namespace thermocomp::cli {

@@ -10,7 +10,6 @@
 #include "config/runs/model_inputs.hpp"
 #include "config/text/units.hpp"
 #include "estimator/model/displacement_model.hpp"
-#include "estimator/model/model_domain.hpp"
 #include "estimator/types.hpp"
 
 namespace thermocomp::cli {

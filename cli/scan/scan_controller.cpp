@@ -18,7 +18,7 @@
 #include "drivers/bus_thread.hpp"
 #include "drivers/controllers/kinds/modbus/modbus_layout.hpp"
 #include "drivers/modbus/connection.hpp"
-#include "drivers/modbus/register_codec.hpp"
+#include "drivers/modbus/modbus_codec.hpp"
 #include "estimator/estimator_config.hpp"
 #include "status/status.hpp"
 

@@ -12,7 +12,7 @@
 #include "cli/scan/scan_bus.hpp"
 #include "drivers/bus.hpp"
 #include "drivers/modbus/connection.hpp"
-#include "drivers/modbus/register_codec.hpp"
+#include "drivers/modbus/modbus_codec.hpp"
 #include "drivers/sensors/modbus_poller.hpp"
 #include "status/codes.hpp"
 

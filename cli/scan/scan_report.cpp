@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/common/modbus_names.hpp"
-#include "drivers/modbus/register_codec.hpp"
+#include "drivers/modbus/modbus_codec.hpp"
 #include "report/terminal.hpp"
 #include "status/codes.hpp"
 

@@ -18,7 +18,7 @@
 #include "config/sections/model_binding.hpp"
 #include "config/toml/toml_reader.hpp"
 #include "estimator/pipeline/estimator.hpp"
-#include "estimator/sensing/screening.hpp"
+#include "estimator/sensing/sensor.hpp"
 
 namespace thermocomp {
 namespace {

@@ -10,7 +10,7 @@
 
 #include "config/toml/toml_text.hpp"
 #include "estimator/estimator_config.hpp"
-#include "estimator/model/model_domain.hpp"
+#include "estimator/model/displacement_model.hpp"
 
 namespace thermocomp {
 namespace {

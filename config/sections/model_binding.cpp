@@ -4,7 +4,7 @@
 
 #include "config/text/units.hpp"
 #include "estimator/estimator_config.hpp"
-#include "estimator/sensing/neighbour_check.hpp"
+#include "estimator/sensing/neighbours.hpp"
 
 namespace thermocomp::sections {
 namespace {

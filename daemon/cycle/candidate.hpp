@@ -10,7 +10,7 @@
 #include <span>
 #include <string>
 
-#include "drivers/wait_free_slot.hpp"
+#include "drivers/bus.hpp"
 #include "estimator/pipeline/estimator.hpp"
 #include "estimator/types.hpp"
 

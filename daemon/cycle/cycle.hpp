@@ -16,9 +16,8 @@
 #include "daemon/recording/cycle_recorder.hpp"
 #include "daemon/recording/last_sent.hpp"
 #include "daemon/recording/record.hpp"
+#include "drivers/bus.hpp"
 #include "drivers/controllers/controller_link.hpp"
-#include "drivers/sensors/sensor_source.hpp"
-#include "drivers/wait_free_slot.hpp"
 #include "estimator/pipeline/estimator.hpp"
 #include "estimator/types.hpp"
 

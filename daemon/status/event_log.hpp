@@ -10,8 +10,8 @@
 #include "daemon/history/writing/history_writer.hpp"
 #include "daemon/socket/status_server.hpp"
 #include "daemon/status/event_journal.hpp"
+#include "drivers/bus.hpp"
 #include "drivers/controllers/controller_link.hpp"
-#include "drivers/sensors/sensor_source.hpp"
 #include "estimator/pipeline/estimator.hpp"
 
 namespace thermocomp {

@@ -8,7 +8,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 
-#include "estimator/model/model_domain.hpp"
+#include "estimator/model/displacement_model.hpp"
 
 namespace thermocomp {
 namespace {

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "estimator/pipeline/estimator.hpp"
-#include "estimator/pipeline/report.hpp"
 #include "estimator/thermal_model.hpp"
 
 namespace thermocomp {

@@ -8,9 +8,8 @@
 
 #include "drivers/bus.hpp"
 #include "drivers/bus_thread.hpp"
-#include "drivers/modbus/frames.hpp"
 #include "drivers/modbus/late_answers.hpp"
-#include "drivers/modbus/register_codec.hpp"
+#include "drivers/modbus/modbus_codec.hpp"
 #include "estimator/checks.hpp"
 
 namespace thermocomp {

@@ -3,7 +3,7 @@
 #include <cstdio>
 #include <vector>
 
-#include "drivers/modbus/frames.hpp"
+#include "drivers/modbus/modbus_codec.hpp"
 #include "drivers/modbus/port.hpp"
 
 namespace thermocomp {

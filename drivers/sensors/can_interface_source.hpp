@@ -9,11 +9,10 @@
 #include <string>
 #include <vector>
 
+#include "drivers/bus.hpp"
 #include "drivers/bus_thread.hpp"
 #include "drivers/can/can_protocol.hpp"
 #include "drivers/can/can_socket.hpp"
-#include "drivers/sensors/sensor_source.hpp"
-#include "drivers/wait_free_slot.hpp"
 
 namespace thermocomp {
 

@@ -3,8 +3,8 @@
 
 #include <memory>
 
+#include "drivers/bus.hpp"
 #include "drivers/sensors/bus_config.hpp"
-#include "drivers/sensors/sensor_source.hpp"
 
 namespace thermocomp {
 

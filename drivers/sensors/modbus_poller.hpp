@@ -1,17 +1,104 @@
-/// Polling of the units of one Modbus line, and the readings from their answers.
+/// Thermocouples on a Modbus line: the requests for all values of a device (pure), the polling of
+/// the units, and the readings from their answers.
 #pragma once
 
+#include <algorithm>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
 #include <mutex>
 #include <optional>
 #include <vector>
 
+#include "drivers/bus.hpp"
+#include "drivers/modbus/modbus_config.hpp"
 #include "drivers/modbus/shared_line.hpp"
-#include "drivers/sensors/modbus_plan.hpp"
-#include "drivers/sensors/sensor_source.hpp"
-#include "drivers/sensors/unit_backoff.hpp"
-#include "drivers/wait_free_slot.hpp"
 
 namespace thermocomp {
+
+inline constexpr int registers_per_request_limit = 125;  ///< of the protocol
+inline constexpr int bits_per_request_limit = 2000;      ///< of the protocol
+
+/// Read of `count` registers or bits of one table from `address` on.
+struct PlannedRequest {
+  ModbusTable table{ModbusTable::input};
+  std::uint16_t address{0};  ///< 0-based
+  std::uint16_t count{0};
+};
+
+/// Place of a value's first register or bit in the answers.
+struct WordPlace {
+  std::size_t request{0};  ///< index into ModbusPlan::requests
+  std::size_t offset{0};   ///< words from the answer's first
+};
+
+struct ChannelPlace {
+  WordPlace value;
+  std::optional<WordPlace> status;
+};
+
+/// Requests for all values of a device, and the place of each value in the answers.
+struct ModbusPlan {
+  std::size_t words_a_register{1};  ///< in the answers; 2: of 32-bit registers
+  std::vector<PlannedRequest> requests;
+  std::vector<ChannelPlace> channels;  ///< in the order of the device's channels
+  /// In the first request: a counter read before the values never makes old values new.
+  std::optional<WordPlace> renewal;
+};
+
+/// Neighbouring values share a request if the unused words between them are at most
+/// `gap_registers_max` (bits: 16 times that), and its length at most `registers_per_request_max`,
+/// `line_registers_max` and the protocol's limit. A value is never split. `one_register_a_request`:
+/// every value, status and counter has a request of its own.
+/// @pre the limits are at least as large as the largest value
+[[nodiscard]] ModbusPlan plan_requests(const ModbusDeviceConfig& device,
+                                       int line_registers_max = registers_per_request_limit);
+
+/// Pauses between requests to a unit that does not answer. Pure; the time is passed in.
+/// They double from `pause_first` to `pause_max`; an answer ends them at once. From the third
+/// failure on they also limit the time-outs of all dead units of the line to `line_share_max` of
+/// its time, as far as `stretch_max` times `pause_max` allows.
+class UnitBackoff {
+ public:
+  using nanoseconds = std::chrono::nanoseconds;
+  static constexpr double line_share_max = 0.02;
+  static constexpr int failures_before_budget = 2;
+  static constexpr double stretch_max = 1.8;
+
+  explicit UnitBackoff(nanoseconds pause_first) noexcept : pause_first_(pause_first) {}
+
+  void answered() noexcept {
+    failures_ = 0;
+    not_before_ = nanoseconds{0};
+  }
+
+  /// All attempts failed at `now`.
+  /// @param cost        line time of the failed request
+  /// @param dead_units  units of the line without answer, with this one
+  void failed(nanoseconds now, nanoseconds cost, std::size_t dead_units,
+              nanoseconds pause_max) noexcept {
+    pause_ = std::min(failures_ == 0 ? pause_first_ : 2 * pause_, pause_max);
+    ++failures_;
+    nanoseconds pause = pause_;
+    if (failures_ > failures_before_budget) {
+      const double budget =
+          static_cast<double>(cost.count()) * static_cast<double>(dead_units) / line_share_max;
+      const auto ceiling = stretch_max * static_cast<double>(pause_max.count());
+      pause =
+          std::max(pause, nanoseconds{static_cast<nanoseconds::rep>(std::min(budget, ceiling))});
+    }
+    not_before_ = now + pause;
+  }
+
+  [[nodiscard]] bool dead() const noexcept { return failures_ != 0; }
+  [[nodiscard]] nanoseconds not_before() const noexcept { return not_before_; }
+
+ private:
+  nanoseconds pause_first_;
+  nanoseconds pause_{0};
+  nanoseconds not_before_{0};
+  int failures_{0};
+};
 
 /// Each device is read at its period on an absolute schedule. `taken_at` of a reading is the
 /// arrival of the last answer with its value (with a renewal counter: the last answer in which the

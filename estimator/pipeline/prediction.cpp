@@ -4,7 +4,154 @@
 #include <cmath>
 #include <span>
 
+#include "estimator/checks.hpp"
+#include "estimator/name_index.hpp"
+
 namespace thermocomp {
+namespace {
+
+/// Larger values are garbled registers, whose squares would stay in the lags for ever.
+constexpr double signal_magnitude_max = 1e9;
+
+std::vector<std::size_t> indices_of_model(const EstimatorConfig& config,
+                                          const ThermalModel& model) {
+  static_assert(signals_max == 48);
+  require(config.signals.size() <= signals_max, "controller.signal",
+          static_cast<double>(config.signals.size()), "must be at most 48");
+  std::vector<std::size_t> indices;
+  for (const std::string& name : model.signal_columns())
+    indices.push_back(
+        index_of(config.signals, name, "controller.signal", "the model needs this signal"));
+  return indices;
+}
+
+std::optional<std::size_t> switch_index(const EstimatorConfig& config, const std::string& name,
+                                        const char* key) {
+  if (name.empty()) return std::nullopt;
+  return index_of(config.signals, name, key, "is not a signal of the controller");
+}
+
+}  // namespace
+
+SignalIntake::SignalIntake(const EstimatorConfig& config, const ThermalModel& model)
+    : names_(config.signals),
+      model_signals_(indices_of_model(config, model)),
+      cutting_(switch_index(config, config.compensation.cutting_signal, "cutting_signal")),
+      disable_(switch_index(config, config.compensation.disable_signal, "disable_signal")),
+      cycle_end_(switch_index(config, config.compensation.cycle_end_signal, "cycle_end_signal")),
+      stale_after_(to_nanoseconds(config.compensation.controller_stale_after_s)),
+      of_model_(model_signals_.size(), not_a_number) {
+  state_.last.fill(not_a_number);
+}
+
+Signals SignalIntake::step(nanoseconds now, const ControllerState& controller) noexcept {
+  state_.online = controller.online && now - controller.taken_at <= stale_after_;
+  Signals signals;
+  signals.online = state_.online;
+  signals.complete = state_.online ? take(controller) : model_signals_.empty();
+  signals.of_model = of_model_;
+  signals.watches_cutting = cutting_.has_value();
+  signals.cutting = last_value(cutting_);
+  signals.disable = last_value(disable_);
+  signals.cycle_end = last_value(cycle_end_);
+  return signals;
+}
+
+/// @return true if all needed signals are known
+bool SignalIntake::take(const ControllerState& controller) noexcept {
+  for (std::size_t i = 0; i < names_.size(); ++i)
+    state_.last[i] = std::abs(controller.signals[i]) <= signal_magnitude_max ? controller.signals[i]
+                                                                             : not_a_number;
+  // A switch in an unknown position counts as missing: hold.
+  bool complete = !disable_ || std::isfinite(last_value(disable_));
+  for (std::size_t i = 0; i < model_signals_.size(); ++i) {
+    of_model_[i] = state_.last[model_signals_[i]];
+    complete = complete && std::isfinite(of_model_[i]);
+  }
+  return complete;
+}
+
+void SignalIntake::adopt(const SignalIntake& previous, const std::vector<int>& plan) noexcept {
+  take_by_plan(plan, previous.of_model_, of_model_);
+  // `online` is set by the next step.
+  if (names_ == previous.names_) state_.last = previous.state_.last;
+}
+
+namespace {
+
+constexpr nanoseconds never = nanoseconds::min();
+
+}  // namespace
+
+Reference::Reference(const ThermalModel& model)
+    : of_model_file_(model.reference_degC),
+      columns_(model.temperature_columns()),
+      signal_names_(model.signal_columns()),
+      temps_degC_(columns_.size(), not_a_number),
+      sampled_at_(columns_.size(), never),
+      signals_(signal_names_.size(), of_model_file_.empty() ? not_a_number : 0.0) {
+  std::copy(of_model_file_.begin(), of_model_file_.end(), temps_degC_.begin());
+}
+
+ReferenceState Reference::step(nanoseconds now, const Temperatures& temps,
+                               const Signals& signals) noexcept {
+  ReferenceState state{temps_degC_, signals_, true, false};
+  for (std::size_t i = 0; i < temps_degC_.size(); ++i) {
+    const nanoseconds sampled_at = sampled_at_[i];
+    if (sampled_at != never && temps.refuted_at[i] >= sampled_at &&
+        temps.refuted_at[i] - sampled_at <= young) {
+      temps_degC_[i] = not_a_number;
+      state.changed = true;
+    }
+    if (!std::isfinite(temps_degC_[i]) && temps.good[i] != 0) {
+      temps_degC_[i] = temps.measured_degC[i];
+      sampled_at_[i] = now;
+      state.changed = true;
+    }
+    if (!std::isfinite(temps_degC_[i])) state.known = false;
+  }
+  // Signals of an offline controller are not those of this moment.
+  for (std::size_t i = 0; signals.online && i < signals_.size(); ++i)
+    if (!std::isfinite(signals_[i])) {
+      signals_[i] = signals.of_model[i];
+      state.changed = true;
+    }
+  return state;
+}
+
+void Reference::take(std::span<const double> temps_degC) noexcept {
+  THERMOCOMP_ENSURE(temps_degC.size() == temps_degC_.size());
+  std::copy(temps_degC.begin(), temps_degC.end(), temps_degC_.begin());
+  std::fill(sampled_at_.begin(), sampled_at_.end(), never);
+  std::fill(signals_.begin(), signals_.end(), not_a_number);
+}
+
+void Reference::restore(const std::map<std::string, double>& temps_degC,
+                        const std::map<std::string, double>& signals) {
+  for (std::size_t i = 0; i < columns_.size(); ++i)
+    take_if_finite(temps_degC, columns_[i], temps_degC_[i]);
+  for (std::size_t i = 0; i < signal_names_.size(); ++i)
+    take_if_finite(signals, signal_names_[i], signals_[i]);
+}
+
+void Reference::adopt(const Reference& previous, const std::vector<int>& columns,
+                      const std::vector<int>& signals) noexcept {
+  if (of_model_file_ != previous.of_model_file_) return;
+  take_by_plan(columns, previous.temps_degC_, temps_degC_);
+  take_by_plan(columns, previous.sampled_at_, sampled_at_);
+  take_by_plan(signals, previous.signals_, signals_);
+}
+
+void Reference::complete(const Reference& same) noexcept {
+  for (std::size_t i = 0; i < temps_degC_.size(); ++i) {
+    if (std::isfinite(temps_degC_[i])) continue;
+    temps_degC_[i] = same.temps_degC_[i];
+    sampled_at_[i] = same.sampled_at_[i];
+  }
+  for (std::size_t i = 0; i < signals_.size(); ++i)
+    if (!std::isfinite(signals_[i])) signals_[i] = same.signals_[i];
+}
+
 namespace {
 
 /// Share of the limit below which an uncertain estimate is used again, so that a moving slide does
@@ -98,7 +245,7 @@ Displacement Prediction::step(nanoseconds now, const Temperatures& temps,
   found.block_estimated = !temps.all_good && certain;
   if (!found.block_lost && signals.complete && reference.known) {
     predict(now, temps, reference, signals);
-    learned.step(now, temps, reference, !signals.may_be_cutting());
+    learned.step(now, temps.estimated_degC, reference.temps_degC, !signals.may_be_cutting());
     for (std::size_t i = 0; i < axis_um_.size(); ++i) axis_um_[i] = axis_um(i, learned);
     // Good inputs and a valid model may still give a result that is not finite.
     found.known = std::all_of(axis_um_.begin(), axis_um_.end(),

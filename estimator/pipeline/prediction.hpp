@@ -1,22 +1,153 @@
-/// Displacement of each axis from temperatures, reference and signals, and the decision whether
-/// estimates of lost blocks are accurate enough.
+/// Displacement of each axis: the controller's signals, the reference state, the model, and the
+/// decision whether estimates of lost blocks are accurate enough. Spans in its values are valid
+/// until the next step.
 #pragma once
 
+#include <array>
+#include <chrono>
 #include <cstddef>
+#include <cstdint>
+#include <map>
 #include <optional>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "estimator/estimator_config.hpp"
 #include "estimator/learning/probings.hpp"
 #include "estimator/model/displacement_model.hpp"
-#include "estimator/model/model_domain.hpp"
 #include "estimator/model/travel_curves.hpp"
-#include "estimator/sensing/lost_blocks.hpp"
+#include "estimator/sensing/neighbours.hpp"
+#include "estimator/sensing/sensing.hpp"
 #include "estimator/state_archive.hpp"
-#include "estimator/step_values.hpp"
 #include "estimator/thermal_model.hpp"
+#include "estimator/types.hpp"
 
 namespace thermocomp {
+
+/// Signals of the controller; while it is offline, the last ones.
+struct Signals {
+  bool online{false};    ///< the controller answers and its report is fresh
+  bool complete{false};  ///< every value that the model or disable_signal needs is known
+  std::span<const double> of_model;  ///< shape (signal_columns)
+  bool watches_cutting{false};       ///< a cutting_signal is configured
+  double cutting{not_a_number};      ///< NaN: unknown or not configured; so are the next two
+  double disable{not_a_number};
+  double cycle_end{not_a_number};
+
+  /// An unknown signal does not count as "not cutting".
+  [[nodiscard]] bool surely_not_cutting() const noexcept { return online && cutting < 0.5; }
+  [[nodiscard]] bool may_be_cutting() const noexcept {
+    return watches_cutting && !surely_not_cutting();
+  }
+};
+
+/// A controller that is offline, or whose values are older than controller_stale_after_s, gives no
+/// signals: its positions and switches have no effect, and the offset holds where they are needed.
+class SignalIntake {
+ public:
+  struct State {
+    std::array<double, signals_max> last{};  ///< order of the configuration
+    bool online{false};
+  };
+
+  /// @throws InvalidValue when the model or a rule needs a signal that is not configured
+  SignalIntake(const EstimatorConfig& config, const ThermalModel& model);
+
+  [[nodiscard]] Signals step(nanoseconds now, const ControllerState& controller) noexcept;
+  /// The model's signals, as last reported.
+  [[nodiscard]] std::span<const double> of_model() const noexcept { return of_model_; }
+
+  /// @param plan  from plan_names() for the model's signals
+  void adopt(const SignalIntake& previous, const std::vector<int>& plan) noexcept;
+  void visit_last(StateArchive& archive) {
+    auto& [last, online] = state_;
+    archive(last, online);
+  }
+  void visit_of_model(StateArchive& archive) { archive(of_model_); }
+
+ private:
+  [[nodiscard]] bool take(const ControllerState& controller) noexcept;
+  [[nodiscard]] double last_value(std::optional<std::size_t> signal) const noexcept {
+    return signal ? state_.last[*signal] : not_a_number;
+  }
+
+  const std::vector<std::string> names_;
+  const std::vector<std::size_t> model_signals_;  ///< model's signal -> configured signal
+  const std::optional<std::size_t> cutting_;
+  const std::optional<std::size_t> disable_;
+  const std::optional<std::size_t> cycle_end_;
+  const nanoseconds stale_after_;
+
+  State state_;
+  std::vector<double> of_model_;
+};
+
+/// State of zero displacement.
+struct ReferenceState {
+  std::span<const double> temps_degC;  ///< shape (temperature_columns)
+  std::span<const double> signals;     ///< shape (signal_columns)
+  bool known{false};                   ///< all temperatures are known
+  bool changed{false};                 ///< in this step
+};
+
+/// Temperatures: the model file's numbers, else each column's first good value. Signals: zero with
+/// such numbers, which mean a machine at rest; a sampled reference defines zero displacement in the
+/// present state, so its signals are those of that moment.
+///
+/// A first good value is provisional for `young`: if a jump of its sensor begins in that time and
+/// is confirmed, the value was wrong and the column's reference is taken anew. (Waiting for a
+/// steady machine instead would leave one that is started warm without compensation.)
+class Reference {
+ public:
+  static constexpr nanoseconds young = std::chrono::minutes(10);
+
+  explicit Reference(const ThermalModel& model);
+
+  /// Takes references that are missing and measured now.
+  [[nodiscard]] ReferenceState step(nanoseconds now, const Temperatures& temps,
+                                    const Signals& signals) noexcept;
+  /// Displacement is zero now. The signals are taken at the next step.
+  /// @pre all temperatures are good
+  void take(std::span<const double> temps_degC) noexcept;
+
+  [[nodiscard]] std::span<const double> temps_degC() const noexcept { return temps_degC_; }
+  [[nodiscard]] std::span<const double> signals() const noexcept { return signals_; }
+
+  /// Before the first step, by name; missing or non-finite values change nothing.
+  void restore(const std::map<std::string, double>& temps_degC,
+               const std::map<std::string, double>& signals);
+  /// After a reload, with plans of plan_names(). New numbers in the model file are deliberate and
+  /// replace the reference; otherwise it stays.
+  void adopt(const Reference& previous, const std::vector<int>& columns,
+             const std::vector<int>& signals) noexcept;
+  /// Takes missing references from an estimator with the same model.
+  void complete(const Reference& same) noexcept;
+  void visit_temperatures(StateArchive& archive) { archive(temps_degC_, sampled_at_); }
+  void visit_signals(StateArchive& archive) { archive(signals_); }
+
+ private:
+  const std::vector<double> of_model_file_;  ///< one per input, or empty
+  const std::vector<std::string> columns_;
+  const std::vector<std::string> signal_names_;
+
+  std::vector<double> temps_degC_;
+  std::vector<nanoseconds> sampled_at_;  ///< one per column; min(): not a first value
+  std::vector<double> signals_;
+};
+
+/// Displacement of the machine without any offset.
+struct Displacement {
+  bool known{false};  ///< computed in this step; else the numbers below are from an earlier one
+  bool block_lost{false};
+  bool block_estimated{false};  ///< lost, and estimated well enough
+  bool not_finite{false};       ///< good inputs gave no finite number
+  bool outside{false};
+  bool held{false};                 ///< outside, and configured to hold
+  double used_share{1.0};           ///< share of the model's displacement in use
+  std::span<const double> zero_um;  ///< per output: the model at the reference state
+  std::span<const double> axis_um;  ///< one per axis, with the correction learned from probings
+};
 
 /// Standard deviation of each axis from the estimated temperatures,
 ///

@@ -1,89 +1,104 @@
 #include "estimator/pipeline/report.hpp"
 
-#include <chrono>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <utility>
 
-#include "estimator/pipeline/stages.hpp"
+#include "estimator/checks.hpp"
+#include "estimator/learning/probings.hpp"
 
 namespace thermocomp {
 namespace {
 
-void report_axis(const Stages& stages, std::size_t axis, AxisReport& out) noexcept {
-  const AxisChannel& channel = stages.axes[axis];
-  out.displacement_um = stages.prediction.axis_um(axis, stages.learned);
-  out.target_um = channel.target_um();
-  out.offset_um = channel.offset_um();
-  out.applied_um = channel.applied_um();
-  out.measured_um = stages.learned.measured_um(axis);
-  out.synced = channel.synced();
-  out.driven = stages.axes.driven(axis);
-  out.disagrees = channel.mismatch();
-  out.start = channel.start();
-  out.start_unknown = channel.start_unknown();
-  out.waits_for_disk = channel.waits_for_disk();
-  out.corridor_um = channel.corridor_um();
-  out.latched = channel.latched();
-  out.releasing = channel.releasing();
-  out.latched_mismatch = channel.latched_mismatch();
-  out.at_bound = channel.at_bound();
-  out.proving = channel.proving();
-  out.offset_sd_um = stages.prediction.offset_sd_um(axis);
-  out.held_um = stages.cycle_update.held_um(axis);
-  out.claimed_sd_um = stages.prediction.claimed_sd_um(axis);
-  out.probed_rms_um = stages.learned.rms_um(axis);
-  out.probings = stages.learned.count(axis);
-  out.entered_um = stages.learned.operator_um(axis).entered_um;
-  out.absorbed_um = stages.learned.operator_um(axis).learned_um;
-  out.correction = stages.learned.report(axis);
+void add(std::map<std::string, double>& values, const std::string& name, double value) {
+  if (std::isfinite(value)) values[name] = value;
 }
 
-DomainReport domain_of(const Prediction& prediction) noexcept {
-  DomainReport report;
-  report.outside_share_24h = prediction.outside_share_24h();
-  if (!prediction.domain()) return report;
-  report.known = true;
-  report.outside = prediction.domain()->outside();
-  report.distance = prediction.domain()->distance();
-  return report;
+void add_inputs(const std::vector<std::string>& columns, const Report& report,
+                PersistentState& state) {
+  THERMOCOMP_ENSURE(columns.size() == report.inputs.size());
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    const InputReport& input = report.inputs[i];
+    add(state.reference_degC, columns[i], input.reference_degC);
+    add(state.held_degC, columns[i], input.held_degC);
+    if (input.good || input.estimated) add(state.temp_degC, columns[i], input.temp_degC);
+  }
+}
+
+void add_axis(const std::string& name, const AxisReport& axis, PersistentState& state) {
+  add(state.offset_um, name, axis.offset_um);
+  add(state.corridor_um, name, axis.corridor_um);
+  const auto add_learned = [&](const std::string& key, double value) {
+    state.correction[std::string(name).append(".").append(key)] = value;
+  };
+  for (const auto& [key, value] : RunningCorrection::persistent(axis.correction))
+    add_learned(key, value);
+  if (axis.entered_um == 0.0 && axis.absorbed_um == 0.0) return;
+  add_learned("entered_um", axis.entered_um);
+  add_learned("absorbed_um", axis.absorbed_um);
+}
+
+bool nears_an_edge(const PersistentState& now, const PersistentState& saved) {
+  return std::any_of(now.corridor_um.begin(), now.corridor_um.end(), [&](const auto& corridor) {
+    const auto& [name, width_um] = corridor;
+    const auto before = saved.offset_um.find(name);
+    const auto offset = now.offset_um.find(name);
+    return before == saved.offset_um.end() || offset == now.offset_um.end() ||
+           std::abs(offset->second - before->second) >= 0.25 * width_um;
+  });
 }
 
 }  // namespace
 
-Report sized_report(const Stages& stages) {
-  Report out;
-  out.sensors.resize(stages.config.sensors.size());
-  out.inputs.resize(stages.reference.temps_degC().size());
-  out.signals.resize(stages.signals.of_model().size());
-  out.displacement_um.resize(stages.model.outputs.size());
-  out.axes.resize(stages.axes.size());
-  return out;
+std::map<std::string, double> reference_numbers(const ThermalModel& model) {
+  std::map<std::string, double> numbers;
+  for (std::size_t i = 0; i < model.reference_degC.size(); ++i)
+    numbers[model.inputs[i]] = model.reference_degC[i];
+  return numbers;
 }
 
-void fill_report(const Stages& stages, Report& out) noexcept {
-  const ModeDecision::State& mode = stages.mode.state();
-  const CycleHold& held = stages.cycle_update.hold();
-  out.cycle = stages.record.cycle;
-  out.now = stages.record.now;
-  out.mode = mode.mode;
-  out.mode_since = mode.mode_since;
-  out.reasons = stages.record.reasons;
-  out.enabled = mode.enabled;
-  out.cycle_ends = stages.cycle_update.cycle_ends();
-  out.remembered_s = std::chrono::duration<double>(stages.learned.remembered()).count();
-  stages.sensing.report(out.sensors);
-  const LostBlocks& lost = stages.sensing.lost();
-  for (std::size_t i = 0; i < out.inputs.size(); ++i)
-    out.inputs[i] = {lost.temps_degC()[i],
-                     stages.reference.temps_degC()[i],
-                     stages.sensing.blocks().good(i),
-                     lost.estimated(i),
-                     lost.sd_K(i),
-                     held.temps_degC()[i]};
-  for (std::size_t i = 0; i < out.signals.size(); ++i)
-    out.signals[i] = {stages.signals.of_model()[i], stages.reference.signals()[i], held.signal(i)};
-  for (std::size_t i = 0; i < out.displacement_um.size(); ++i)
-    out.displacement_um[i] = stages.prediction.output_um(i);
-  for (std::size_t i = 0; i < out.axes.size(); ++i) report_axis(stages, i, out.axes[i]);
-  out.domain = domain_of(stages.prediction);
+bool must_be_saved(const PersistentState& now, const PersistentState& saved) {
+  return now.enabled != saved.enabled || now.reference_degC != saved.reference_degC ||
+         now.model_reference_degC != saved.model_reference_degC ||
+         now.jumped_from_degC != saved.jumped_from_degC ||
+         now.reference_signals != saved.reference_signals || now.held_degC != saved.held_degC ||
+         now.held_signals != saved.held_signals || now.correction != saved.correction ||
+         now.corridor_um != saved.corridor_um || nears_an_edge(now, saved);
+}
+
+std::vector<Command> saved_commands(const EstimatorConfig& config, const PersistentState& saved) {
+  std::vector<Command> commands;
+  for (std::size_t i = 0; i < config.axes.size(); ++i) {
+    const std::string& name = config.axes[i].name;
+    const auto offset = saved.offset_um.find(name);
+    if (saved.corridor_um.contains(name) && offset != saved.offset_um.end())
+      commands.push_back({CommandKind::saved, static_cast<std::uint32_t>(i), offset->second});
+  }
+  return commands;
+}
+
+PersistentState persistent_state(const EstimatorConfig& config, const ThermalModel& model,
+                                 const Report& report) {
+  PersistentState state;
+  state.enabled = report.enabled;
+  state.model_reference_degC = reference_numbers(model);
+  add_inputs(model.temperature_columns(), report, state);
+  const std::vector<std::string> signals = model.signal_columns();
+  THERMOCOMP_ENSURE(signals.size() == report.signals.size());
+  for (std::size_t i = 0; i < signals.size(); ++i) {
+    add(state.reference_signals, signals[i], report.signals[i].reference);
+    add(state.held_signals, signals[i], report.signals[i].held);
+  }
+  THERMOCOMP_ENSURE(config.sensors.size() == report.sensors.size());
+  for (std::size_t i = 0; i < report.sensors.size(); ++i)
+    add(state.jumped_from_degC, config.sensors[i].name, report.sensors[i].jumped_from_degC);
+  THERMOCOMP_ENSURE(config.axes.size() == report.axes.size());
+  for (std::size_t i = 0; i < report.axes.size(); ++i) {
+    state.sign[config.axes[i].name] = config.axes[i].sign;
+    add_axis(config.axes[i].name, report.axes[i], state);
+  }
+  return state;
 }
 
 }  // namespace thermocomp

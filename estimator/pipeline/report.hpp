@@ -1,13 +1,16 @@
-/// State after a step, for operators and the history.
+/// State after a step, for operators and the history; and the part of it that survives a restart.
 #pragma once
 
 #include <cstdint>
+#include <map>
+#include <string>
 #include <vector>
 
-#include "estimator/axes/read_back.hpp"
-#include "estimator/learning/running_correction.hpp"
-#include "estimator/pipeline/mode.hpp"
-#include "estimator/sensing/screening.hpp"
+#include "estimator/axes/mismatch.hpp"
+#include "estimator/estimator_config.hpp"
+#include "estimator/learning/probings.hpp"
+#include "estimator/sensing/sensor.hpp"
+#include "estimator/thermal_model.hpp"
 #include "estimator/types.hpp"
 
 namespace thermocomp {
@@ -87,10 +90,45 @@ struct Report {
   DomainReport domain;
 };
 
-struct Stages;
-/// Sized for `stages`; allocates.
-[[nodiscard]] Report sized_report(const Stages& stages);
-/// Overwrites `out`, which was sized for these stages. No allocation.
-void fill_report(const Stages& stages, Report& out) noexcept;
+/// State that survives a restart, by name (the state file).
+struct PersistentState {
+  bool enabled{true};
+  std::map<std::string, double> reference_degC;  ///< by temperature column
+  /// Reference of the model file at the time, by input; empty: first sample. Other numbers in the
+  /// file at a restart are deliberate and replace the stored ones.
+  std::map<std::string, double> model_reference_degC;
+  std::map<std::string, double> reference_signals;  ///< at the reference, by column
+  std::map<std::string, double> offset_um;          ///< by axis, last sent
+  /// By axis with a corridor: largest distance of the sent offset from the saved one [um]. The
+  /// saved one is the start where nothing better is known.
+  std::map<std::string, double> corridor_um;
+  std::map<std::string, double> sign;         ///< by axis: direction in which an offset counted
+  std::string controller;                     ///< that the offsets were sent to; empty: unknown
+  std::map<std::string, double> recorded_um;  ///< by axis, last-sent record; not in the file
+  std::map<std::string, double> temp_degC;    ///< in use, by temperature column
+  /// By sensor with a jump: its value before, so that a restart does not confirm the jump.
+  std::map<std::string, double> jumped_from_degC;
+  std::map<std::string, double> held_degC;     ///< InputReport::held_degC, by column
+  std::map<std::string, double> held_signals;  ///< SignalReport::held, by column
+  /// RunningCorrection::persistent(), "z.gain1" and so on.
+  std::map<std::string, double> correction;
+};
+
+/// Reference of a model file, by input.
+[[nodiscard]] std::map<std::string, double> reference_numbers(const ThermalModel& model);
+
+/// True if a difference must be written at once: switch, references, jumps, learned and held
+/// values, and an offset that has used a quarter of its corridor. Other offsets and temperatures
+/// change all the time and may wait.
+[[nodiscard]] bool must_be_saved(const PersistentState& now, const PersistentState& saved);
+
+/// Commands that report `saved` as written to disk: one per axis with a corridor.
+[[nodiscard]] std::vector<Command> saved_commands(const EstimatorConfig& config,
+                                                  const PersistentState& saved);
+
+/// The state that survives a restart, from a report of the estimator with this configuration and
+/// model (sizes are checked).
+[[nodiscard]] PersistentState persistent_state(const EstimatorConfig& config,
+                                               const ThermalModel& model, const Report& report);
 
 }  // namespace thermocomp

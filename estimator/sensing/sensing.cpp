@@ -2,86 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <map>
 
 #include "estimator/checks.hpp"
 #include "estimator/name_index.hpp"
 
 namespace thermocomp {
-namespace {
-
-constexpr nanoseconds never = nanoseconds::min();
-
-}  // namespace
-
-Reference::Reference(const ThermalModel& model)
-    : of_model_file_(model.reference_degC),
-      columns_(model.temperature_columns()),
-      signal_names_(model.signal_columns()),
-      temps_degC_(columns_.size(), not_a_number),
-      sampled_at_(columns_.size(), never),
-      signals_(signal_names_.size(), of_model_file_.empty() ? not_a_number : 0.0) {
-  std::copy(of_model_file_.begin(), of_model_file_.end(), temps_degC_.begin());
-}
-
-ReferenceState Reference::step(nanoseconds now, const Temperatures& temps,
-                               const Signals& signals) noexcept {
-  ReferenceState state{temps_degC_, signals_, true, false};
-  for (std::size_t i = 0; i < temps_degC_.size(); ++i) {
-    const nanoseconds sampled_at = sampled_at_[i];
-    if (sampled_at != never && temps.refuted_at[i] >= sampled_at &&
-        temps.refuted_at[i] - sampled_at <= young) {
-      temps_degC_[i] = not_a_number;
-      state.changed = true;
-    }
-    if (!std::isfinite(temps_degC_[i]) && temps.good[i] != 0) {
-      temps_degC_[i] = temps.measured_degC[i];
-      sampled_at_[i] = now;
-      state.changed = true;
-    }
-    if (!std::isfinite(temps_degC_[i])) state.known = false;
-  }
-  // Signals of an offline controller are not those of this moment.
-  for (std::size_t i = 0; signals.online && i < signals_.size(); ++i)
-    if (!std::isfinite(signals_[i])) {
-      signals_[i] = signals.of_model[i];
-      state.changed = true;
-    }
-  return state;
-}
-
-void Reference::take(std::span<const double> temps_degC) noexcept {
-  THERMOCOMP_ENSURE(temps_degC.size() == temps_degC_.size());
-  std::copy(temps_degC.begin(), temps_degC.end(), temps_degC_.begin());
-  std::fill(sampled_at_.begin(), sampled_at_.end(), never);
-  std::fill(signals_.begin(), signals_.end(), not_a_number);
-}
-
-void Reference::restore(const std::map<std::string, double>& temps_degC,
-                        const std::map<std::string, double>& signals) {
-  for (std::size_t i = 0; i < columns_.size(); ++i)
-    take_if_finite(temps_degC, columns_[i], temps_degC_[i]);
-  for (std::size_t i = 0; i < signal_names_.size(); ++i)
-    take_if_finite(signals, signal_names_[i], signals_[i]);
-}
-
-void Reference::adopt(const Reference& previous, const std::vector<int>& columns,
-                      const std::vector<int>& signals) noexcept {
-  if (of_model_file_ != previous.of_model_file_) return;
-  take_by_plan(columns, previous.temps_degC_, temps_degC_);
-  take_by_plan(columns, previous.sampled_at_, sampled_at_);
-  take_by_plan(signals, previous.signals_, signals_);
-}
-
-void Reference::complete(const Reference& same) noexcept {
-  for (std::size_t i = 0; i < temps_degC_.size(); ++i) {
-    if (std::isfinite(temps_degC_[i])) continue;
-    temps_degC_[i] = same.temps_degC_[i];
-    sampled_at_[i] = same.sampled_at_[i];
-  }
-  for (std::size_t i = 0; i < signals_.size(); ++i)
-    if (!std::isfinite(signals_[i])) signals_[i] = same.signals_[i];
-}
-
 namespace {
 
 /// The model for LostBlocks: without covariance if blocks are not to be estimated.
@@ -200,6 +127,314 @@ void Sensing::adopt(const Sensing& previous) noexcept {
   blocks_.adopt(previous.blocks_);
   lost_.adopt(previous.lost_);
   if (suspicion_ && previous.suspicion_) suspicion_->adopt(*previous.suspicion_);
+}
+
+namespace {
+
+constexpr nanoseconds never = nanoseconds::min();
+constexpr int no_sensor = -1;
+constexpr int unknown_sensor = -2;  ///< not in the previous bank
+
+bool same(const SmoothingConfig& a, const SmoothingConfig& b) {
+  return a.form == b.form && a.history == b.history && a.period_s == b.period_s &&
+         a.samples == b.samples && a.half_width_K == b.half_width_K && a.outage_s == b.outage_s;
+}
+
+}  // namespace
+
+BlockBank::Sensor::Sensor(const SensorConfig& sensor_config)
+    : screening(sensor_config.screening),
+      smoother(sensor_config.smoothing),
+      reference(sensor_config.reference_sensor ? static_cast<int>(*sensor_config.reference_sensor)
+                                               : no_sensor),
+      config(sensor_config) {}
+
+BlockBank::BlockBank(const EstimatorConfig& config, const std::vector<std::string>& columns) {
+  for (const SensorConfig& sensor : config.sensors) {
+    if (sensor.reference_sensor && *sensor.reference_sensor >= config.sensors.size())
+      throw InvalidValue("sensor[" + sensor.name + "].reference_sensor",
+                         std::to_string(*sensor.reference_sensor), "must be the index of a sensor");
+    sensors_.emplace_back(sensor);
+  }
+  std::map<std::string, std::size_t> named;
+  for (std::size_t i = 0; i < sensors_.size(); ++i) {
+    const std::string& name = config.sensors[i].module;
+    const std::size_t module =
+        name.empty() ? modules_.size() : named.try_emplace(name, modules_.size()).first->second;
+    if (module == modules_.size()) modules_.emplace_back();
+    modules_[module].push_back(i);
+    sensors_[i].module = module;
+  }
+  witnesses_.assign(modules_.size(), 0);
+  refuted_at_.assign(columns.size(), never);
+  for (const std::string& column : columns) {
+    const auto block = std::find_if(config.blocks.begin(), config.blocks.end(),
+                                    [&](const BlockConfig& each) { return each.input == column; });
+    if (block == config.blocks.end())
+      throw InvalidValue("model.inputs", column, "no [[block]] has this input");
+    if (block->sensors.empty())
+      throw InvalidValue("block[" + block->name + "].sensors", "[]", "must name a sensor");
+    for (const std::size_t index : block->sensors)
+      if (index >= sensors_.size())
+        throw InvalidValue("block[" + block->name + "].sensors", std::to_string(index),
+                           "must be the index of a sensor");
+    blocks_.push_back({block->sensors, std::vector<double>(block->sensors.size(), 0.0)});
+  }
+  values_K_.assign(sensors_.size(), not_a_number);
+  kept_K_ = values_K_;
+  temps_degC_.assign(columns.size(), not_a_number);
+  good_.assign(columns.size(), 0);
+}
+
+void BlockBank::read(nanoseconds now, std::span<const Reading> readings) noexcept {
+  THERMOCOMP_ENSURE(readings.size() == sensors_.size());
+  now_ = now;
+  // All are screened before any is smoothed: a difference needs the reference of this cycle.
+  waiting_ = jumped_ = 0;
+  for (std::size_t i = 0; i < sensors_.size(); ++i) look_at(sensors_[i], now, readings[i]);
+  for (std::size_t i = 0; i < sensors_.size(); ++i) values_K_[i] = smooth(sensors_[i], now);
+}
+
+void BlockBank::screened(nanoseconds now, std::span<double> values_K) const noexcept {
+  THERMOCOMP_ENSURE(values_K.size() == sensors_.size());
+  for (std::size_t i = 0; i < sensors_.size(); ++i) {
+    const Sensor& sensor = sensors_[i];
+    values_K[i] = sensor.screening.usable(now) ? sensor.screening.good_degC() : not_a_number;
+    if (sensor.reference == no_sensor) continue;
+    const Screening& reference = sensors_[static_cast<std::size_t>(sensor.reference)].screening;
+    values_K[i] -= reference.usable(now) ? reference.good_degC() : not_a_number;
+  }
+}
+
+bool BlockBank::join(std::span<const std::uint8_t> left_out) noexcept {
+  in_use_K_ = values_K_;
+  if (!left_out.empty()) {
+    for (std::size_t i = 0; i < values_K_.size(); ++i)
+      kept_K_[i] = left_out[i] != 0 ? not_a_number : values_K_[i];
+    in_use_K_ = kept_K_;
+  }
+  bool all_good = true;
+  for (std::size_t i = 0; i < blocks_.size(); ++i) {
+    good_[i] = update(blocks_[i], temps_degC_[i]) ? 1 : 0;
+    all_good = all_good && good_[i] != 0;
+  }
+  return all_good;
+}
+
+void BlockBank::look_at(Sensor& sensor, nanoseconds now, const Reading& reading) noexcept {
+  sensor.fresh = sensor.screening.look(now, reading);
+  sensor.raw_degC = reading.temp_degC;
+  sensor.fault = sensor.screening.fault(now);
+  if (sensor.screening.waiting()) {
+    ++waiting_;
+    if (sensor.screening.jumped()) ++jumped_;
+    return;
+  }
+  if (!sensor.fresh || !sensor.screening.refuted()) return;
+  sensor.smoother.restart();
+  note_refuted(sensor);
+}
+
+void BlockBank::note_refuted(const Sensor& sensor) noexcept {
+  const auto index = static_cast<std::size_t>(&sensor - sensors_.data());
+  for (std::size_t i = 0; i < blocks_.size(); ++i)
+    if (std::find(blocks_[i].sensors.begin(), blocks_[i].sensors.end(), index) !=
+        blocks_[i].sensors.end())
+      refuted_at_[i] = sensor.screening.jumped_at();
+}
+
+void BlockBank::surround(std::span<const double> expected_degC,
+                         std::span<const double> sd_K) noexcept {
+  for (Sensor& sensor : sensors_) sensor.screening.surround({});
+  for (const auto& module : modules_)
+    if (is_not_ready(module))
+      for (const std::size_t sensor : module)
+        sensors_[sensor].screening.surround({not_a_number, 0.0, true});
+  std::fill(witnesses_.begin(), witnesses_.end(), std::size_t{0});
+  for (std::size_t i = 0; i < blocks_.size(); ++i)
+    for (const std::size_t sensor : blocks_[i].sensors)
+      if (good_[i] != 0) ++witnesses_[sensors_[sensor].module];
+  for (std::size_t i = 0; i < blocks_.size(); ++i) {
+    if (std::isnan(expected_degC[i])) continue;
+    for (std::size_t k = 0; k < blocks_[i].sensors.size(); ++k) {
+      Sensor& sensor = sensors_[blocks_[i].sensors[k]];
+      if (!sensor.screening.waiting() || !has_other_witness(sensor.module)) continue;
+      double expected = expected_degC[i] + blocks_[i].deviation_K[k];
+      if (sensor.reference != no_sensor) {
+        const Screening& reference = sensors_[static_cast<std::size_t>(sensor.reference)].screening;
+        expected += reference.usable(now_) ? reference.good_degC() : not_a_number;
+      }
+      sensor.screening.surround({expected, sd_K[i], false});
+    }
+  }
+}
+
+/// All channels show the same value although their last good values differ, as from a module that
+/// answers before its first conversion.
+bool BlockBank::is_not_ready(const std::vector<std::size_t>& module) const noexcept {
+  if (module.size() < 2) return false;
+  double least_degC = std::numeric_limits<double>::infinity();
+  double most_degC = -least_degC;
+  const double shown_degC = sensors_[module.front()].screening.newest_degC();
+  for (const std::size_t i : module) {
+    const Screening& screening = sensors_[i].screening;
+    if (!screening.waiting() || screening.newest_degC() != shown_degC) return false;
+    if (!screening.has_good()) continue;
+    least_degC = std::min(least_degC, screening.good_degC());
+    most_degC = std::max(most_degC, screening.good_degC());
+  }
+  return most_degC - least_degC > sensors_[module.front()].config.screening.rate_allowance_K;
+}
+
+/// True if a sensor of another module is in a good column.
+bool BlockBank::has_other_witness(std::size_t module) const noexcept {
+  for (std::size_t i = 0; i < witnesses_.size(); ++i)
+    if (i != module && witnesses_[i] > 0) return true;
+  return false;
+}
+
+void BlockBank::restore_jump(const std::string& name, double from_degC) {
+  for (Sensor& sensor : sensors_)
+    if (sensor.config.name == name) sensor.screening.restore_jump(from_degC);
+}
+
+bool BlockBank::accept(std::size_t index) noexcept {
+  Sensor& sensor = sensors_[index];
+  if (!sensor.screening.accept()) return false;
+  if (sensor.screening.refuted()) note_refuted(sensor);
+  sensor.smoother.restart();
+  sensor.fault = sensor.screening.fault(now_);
+  sensor.fresh = true;
+  values_K_[index] = smooth(sensor, now_);
+  return true;
+}
+
+double BlockBank::smooth(Sensor& sensor, nanoseconds now) noexcept {
+  double reference_degC = 0.0;
+  bool usable = sensor.screening.usable(now);
+  if (sensor.reference != no_sensor) {
+    const Screening& reference = sensors_[static_cast<std::size_t>(sensor.reference)].screening;
+    usable = usable && reference.usable(now);
+    reference_degC = reference.good_degC();
+  }
+  if (sensor.fresh && usable)
+    sensor.smoother.add(
+        {sensor.screening.good_at(), sensor.screening.good_degC() - reference_degC});
+  return usable && sensor.smoother.has_value() ? sensor.smoother.value_K() : not_a_number;
+}
+
+bool BlockBank::update(Block& block, double& temp_degC) noexcept {
+  double sum_degC = 0.0;
+  for (const std::size_t sensor : block.sensors) sum_degC += in_use_K_[sensor];
+  if (std::isnan(sum_degC)) return update_without_the_missing(block, temp_degC);
+  temp_degC = sum_degC / static_cast<double>(block.sensors.size());
+  for (std::size_t i = 0; i < block.sensors.size(); ++i)
+    block.deviation_K[i] = values_K_[block.sensors[i]] - temp_degC;
+  return true;
+}
+
+bool BlockBank::update_without_the_missing(const Block& block, double& temp_degC) const noexcept {
+  double sum_degC = 0.0;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < block.sensors.size(); ++i) {
+    const double value_K = in_use_K_[block.sensors[i]];
+    if (std::isnan(value_K)) continue;
+    sum_degC += value_K - block.deviation_K[i];
+    ++count;
+  }
+  if (count > 0) temp_degC = sum_degC / static_cast<double>(count);
+  return count > 0;
+}
+
+void BlockBank::continue_from(std::size_t column, double temp_degC) noexcept {
+  Block& block = blocks_[column];
+  for (std::size_t i = 0; i < block.sensors.size(); ++i)
+    if (const double value_K = values_K_[block.sensors[i]]; std::isfinite(value_K))
+      block.deviation_K[i] = value_K - temp_degC;
+}
+
+void BlockBank::report(std::span<SensorReport> sensors) const noexcept {
+  for (std::size_t i = 0; i < sensors_.size(); ++i) {
+    const Sensor& sensor = sensors_[i];
+    sensors[i] = {sensor.raw_degC,
+                  sensor.smoother.has_value() ? sensor.smoother.value_K() : not_a_number,
+                  sensor.screening.good_at(),
+                  sensor.fault,
+                  sensor.smoother.clipped_in_a_row(),
+                  sensor.smoother.clipped(),
+                  sensor.screening.rejected(),
+                  sensor.screening.waiting(),
+                  sensor.screening.jumped(),
+                  sensor.screening.jump_K(),
+                  sensor.screening.jumped_from_degC(),
+                  sensor.screening.jumped_at(),
+                  false,
+                  false,
+                  0.0,
+                  {}};
+  }
+}
+
+void BlockBank::visit_state(StateArchive& archive) {
+  for (Sensor& sensor : sensors_) archive(sensor);
+  for (Block& block : blocks_) archive(block.deviation_K);
+  archive(temps_degC_, good_, now_, waiting_, jumped_, refuted_at_);
+}
+
+void BlockBank::plan_adoption(const BlockBank& previous) {
+  sensor_plan_.clear();
+  for (const Sensor& sensor : sensors_) {
+    const auto found =
+        std::find_if(previous.sensors_.begin(), previous.sensors_.end(),
+                     [&](const Sensor& each) { return each.config.name == sensor.config.name; });
+    sensor_plan_.push_back(found == previous.sensors_.end()
+                               ? -1
+                               : static_cast<int>(found - previous.sensors_.begin()));
+  }
+  block_plan_.clear();
+  for (const Block& block : blocks_) {
+    const auto found =
+        std::find_if(previous.blocks_.begin(), previous.blocks_.end(), [&](const Block& each) {
+          // By name, since a new file may number sensors differently.
+          return std::equal(block.sensors.begin(), block.sensors.end(), each.sensors.begin(),
+                            each.sensors.end(), [&](std::size_t ours, std::size_t theirs) {
+                              return sensor_plan_[ours] == static_cast<int>(theirs);
+                            });
+        });
+    block_plan_.push_back(
+        found == previous.blocks_.end() ? -1 : static_cast<int>(found - previous.blocks_.begin()));
+  }
+}
+
+int BlockBank::previous_reference(const Sensor& sensor) const noexcept {
+  if (sensor.reference == no_sensor) return no_sensor;
+  const int previous = sensor_plan_[static_cast<std::size_t>(sensor.reference)];
+  return previous < 0 ? unknown_sensor : previous;
+}
+
+void BlockBank::adopt(const BlockBank& previous) noexcept {
+  now_ = previous.now_;
+  waiting_ = previous.waiting_;
+  for (std::size_t i = 0; i < sensors_.size(); ++i) {
+    if (sensor_plan_[i] < 0) continue;
+    const Sensor& other = previous.sensors_[static_cast<std::size_t>(sensor_plan_[i])];
+    Sensor& sensor = sensors_[i];
+    sensor.screening.adopt(other.screening);
+    sensor.raw_degC = other.raw_degC;
+    sensor.fault = other.fault;
+    if (!same(sensor.config.smoothing, other.config.smoothing) ||
+        previous_reference(sensor) != other.reference)
+      continue;
+    sensor.smoother = other.smoother;  // same sizes: no allocation
+  }
+  for (std::size_t i = 0; i < blocks_.size(); ++i) {
+    if (block_plan_[i] < 0) continue;
+    const auto other = static_cast<std::size_t>(block_plan_[i]);
+    blocks_[i].deviation_K = previous.blocks_[other].deviation_K;
+    temps_degC_[i] = previous.temps_degC_[other];
+    good_[i] = previous.good_[other];
+    refuted_at_[i] = previous.refuted_at_[other];
+  }
 }
 
 }  // namespace thermocomp

@@ -1,4 +1,4 @@
-/// Temperatures of the model's columns from readings, and the reference of their rise.
+/// Temperatures of the model's columns from readings.
 #pragma once
 
 #include <map>
@@ -8,58 +8,120 @@
 #include <vector>
 
 #include "estimator/estimator_config.hpp"
-#include "estimator/sensing/block_bank.hpp"
-#include "estimator/sensing/lost_blocks.hpp"
+#include "estimator/sensing/neighbours.hpp"
+#include "estimator/sensing/sensor.hpp"
 #include "estimator/sensing/suspicion.hpp"
 #include "estimator/state_archive.hpp"
-#include "estimator/step_values.hpp"
 #include "estimator/thermal_model.hpp"
 
 namespace thermocomp {
 
-/// Temperatures: the model file's numbers, else each column's first good value. Signals: zero with
-/// such numbers, which mean a machine at rest; a sampled reference defines zero displacement in the
-/// present state, so its signals are those of that moment.
-///
-/// A first good value is provisional for `young`: if a jump of its sensor begins in that time and
-/// is confirmed, the value was wrong and the column's reference is taken anew. (Waiting for a
-/// steady machine instead would leave one that is started warm without compensation.)
-class Reference {
+/// Block temperatures from sensors: screening, smoothing, differences, mean of a block's sensors.
+/// All sensors and their blocks, in the order of the model's temperature columns.
+class BlockBank {
  public:
-  static constexpr nanoseconds young = std::chrono::minutes(10);
+  /// @throws InvalidValue when a column has no block or a block no sensor
+  BlockBank(const EstimatorConfig& config, const std::vector<std::string>& columns);
 
-  explicit Reference(const ThermalModel& model);
+  void read(nanoseconds now, std::span<const Reading> readings) noexcept;
+  /// Number of sensors with an unconfirmed value.
+  [[nodiscard]] std::size_t waiting() const noexcept { return waiting_; }
+  /// ... of these, after a jump.
+  [[nodiscard]] std::size_t jumped() const noexcept { return jumped_; }
+  /// Before read(), while values wait: the expectation from the other blocks.
+  /// @param expected_degC, sd_K  of a column; NaN: no expectation
+  void surround(std::span<const double> expected_degC, std::span<const double> sd_K) noexcept;
+  /// Before the first step: the sensor's value before an unconfirmed jump of the previous run.
+  void restore_jump(const std::string& name, double from_degC);
+  /// Confirms the sensor's newest value. @return true if one was waiting
+  bool accept(std::size_t sensor) noexcept;
+  /// Shape (columns): start of the last confirmed jump of a sensor, which shows that the values
+  /// before it were wrong; min(): none.
+  [[nodiscard]] std::span<const nanoseconds> refuted_at() const noexcept { return refuted_at_; }
+  /// Screened values before smoothing; one per sensor, NaN: none.
+  void screened(nanoseconds now, std::span<double> values_K) const noexcept;
+  /// @param left_out  one per sensor: 1 excludes it; empty: all are used
+  /// @return true if every column has a usable temperature
+  bool join(std::span<const std::uint8_t> left_out) noexcept;
+  /// A sensor of the block is excluded: the block continues from `temp_degC`, and the deviations of
+  /// its other sensors count from there.
+  void continue_from(std::size_t column, double temp_degC) noexcept;
 
-  /// Takes references that are missing and measured now.
-  [[nodiscard]] ReferenceState step(nanoseconds now, const Temperatures& temps,
-                                    const Signals& signals) noexcept;
-  /// Displacement is zero now. The signals are taken at the next step.
-  /// @pre all temperatures are good
-  void take(std::span<const double> temps_degC) noexcept;
-
+  /// Shape (columns): block temperatures; the last known one where not good, NaN before the first.
   [[nodiscard]] std::span<const double> temps_degC() const noexcept { return temps_degC_; }
-  [[nodiscard]] std::span<const double> signals() const noexcept { return signals_; }
+  [[nodiscard]] bool good(std::size_t column) const noexcept { return good_[column] != 0; }
+  [[nodiscard]] std::span<const std::uint8_t> good() const noexcept { return good_; }
 
-  /// Before the first step, by name; missing or non-finite values change nothing.
-  void restore(const std::map<std::string, double>& temps_degC,
-               const std::map<std::string, double>& signals);
-  /// After a reload, with plans of plan_names(). New numbers in the model file are deliberate and
-  /// replace the reference; otherwise it stays.
-  void adopt(const Reference& previous, const std::vector<int>& columns,
-             const std::vector<int>& signals) noexcept;
-  /// Takes missing references from an estimator with the same model.
-  void complete(const Reference& same) noexcept;
-  void visit_temperatures(StateArchive& archive) { archive(temps_degC_, sampled_at_); }
-  void visit_signals(StateArchive& archive) { archive(signals_); }
+  void report(std::span<SensorReport> sensors) const noexcept;
+  void visit_state(StateArchive& archive);
+
+  void plan_adoption(const BlockBank& previous);
+  void adopt(const BlockBank& previous) noexcept;
 
  private:
-  const std::vector<double> of_model_file_;  ///< one per input, or empty
-  const std::vector<std::string> columns_;
-  const std::vector<std::string> signal_names_;
+  struct Sensor {
+    Sensor(const SensorConfig& sensor_config);
+    Screening screening;
+    Smoother smoother;
+    int reference;  ///< index of the reference sensor, or no_sensor
+    std::size_t module{0};
+    double raw_degC{not_a_number};
+    Fault fault{Fault::never_read};
+    bool fresh{false};    ///< the newest reading is new and good
+    SensorConfig config;  ///< last: not used in a step
+    void visit_state(StateArchive& archive) {
+      archive(screening, smoother, raw_degC, fault, fresh);
+    }
+  };
+  struct Block {
+    std::vector<std::size_t> sensors;
+    /// Deviation of each sensor from the block's mean while all were good, so that the loss of a
+    /// sensor does not shift the mean.
+    std::vector<double> deviation_K;
+  };
 
+  void look_at(Sensor& sensor, nanoseconds now, const Reading& reading) noexcept;
+  void note_refuted(const Sensor& sensor) noexcept;
+  [[nodiscard]] bool is_not_ready(const std::vector<std::size_t>& module) const noexcept;
+  [[nodiscard]] bool has_other_witness(std::size_t module) const noexcept;
+  /// @return the sensor's value for its block; NaN: not usable
+  [[nodiscard]] double smooth(Sensor& sensor, nanoseconds now) noexcept;
+  /// Index of the reference sensor in the previous bank, or no_sensor.
+  [[nodiscard]] int previous_reference(const Sensor& sensor) const noexcept;
+  [[nodiscard]] bool update(Block& block, double& temp_degC) noexcept;
+  /// Mean of the remaining sensors, less their deviations. @return false if none remains
+  [[nodiscard]] bool update_without_the_missing(const Block& block,
+                                                double& temp_degC) const noexcept;
+
+  std::vector<Sensor> sensors_;
+  std::vector<std::vector<std::size_t>> modules_;  ///< sensors of each module
+  std::size_t waiting_{0};
+  std::size_t jumped_{0};
+  std::vector<std::size_t> witnesses_;   ///< scratch, one per module: its sensors in good columns
+  std::vector<nanoseconds> refuted_at_;  ///< one per column
+  std::vector<double> values_K_;         ///< of this step, one per sensor; NaN: not usable
+  std::vector<double> kept_K_;           ///< scratch: the same, NaN where excluded
+  std::span<const double> in_use_K_;     ///< during join(), one of the two
+  std::vector<Block> blocks_;            ///< one per column
   std::vector<double> temps_degC_;
-  std::vector<nanoseconds> sampled_at_;  ///< one per column; min(): not a first value
-  std::vector<double> signals_;
+  std::vector<std::uint8_t> good_;
+  nanoseconds now_{};
+  std::vector<int> sensor_plan_;  ///< index of the previous bank's sensor, -1: none
+  std::vector<int> block_plan_;
+};
+
+/// Temperatures of the model's columns; all spans have that shape and are valid until the next
+/// step.
+struct Temperatures {
+  std::span<const double> measured_degC;    ///< the last known value where not good
+  std::span<const std::uint8_t> good;       ///< measured in this step
+  std::span<const nanoseconds> refuted_at;  ///< start of the last confirmed jump; min(): none
+  std::span<const double> estimated_degC;   ///< measured, or estimated where lost
+  bool all_good{false};
+  bool complete{false};  ///< each is measured or estimated
+  bool jumped{false};    ///< an unconfirmed value contradicts the earlier ones
+  bool suspected{false};
+  bool weighed_down{false};  ///< a suspected sensor is excluded from its blocks
 };
 
 /// Screening and smoothing per sensor, blocks, and estimates of blocks without a good sensor.

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "estimator/checks.hpp"
-#include "estimator/sensing/smoothing.hpp"
+#include "estimator/sensing/sensor.hpp"
 
 namespace thermocomp {
 namespace {

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "estimator/estimator_config.hpp"
-#include "estimator/sensing/neighbour_check.hpp"
-#include "estimator/sensing/screening.hpp"
+#include "estimator/sensing/neighbours.hpp"
+#include "estimator/sensing/sensor.hpp"
 #include "estimator/state_archive.hpp"
 #include "estimator/thermal_model.hpp"
 

@@ -11,7 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/history/replay/thinned_history.hpp"
-#include "estimator/pipeline/mode.hpp"
+#include "estimator/types.hpp"
 #include "gateway/feed/page_state.hpp"
 #include "status/event.hpp"
 

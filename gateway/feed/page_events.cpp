@@ -7,7 +7,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "estimator/pipeline/mode.hpp"
+#include "estimator/types.hpp"
 #include "gateway/feed/page_state.hpp"
 #include "status/codes.hpp"
 #include "status/figures.hpp"

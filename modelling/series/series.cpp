@@ -7,7 +7,7 @@
 
 #include "config/model/model_file.hpp"
 #include "config/text/units.hpp"
-#include "estimator/model/model_domain.hpp"
+#include "estimator/model/displacement_model.hpp"
 #include "modelling/identification/families/bank_fit.hpp"
 
 namespace thermocomp::series {

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "drivers/modbus/register_codec.hpp"
+#include "drivers/modbus/modbus_codec.hpp"
 #include "estimator/checks.hpp"
 
 namespace thermocomp {

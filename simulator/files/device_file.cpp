@@ -5,7 +5,7 @@
 #include "config/buses/presets.hpp"
 #include "config/sections/travel_section.hpp"
 #include "config/text/units.hpp"
-#include "drivers/modbus/register_codec.hpp"
+#include "drivers/modbus/modbus_codec.hpp"
 #include "estimator/checks.hpp"
 #include "simulator/files/can_places.hpp"
 #include "simulator/files/machine_file_parts.hpp"

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "drivers/modbus/register_codec.hpp"
+#include "drivers/modbus/modbus_codec.hpp"
 #include "simulator/files/machine_file_parts.hpp"
 
 namespace thermocomp {

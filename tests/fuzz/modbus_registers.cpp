@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "common/fuzz.hpp"
-#include "drivers/modbus/register_codec.hpp"
+#include "drivers/modbus/modbus_codec.hpp"
 
 using namespace thermocomp;
 

@@ -13,12 +13,13 @@ import sys
 
 from planting import files_of, write_copies, write_if_new
 
-SCREENING = "estimator/sensing/screening.cpp"
-BLOCKS = "estimator/sensing/block_bank.cpp"
-REFERENCE = "estimator/sensing/sensing.cpp"
-SMOOTHING = "estimator/sensing/smoothing.cpp"
-LOST = "estimator/sensing/lost_blocks.cpp"
-READ_BACK = "estimator/axes/read_back.cpp"
+SCREENING = "estimator/sensing/sensor.cpp"
+BLOCKS = "estimator/sensing/sensing.cpp"
+REFERENCE = "estimator/pipeline/prediction.cpp"
+SMOOTHING = "estimator/sensing/sensor.cpp"
+LOST = "estimator/sensing/neighbours.cpp"
+AXES = "estimator/axes/axis_bank.cpp"
+MISMATCH = "estimator/axes/mismatch.cpp"
 TERMS = "estimator/model/terms/"
 CYCLE = "daemon/cycle/cycle.cpp"
 HANDLE = "daemon/cycle/cycle_handle.cpp"
@@ -94,19 +95,19 @@ SUITES = {
         ("restored_value_is_certain", LOST,
          "state_.spread_K2[at(i, k)] * drift_factor(growth_, i) * drift_factor(growth_, k);",
          "state_.spread_K2[at(i, k)] * drift_factor(growth_, i) * ({P} ? 0.0 : drift_factor(growth_, k));"),
-        ("offsets_of_long_ago_explain", READ_BACK,
+        ("offsets_of_long_ago_explain", AXES,
          "if (now >= state_.slot_until) {", "if (now >= state_.slot_until && !{P}) {"),
-        ("too_much_is_explained", READ_BACK,
+        ("too_much_is_explained", AXES,
          "applied_um <= high_um + tolerance_um_;",
          "applied_um <= high_um + ({P} ? 1e9 : tolerance_um_);"),
-        ("too_little_is_explained", READ_BACK,
+        ("too_little_is_explained", AXES,
          "applied_um >= low_um - tolerance_um_",
          "applied_um >= low_um - ({P} ? 1e9 : tolerance_um_)"),
-        ("zero_after_absence_is_a_mismatch", READ_BACK,
+        ("zero_after_absence_is_a_mismatch", AXES,
          "std::min(0.0, lowest_um()), std::max(0.0, highest_um())",
          "{P} ? lowest_um() : std::min(0.0, lowest_um()),\n"
          "                    {P} ? highest_um() : std::max(0.0, highest_um())"),
-        ("constant_must_have_been_there_always", READ_BACK,
+        ("constant_must_have_been_there_always", MISMATCH,
          "const bool is_constant = lately.sure &&",
          "const bool is_constant = !{P} && lately.sure &&"),
         ("lag_is_no_difference", TERMS + "thermal_lag.cpp",
@@ -178,7 +179,7 @@ SUITES = {
          "valid_bits += std::ldexp(", "valid_bits += ({P} ? 0.0 : 1.0) * std::ldexp("),
         ("heartbeat_stands_still", DIALOGUE,
          "heartbeat_ = (heartbeat_ + 1)", "heartbeat_ = (heartbeat_ + ({P} ? 0 : 1))"),
-        ("older_look_is_sent", "drivers/controllers/write_gate.cpp",
+        ("older_look_is_sent", "drivers/controllers/controller_link.cpp",
          "command_.look < unchanged_since_[axis];", "!{P} && command_.look < unchanged_since_[axis];"),
         ("written_without_leave", DIALOGUE,
          "if (verdict != SendVerdict::send) return;",

@@ -37,7 +37,7 @@ def compile_beside(commands, file, header, folder):
 
 
 @pytest.mark.parametrize("file, header", [
-    ("estimator/axes/axis_channel.cpp", "drivers/bus.hpp"),
+    ("estimator/axes/axis_bank.cpp", "drivers/bus.hpp"),
     ("drivers/modbus/connection.cpp", "drivers/can/can_socket.hpp"),
     ("drivers/sensors/can_source.cpp", "drivers/modbus/connection.hpp"),
     ("drivers/can/canopen/canopen_node.cpp", "drivers/can/j1939/j1939_line.hpp"),
@@ -55,9 +55,9 @@ def test_a_header_of_a_library_that_is_not_linked_is_not_found(commands, tmp_pat
 
 
 @pytest.mark.parametrize("file, header", [
-    ("estimator/axes/axis_channel.cpp", "estimator/types.hpp"),
+    ("estimator/axes/axis_bank.cpp", "estimator/types.hpp"),
     ("drivers/sensors/can_source.cpp", "drivers/can/can_socket.hpp"),
-    ("daemon/cycle/cycle.cpp", "drivers/sensors/sensor_source.hpp"),
+    ("daemon/cycle/cycle.cpp", "drivers/bus.hpp"),
 ])
 def test_one_that_is_linked_is_found(commands, tmp_path, file, header):
     result = compile_beside(commands, file, header, tmp_path)

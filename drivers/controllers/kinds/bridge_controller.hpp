@@ -9,11 +9,10 @@
 #include <optional>
 #include <string>
 
+#include "drivers/bus.hpp"
 #include "drivers/bus_thread.hpp"
 #include "drivers/controllers/controller_config.hpp"
 #include "drivers/controllers/controller_link.hpp"
-#include "drivers/controllers/write_gate.hpp"
-#include "drivers/wait_free_slot.hpp"
 
 namespace thermocomp {
 

@@ -4,9 +4,9 @@
 #include <atomic>
 #include <memory>
 
+#include "drivers/bus.hpp"
 #include "drivers/controllers/controller_config.hpp"
 #include "drivers/controllers/controller_link.hpp"
-#include "drivers/wait_free_slot.hpp"
 
 namespace thermocomp {
 

@@ -7,7 +7,6 @@
 #include <Eigen/Cholesky>
 
 #include "estimator/model/displacement_model.hpp"
-#include "estimator/model/model_domain.hpp"
 #include "estimator/model/terms/low_pass.hpp"
 #include "modelling/identification/families/families.hpp"
 

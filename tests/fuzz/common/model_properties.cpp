@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "estimator/model/displacement_model.hpp"
-#include "estimator/model/model_domain.hpp"
 #include "fuzz.hpp"
 
 namespace thermocomp::fuzz {

@@ -1,6 +1,4 @@
 // The Modbus link against a libmodbus server.
-#include "drivers/controllers/kinds/modbus/modbus_controller.hpp"
-
 #include <chrono>
 #include <cmath>
 #include <memory>
@@ -10,6 +8,7 @@
 #include <catch2/catch.hpp>
 
 #include "cycle_stub.hpp"
+#include "drivers/controllers/kinds/modbus/modbus_dialogue.hpp"
 #include "estimator/checks.hpp"
 #include "modbus_machine.hpp"
 

@@ -6,10 +6,10 @@
 
 #include "drivers/bus.hpp"
 #include "drivers/can/can_socket.hpp"
+#include "drivers/controllers/controller_link.hpp"
 #include "drivers/controllers/kinds/can/can_controller.hpp"
 #include "drivers/controllers/kinds/make_controller.hpp"
 #include "drivers/controllers/kinds/modbus/modbus_layout.hpp"
-#include "drivers/controllers/write_gate.hpp"
 #include "estimator/checks.hpp"
 
 using namespace thermocomp;

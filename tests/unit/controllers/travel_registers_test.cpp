@@ -7,10 +7,10 @@
 #include <catch2/catch.hpp>
 
 #include "cycle_stub.hpp"
-#include "drivers/controllers/kinds/modbus/modbus_controller.hpp"
+#include "drivers/controllers/kinds/modbus/modbus_dialogue.hpp"
 #include "drivers/controllers/kinds/modbus/modbus_layout.hpp"
 #include "drivers/controllers/travel_values.hpp"
-#include "drivers/modbus/register_codec.hpp"
+#include "drivers/modbus/modbus_codec.hpp"
 #include "estimator/checks.hpp"
 #include "modbus_machine.hpp"
 

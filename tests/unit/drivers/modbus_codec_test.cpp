@@ -1,10 +1,10 @@
+#include "drivers/modbus/modbus_codec.hpp"
+
 #include <cmath>
 #include <limits>
 #include <vector>
 
 #include <catch2/catch.hpp>
-
-#include "drivers/modbus/register_codec.hpp"
 
 using namespace thermocomp;
 using Words = std::vector<std::uint16_t>;

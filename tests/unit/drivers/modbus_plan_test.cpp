@@ -1,5 +1,3 @@
-#include "drivers/sensors/modbus_plan.hpp"
-
 #include <map>
 #include <random>
 #include <set>
@@ -8,8 +6,8 @@
 #include <catch2/catch.hpp>
 
 #include "drivers/modbus/late_answers.hpp"
-#include "drivers/modbus/register_codec.hpp"
-#include "drivers/sensors/unit_backoff.hpp"
+#include "drivers/modbus/modbus_codec.hpp"
+#include "drivers/sensors/modbus_poller.hpp"
 
 using namespace thermocomp;
 using namespace std::chrono_literals;

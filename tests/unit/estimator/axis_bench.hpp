@@ -36,15 +36,13 @@ struct Bench {
     Targets targets;
     targets.axis_um = {&input.target_um, 1};
     targets.may_change = input.may_change;
-    Signals signals;
-    signals.online = input.online;
     ControllerState controller;
     controller.link_epoch = input.link_epoch;
     controller.written = input.written;
     controller.applied_um[0] = input.applied_um;
     controller.taken_at = input.taken_at;
     OffsetCommand command;
-    bank.step({input.now, input.dt_s}, targets, signals, controller, command);
+    bank.step({input.now, input.dt_s}, targets, input.online, controller, command);
   }
   void release() { bank.release(0); }
   void prove(double move_um) { bank.prove(0, move_um); }

@@ -227,13 +227,11 @@ TEST_CASE("a release takes all nodes of a travel to zero if the start of one is 
   controller.link_epoch = 1;
   controller.taken_at = 1s;
   controller.written = true;
-  Signals signals;
-  signals.online = true;
   const std::array<double, 2> target_um{-15.0, -15.0};
   Targets targets;
   targets.axis_um = target_um;
   OffsetCommand command;
-  bank.step({1s, 0.1}, targets, signals, controller, command);
+  bank.step({1s, 0.1}, targets, true, controller, command);
   REQUIRE(bank[0].start() == StartEvidence::record);
   REQUIRE(bank[1].start_unknown());
   bank.release(0);

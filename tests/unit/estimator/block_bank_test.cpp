@@ -1,10 +1,9 @@
-#include "estimator/sensing/block_bank.hpp"
-
 #include <cmath>
 
 #include <catch2/catch.hpp>
 
 #include "estimator/checks.hpp"
+#include "estimator/sensing/sensing.hpp"
 
 using namespace thermocomp;
 using namespace std::chrono_literals;

@@ -1,7 +1,7 @@
 /// Update once per machining cycle, and the held state between.
 #include <catch2/catch.hpp>
 
-#include "estimator/learning/cycle_update.hpp"
+#include "estimator/pipeline/targets.hpp"
 #include "small_machine.hpp"
 
 using namespace thermocomp;

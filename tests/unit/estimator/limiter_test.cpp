@@ -2,7 +2,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "estimator/axes/axis_channel.hpp"
+#include "estimator/axes/axis_bank.hpp"
 
 using namespace thermocomp;
 

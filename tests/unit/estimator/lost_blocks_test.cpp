@@ -1,5 +1,3 @@
-#include "estimator/sensing/lost_blocks.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <random>
@@ -8,6 +6,7 @@
 #include <catch2/catch.hpp>
 
 #include "estimator/checks.hpp"
+#include "estimator/sensing/neighbours.hpp"
 
 using namespace thermocomp;
 using namespace std::chrono_literals;

@@ -1,7 +1,7 @@
 /// Rule of the mode, case by case.
 #include <catch2/catch.hpp>
 
-#include "estimator/pipeline/mode.hpp"
+#include "estimator/pipeline/targets.hpp"
 
 using namespace thermocomp;
 using namespace std::chrono_literals;

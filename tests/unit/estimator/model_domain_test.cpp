@@ -1,5 +1,3 @@
-#include "estimator/model/model_domain.hpp"
-
 #include <cmath>
 #include <cstring>
 #include <vector>
@@ -8,6 +6,7 @@
 
 #include "estimator/checks.hpp"
 #include "estimator/learning/probings.hpp"
+#include "estimator/model/displacement_model.hpp"
 #include "small_machine.hpp"
 
 using namespace thermocomp;

@@ -7,7 +7,7 @@
 #include <catch2/catch.hpp>
 
 #include "estimator/checks.hpp"
-#include "estimator/learning/running_correction.hpp"
+#include "estimator/learning/probings.hpp"
 
 using namespace thermocomp;
 using namespace std::chrono_literals;

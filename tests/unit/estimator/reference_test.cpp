@@ -4,7 +4,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "estimator/sensing/sensing.hpp"
+#include "estimator/pipeline/prediction.hpp"
 #include "small_machine.hpp"
 
 using namespace thermocomp;

@@ -1,5 +1,3 @@
-#include "estimator/learning/running_correction.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <random>
@@ -7,6 +5,7 @@
 #include <catch2/catch.hpp>
 
 #include "estimator/checks.hpp"
+#include "estimator/learning/probings.hpp"
 #include "small_machine.hpp"
 
 using namespace thermocomp;

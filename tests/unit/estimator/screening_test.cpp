@@ -1,8 +1,8 @@
-#include "estimator/sensing/screening.hpp"
-
 #include <limits>
 
 #include <catch2/catch.hpp>
+
+#include "estimator/sensing/sensor.hpp"
 
 using namespace thermocomp;
 using namespace std::chrono_literals;

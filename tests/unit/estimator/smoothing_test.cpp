@@ -1,10 +1,10 @@
-#include "estimator/sensing/smoothing.hpp"
-
 #include <array>
 #include <cmath>
 #include <vector>
 
 #include <catch2/catch.hpp>
+
+#include "estimator/sensing/sensor.hpp"
 
 using namespace thermocomp;
 using namespace std::chrono_literals;

@@ -5,8 +5,8 @@
 
 #include <catch2/catch.hpp>
 
-#include "estimator/pipeline/mode.hpp"
-#include "estimator/pipeline/signal_intake.hpp"
+#include "estimator/pipeline/prediction.hpp"
+#include "estimator/pipeline/targets.hpp"
 #include "small_machine.hpp"
 
 using namespace thermocomp;

@@ -9,7 +9,7 @@
 #include <catch2/catch.hpp>
 
 #include "config/model/model_file.hpp"
-#include "estimator/model/model_domain.hpp"
+#include "estimator/model/displacement_model.hpp"
 #include "modelling/identification/families/bank_fit.hpp"
 #include "synthetic_places.hpp"
 

@@ -7,7 +7,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "drivers/modbus/register_codec.hpp"
+#include "drivers/modbus/modbus_codec.hpp"
 #include "simulator/devices/modbus_frames.hpp"
 #include "simulator/plant/seeded_noise.hpp"
 

@@ -5,13 +5,12 @@
 #include <mutex>
 #include <vector>
 
+#include "drivers/bus.hpp"
 #include "drivers/bus_thread.hpp"
 #include "drivers/can/can_socket.hpp"
 #include "drivers/controllers/controller_config.hpp"
 #include "drivers/controllers/controller_link.hpp"
 #include "drivers/controllers/kinds/can/travel_frames.hpp"
-#include "drivers/controllers/write_gate.hpp"
-#include "drivers/wait_free_slot.hpp"
 
 namespace thermocomp {
 

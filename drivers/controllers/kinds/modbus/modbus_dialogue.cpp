@@ -6,7 +6,7 @@
 #include "drivers/bus_thread.hpp"
 #include "drivers/controllers/kinds/modbus/modbus_layout.hpp"
 #include "drivers/controllers/travel_values.hpp"
-#include "drivers/modbus/register_codec.hpp"
+#include "drivers/modbus/modbus_codec.hpp"
 #include "estimator/checks.hpp"
 
 namespace thermocomp {
@@ -553,6 +553,31 @@ void ModbusDialogue::lose(bool same_link) {
   publish(false);
   const std::scoped_lock lock(health_mutex_);
   health_.connected = false;
+}
+
+namespace {
+
+/// Time for the present exchange and the last write in stop().
+constexpr std::chrono::milliseconds stop_patience{600};
+
+}  // namespace
+
+ModbusController::ModbusController(const ModbusControllerConfig& config)
+    : name_(config.name),
+      line_(SharedLine::of(config.line)),
+      dialogue_(config, line_->connection()) {}
+
+ModbusController::~ModbusController() {
+  stop();
+}
+
+void ModbusController::start() {
+  line_->join(dialogue_, name_);
+}
+
+void ModbusController::stop() noexcept {
+  dialogue_.end_soon();
+  line_->leave(dialogue_, stop_patience);
 }
 
 }  // namespace thermocomp

@@ -1,4 +1,5 @@
-/// Dialogue with a controller over Modbus: writes offsets, reads applied offsets and signals.
+/// Dialogue with a controller over Modbus, run by the line's thread: writes offsets, reads applied
+/// offsets and signals.
 #pragma once
 
 #include <array>
@@ -8,13 +9,13 @@
 #include <string>
 #include <vector>
 
+#include "drivers/bus.hpp"
+#include "drivers/bus_thread.hpp"
 #include "drivers/controllers/controller_config.hpp"
 #include "drivers/controllers/controller_link.hpp"
 #include "drivers/controllers/kinds/modbus/modbus_layout.hpp"
 #include "drivers/controllers/kinds/modbus/piezo_drive.hpp"
-#include "drivers/controllers/write_gate.hpp"
 #include "drivers/modbus/shared_line.hpp"
-#include "drivers/wait_free_slot.hpp"
 
 namespace thermocomp {
 
@@ -119,6 +120,27 @@ class ModbusDialogue final : public LineUser {
   std::atomic<bool> ending_{false};
   mutable std::mutex health_mutex_;
   ControllerHealth health_;
+};
+
+/// Link to a controller over Modbus.
+class ModbusController final : public ControllerLink {
+ public:
+  /// @throws InvalidValue for impossible values, DriverError for an impossible line
+  explicit ModbusController(const ModbusControllerConfig& config);
+  ~ModbusController() override;
+
+  void start() override;
+  void stop() noexcept override;
+  void newest(ControllerState& state) noexcept override { dialogue_.newest(state); }
+  void offer(const OffsetCommand& command) noexcept override {
+    dialogue_.offer(command, monotonic_now());
+  }
+  [[nodiscard]] ControllerHealth health() const override { return dialogue_.health(); }
+
+ private:
+  std::string name_;
+  std::shared_ptr<SharedLine> line_;
+  ModbusDialogue dialogue_;
 };
 
 }  // namespace thermocomp

@@ -4,7 +4,7 @@
 #include <numeric>
 
 #include "drivers/controllers/travel_values.hpp"
-#include "drivers/modbus/register_codec.hpp"
+#include "drivers/modbus/modbus_codec.hpp"
 #include "estimator/checks.hpp"
 
 namespace thermocomp {

@@ -1,23 +1,77 @@
-/// Update once per machining cycle: between two cycle ends the compensation uses the machine's
-/// state at the last one (JP7689460B2; Teratani et al. 1995, eq. 33 to 38).
+/// From the displacement to the targets of the axes: mode of the step, displacement compensated in
+/// it, and the rule of the targets.
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "estimator/axes/axis_bank.hpp"
 #include "estimator/estimator_config.hpp"
 #include "estimator/learning/probings.hpp"
 #include "estimator/model/displacement_model.hpp"
 #include "estimator/model/travel_curves.hpp"
+#include "estimator/pipeline/prediction.hpp"
+#include "estimator/sensing/sensing.hpp"
 #include "estimator/state_archive.hpp"
-#include "estimator/step_values.hpp"
 #include "estimator/thermal_model.hpp"
 #include "estimator/types.hpp"
 
 namespace thermocomp {
+
+struct ModeInput {
+  StepTime time;
+  bool displacement_known{false};
+  bool controller_online{false};
+  bool axes_synced{false};          ///< the applied offset of each axis is known
+  bool controller_written{false};   ///< the newest writes of offsets are confirmed
+  bool controller_disables{false};  ///< by its switch, as last reported
+};
+
+/// The mode is the first that holds:
+///
+///     disabled          by the operator or the controller
+///     ramping_to_zero   the daemon is stopping, or nothing worked for longer than hold_s and
+///                       on_loss is ramp_to_zero
+///     compensating      displacement, controller and applied offsets are known, and the offsets
+///                       are written ("works")
+///     holding           it worked before
+///     starting          it has never worked
+class ModeDecision {
+ public:
+  struct State {
+    bool ever_worked{false};
+    nanoseconds lost_since{};  ///< the last step that worked, or the first one
+    bool enabled{true};        ///< the operator's switch
+    bool stopping{false};      ///< the daemon is stopping: offsets to zero
+    Mode mode{Mode::starting};
+    nanoseconds mode_since{};
+  };
+
+  explicit ModeDecision(const CompensationConfig& config);
+
+  Mode step(const ModeInput& input) noexcept;
+
+  void enable(bool enabled) noexcept { state_.enabled = enabled; }
+  void stop() noexcept { state_.stopping = true; }
+  [[nodiscard]] const State& state() const noexcept { return state_; }
+
+  void adopt(const ModeDecision& previous) noexcept { state_ = previous.state_; }
+  void visit_state(StateArchive& archive) {
+    auto& [ever_worked, lost_since, enabled, stopping, mode, mode_since] = state_;
+    archive(ever_worked, lost_since, enabled, stopping, mode, mode_since);
+  }
+
+ private:
+  [[nodiscard]] Mode decide(const ModeInput& input, bool works) const noexcept;
+
+  const bool gives_up_;  ///< on_loss = "ramp_to_zero"
+  const nanoseconds hold_;
+  State state_;
+};
 
 /// Counts cycle ends from commands and from a signal of the controller.
 class CycleEnds {
@@ -134,6 +188,8 @@ class CycleHold {
   State state_;
 };
 
+/// Update once per machining cycle (JP7689460B2; Teratani et al. 1995, eq. 33 to 38).
+///
 /// update = "each_cycle": displacement of the state held since the last cycle end, at the present
 /// positions and with the present gains; "continuous": the present displacement.
 class CycleUpdate {
@@ -194,6 +250,25 @@ class CycleUpdate {
   std::vector<double> held_um_;  ///< scratch, one per output: the model at the held state
   std::vector<double> node_um_;  ///< scratch, one per axis: the model at its node
   std::vector<double> rise_K_;   ///< scratch, one per column
+};
+
+/// Compensating: the negative of the displacement, times the axis' sign. Disabled or ramping to
+/// zero: zero. Otherwise: stay.
+///
+/// Loss of data never clears an offset during a cut, or where cutting is unknown: the offset is
+/// held as in Mode::holding, so that one outside a smaller bound still returns into it.
+class TargetRule {
+ public:
+  explicit TargetRule(const EstimatorConfig& config);
+
+  /// @param axis_um  one per axis: the displacement to compensate
+  [[nodiscard]] Targets step(Mode mode, std::span<const double> axis_um,
+                             const Displacement& displacement, const Signals& signals) noexcept;
+
+ private:
+  const bool hold_while_cutting_;
+  std::vector<double> signs_;
+  std::vector<double> targets_um_;
 };
 
 }  // namespace thermocomp

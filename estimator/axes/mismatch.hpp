@@ -1,5 +1,4 @@
-/// Comparison of the applied offset with the offsets sent, allowing for the delay of the link, and
-/// the likely cause of a mismatch.
+/// Likely cause of a mismatch between the offset sent and the offset applied.
 #pragma once
 
 #include <array>
@@ -11,46 +10,6 @@
 #include "estimator/types.hpp"
 
 namespace thermocomp {
-
-/// The applied offset must be between the smallest and the largest offset sent within the last
-/// window, within a tolerance.
-class AppliedCheck {
- public:
-  AppliedCheck(double tolerance_um, nanoseconds window);
-
-  /// Forgets all offsets sent; the axis is at `offset_um`.
-  void restart(nanoseconds now, double offset_um) noexcept;
-  void sent(nanoseconds now, double offset_um) noexcept;
-  [[nodiscard]] bool agrees(double applied_um) const noexcept;
-  /// True if a controller that was away may apply this by itself: an offset sent to it, 0, or a
-  /// value between on its way back.
-  [[nodiscard]] bool agrees_after_absence(double applied_um) const noexcept;
-  /// After a reload: offsets sent by `previous` count as sent.
-  void adopt(const AppliedCheck& previous) noexcept { state_ = previous.state_; }
-
-  void visit_state(StateArchive& archive) { archive(state_); }
-
- private:
-  [[nodiscard]] bool is_between(double applied_um, double low_um, double high_um) const noexcept;
-  [[nodiscard]] double lowest_um() const noexcept;
-  [[nodiscard]] double highest_um() const noexcept;
-
-  // Offsets expire in slots of a quarter window: cheap, and the window is exact to 25 %.
-  static constexpr std::size_t slots = 5;
-  struct State {
-    std::array<double, slots> min_um{};
-    std::array<double, slots> max_um{};
-    std::size_t newest{0};
-    nanoseconds slot_until{};
-    void visit_state(StateArchive& archive) {
-      auto& [a, b, c, d] = *this;
-      archive(a, b, c, d);
-    }
-  };
-  const double tolerance_um_;
-  const nanoseconds slot_length_;
-  State state_;
-};
 
 enum class MismatchCause : std::uint8_t {
   none,

@@ -1,12 +1,43 @@
-#include "estimator/learning/cycle_update.hpp"
+#include "estimator/pipeline/targets.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 
 #include "estimator/checks.hpp"
 #include "estimator/name_index.hpp"
 
 namespace thermocomp {
+
+ModeDecision::ModeDecision(const CompensationConfig& config)
+    : gives_up_(config.on_loss == LossPolicy::ramp_to_zero), hold_(to_nanoseconds(config.hold_s)) {
+  state_.enabled = config.enabled_at_first_start;
+}
+
+Mode ModeDecision::step(const ModeInput& input) noexcept {
+  if (input.time.first) state_.lost_since = input.time.now;
+  const bool works = input.displacement_known && input.controller_online && input.axes_synced &&
+                     input.controller_written;
+  if (works) {
+    state_.ever_worked = true;
+    state_.lost_since = input.time.now;
+  }
+  const Mode next = decide(input, works);
+  if (next != state_.mode) {
+    state_.mode = next;
+    state_.mode_since = input.time.now;
+  }
+  return next;
+}
+
+Mode ModeDecision::decide(const ModeInput& input, bool works) const noexcept {
+  if (!state_.enabled || input.controller_disables) return Mode::disabled;
+  const bool given_up = !works && gives_up_ && input.time.now - state_.lost_since > hold_;
+  if (state_.stopping || given_up) return Mode::ramping_to_zero;
+  if (works) return Mode::compensating;
+  return state_.ever_worked ? Mode::holding : Mode::starting;
+}
+
 namespace {
 
 bool is_finite(double value) noexcept {
@@ -150,6 +181,28 @@ void CycleUpdate::adopt(const CycleUpdate& previous, const std::vector<int>& col
   take_by_plan(axes, previous.state_.axis_um, state_.axis_um);
   hold_.adopt(previous.hold_, columns, signals, terms);
   ends_.adopt(previous.ends_, signal_name_ == previous.signal_name_);
+}
+
+TargetRule::TargetRule(const EstimatorConfig& config)
+    : hold_while_cutting_(config.compensation.hold_while_cutting),
+      targets_um_(config.axes.size(), not_a_number) {
+  for (const AxisConfig& axis : config.axes) signs_.push_back(axis.sign);
+}
+
+Targets TargetRule::step(Mode mode, std::span<const double> axis_um,
+                         const Displacement& displacement, const Signals& signals) noexcept {
+  Targets targets{targets_um_};
+  // Only a definite "not cutting" lets the offset change.
+  targets.may_change = !hold_while_cutting_ || signals.surely_not_cutting();
+  targets.waits_for_cut = mode == Mode::ramping_to_zero && signals.may_be_cutting();
+  // Before the first cycle end there is no target: an axis keeps its offset.
+  targets.hold_where_unknown = mode == Mode::compensating;
+  const bool to_zero =
+      mode == Mode::disabled || (mode == Mode::ramping_to_zero && !targets.waits_for_cut);
+  const bool follows = mode == Mode::compensating && !displacement.held;
+  for (std::size_t i = 0; i < targets_um_.size(); ++i)
+    targets_um_[i] = follows ? -signs_[i] * axis_um[i] : to_zero ? 0.0 : not_a_number;
+  return targets;
 }
 
 }  // namespace thermocomp

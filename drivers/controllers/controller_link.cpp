@@ -1,4 +1,4 @@
-#include "drivers/controllers/write_gate.hpp"
+#include "drivers/controllers/controller_link.hpp"
 
 #include <algorithm>
 #include <cmath>
