@@ -56,6 +56,7 @@ ColumnMap parse_column_map(const std::string& text, const std::string& name) {
     root.problem("pivot", "must be the column of the names, or it and the column of the values");
   map.names = root.texts("names", {});
   if (root.has("period_s")) map.period_s = root.number("period_s", Range::above(0));
+  if (root.has("scan_s")) map.scan_s = root.number("scan_s", Range::above(0));
   map.missing = root.texts("missing", {});
   const Names<std::string> units{{"ns", "ns"},   {"us", "us"},       {"ms", "ms"},
                                  {"s", "s"},     {"min", "min"},     {"h", "h"},

@@ -26,9 +26,10 @@ struct ColumnMap {
   DateOrder date_order{DateOrder::unknown};
   std::vector<std::string> time;  ///< column, or columns of date and time; empty: detected
   std::string time_unit;  ///< "s", "ms", "us", "ns", "min", "h", "day", "hh:mm", "mm:ss" or empty
-  std::vector<std::string> names;    ///< column names of a table without a header
-  std::optional<double> period_s;    ///< row period of a table without time
-  std::vector<std::string> pivot;    ///< columns with a series' name and, optionally, its value
+  std::vector<std::string> names;  ///< column names of a table without a header
+  std::optional<double> period_s;  ///< row period of a table without time
+  std::vector<std::string> pivot;  ///< columns with a series' name and, optionally, its value
+  double scan_s{0};  ///< values of one row per value within it of the first become one row
   std::vector<std::string> missing;  ///< additional words for a missing value
   std::vector<std::string> ignored;  ///< columns left out; "": those without a name
   bool takes_signals{false};         ///< columns without a unit are signals; set by `import`

@@ -144,7 +144,8 @@ class ForeignReader {
   /// Pivots a long table; reverses rows in descending order.
   void order_rows(TimeColumns& time, std::vector<double>& time_s) {
     if (const auto form = long_form(table_, time, time_s, map_, problems_)) {
-      run_.understood.push_back(pivot(table_, time_s, *form, problems_));
+      const double scan_s = map_ == nullptr ? 0.0 : map_->scan_s;
+      run_.understood.push_back(pivot(table_, time_s, *form, scan_s, problems_));
       if (!problems_.empty()) return;
       const double first = time_s.front();  // the earliest, which is 0
       if (first < 0)
@@ -164,11 +165,24 @@ class ForeignReader {
     const auto at = std::adjacent_find(time_s.begin(), time_s.end(), is_not_later);
     const auto row = static_cast<std::size_t>(at - time_s.begin()) + 1;
     const std::size_t column = time.columns.empty() ? 0 : time.columns.back();
-    problems_.add(
-        table_.lines[row], table_.header[column], table_.field(row, column),
-        "must be later than in the row before (" + shortened(table_.field(row - 1, column)) +
-            "); for one row per value write pivot = \"the column that names the series\" in "
-            "the file of --columns");
+    std::string rule =
+        "must be later than in the row before (" + shortened(table_.field(row - 1, column)) + ")";
+    if (has_text(row, time))
+      rule +=
+          "; for one row per value write pivot = \"the column that names the series\" in the "
+          "file of --columns";
+    else if (row == 1)
+      rule += ": delete line " + std::to_string(table_.lines[0]) + " if it belongs to the header";
+    else
+      rule += ": delete one of the two lines";
+    problems_.add(table_.lines[row], table_.header[column], table_.field(row, column), rule);
+  }
+
+  /// Whether a column could name the series of a row's value.
+  [[nodiscard]] bool has_text(std::size_t row, const TimeColumns& time) const {
+    for (std::size_t i = 0; i < table_.columns(); ++i)
+      if (!time.has(i) && is_text(i) && !table_.field(row, i).empty()) return true;
+    return false;
   }
 
   /// In autumn, local time is set back by an hour once, while the rows continue.
@@ -210,7 +224,7 @@ class ForeignReader {
                        (form_.decimal == ',' ? "comma" : "point");
     if (form_.thousands != '\0') note += std::string(", thousands '") + form_.thousands + "'";
     if (from_latin1_) note += ", letters Latin-1";
-    if (!table_.units.empty()) note += ", units in the row under the header";
+    if (!table_.units.empty()) note += ", units in a row of their own";
     if (!table_.has_header) note += ", no header";
     run_.understood.push_back(note);
     run_.understood.insert(run_.understood.end(), table_.notes.begin(), table_.notes.end());
@@ -248,7 +262,8 @@ class ForeignReader {
     const std::string& header = table_.header[i];
     if (is_mapped(header)) return {};
     const bool is_count = is_unnamed(header) || header == "#" || header == "RECORD" ||
-                          header == "No." || header == "Nr." || header == "index";
+                          header == "No." || header == "Nr." || header == "index" ||
+                          (units_[i].empty() && !has_own_unit(header) && table_.rows() >= 10);
     if (is_count && (counts_rows(i) || header == "RECORD")) return "it counts the rows";
     const SpelledUnit* unit = spelled_unit(units_[i]);
     if (unit != nullptr && unit->dimension == "time") return "another time";

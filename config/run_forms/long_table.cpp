@@ -170,13 +170,13 @@ std::optional<LongForm> long_form(const TextTable& table, const TimeColumns& tim
 }
 
 std::string pivot(TextTable& table, std::vector<double>& time_s, const LongForm& form,
-                  ProblemList& problems) {
+                  double scan_s, ProblemList& problems) {
   std::map<double, std::size_t> row_of;
   for (const double at : time_s) row_of.emplace(at, 0);
   std::vector<double> times;
   for (auto& [at, row] : row_of) {
-    row = times.size();
-    times.push_back(at);
+    if (times.empty() || at - times.back() > scan_s) times.push_back(at);
+    row = times.size() - 1;
   }
   // The unit comes from a column of units, else from the name of the value's column.
   const std::string& value_name = table.header[form.value];
@@ -203,9 +203,10 @@ std::string pivot(TextTable& table, std::vector<double>& time_s, const LongForm&
     std::string_view& cell = columns[found->second][at];
     const std::string_view value = table.field(row, form.value);
     if (!cell.empty() && cell != value)
-      problems.add(
-          table.lines[row], series, value,
-          "must be there once at a time; an earlier row of that time has " + shortened(cell));
+      problems.add(table.lines[row], series, value,
+                   (scan_s > 0 ? "must be there once within scan_s; an earlier row has "
+                               : "must be there once at a time; an earlier row of that time has ") +
+                       shortened(cell));
     cell = value;
     if (wide.lines[at] == 0) wide.lines[at] = table.lines[row];
   }
@@ -214,6 +215,16 @@ std::string pivot(TextTable& table, std::vector<double>& time_s, const LongForm&
     note += " and '" + table.header[form.names[i]] + "'";
   note += " names the series, '" + table.header[form.value] + "' is the value; " +
           std::to_string(columns.size()) + " columns";
+  const auto is_complete = [&](std::size_t row) {
+    return std::none_of(columns.begin(), columns.end(),
+                        [row](const auto& column) { return column[row].empty(); });
+  };
+  bool complete = false;
+  for (std::size_t row = 0; row < times.size() && !complete; ++row) complete = is_complete(row);
+  if (!complete)
+    note +=
+        "; no row has a value of each: if they are read one after the other, write scan_s = "
+        "(seconds from the first to the last) in the file of --columns";
   table.header = std::move(wide.header);
   table.units = std::move(wide.units);
   table.lines = std::move(wide.lines);

@@ -33,8 +33,9 @@ struct LongForm {
                                                 const ColumnMap* map, ProblemList& problems);
 
 /// Makes one column per series and one row per time; missing values are empty.
+/// @param scan_s  times within it of a row's first time belong to that row
 /// @return a note on the change
 std::string pivot(TextTable& table, std::vector<double>& time_s, const LongForm& form,
-                  ProblemList& problems);
+                  double scan_s, ProblemList& problems);
 
 }  // namespace thermocomp

@@ -348,8 +348,10 @@ class TableReader {
     return field == "TS" || field == "RN" || field == "NO." || field == "Time";
   }
 
-  void take_units(const Fields& fields) {
-    for (const std::string_view field : fields)
+  void take_units(std::size_t line) {
+    units_line_ = line;
+    table_.units.clear();
+    for (const std::string_view field : fields_of(line))
       table_.units.emplace_back(is_word_of_logger(field) ? "" : without_brackets(field));
   }
 
@@ -381,7 +383,7 @@ class TableReader {
       const Fields fields = fields_of(i);
       if (named ? i == 0 : fields.size() == cut_.fields) {
         if (fields.size() == cut_.fields && is_row_of_units(fields) && i > 0) {
-          take_units(fields);
+          take_units(i);
           continue;
         }
         std::set<std::string_view> distinct(fields.begin(), fields.end());
@@ -391,7 +393,7 @@ class TableReader {
           names = i;
         }
       } else if (named && fields.size() == cut_.fields && is_row_of_units(fields)) {
-        take_units(fields);
+        take_units(i);
       } else if (!named) {
         break;
       }
@@ -444,7 +446,7 @@ class TableReader {
       table_.notes.push_back("above the header in line " + std::to_string(table_.header_line) +
                              " left out: '" + shortened(lines_[0].text) + "'" +
                              more_lines(line - 1));
-    const std::size_t between = row_begin_ - line - 1 - (table_.units.empty() ? 0 : 1);
+    const std::size_t between = row_begin_ - line - 1 - (units_line_ > line ? 1 : 0);
     if (between > 0)
       table_.notes.push_back("between the header and the first row left out: '" +
                              shortened(lines_[row_begin_ - 1].text) + "'" +
@@ -537,6 +539,7 @@ class TableReader {
   Cut cut_;
   std::size_t narrowest_{0};  ///< required fields of a row; 0: all
   std::size_t row_begin_{0};
+  std::size_t units_line_{0};
   std::string_view header_text_;
 };
 

@@ -180,7 +180,9 @@ class TimeReader {
     for (std::size_t row = 0; row < table_.rows(); ++row) {
       const auto number = number_of(table_.field(row, column), form_);
       if (!number && row == 0) return refuse_form();
-      if (!number) refuse(row, "must be a number, as in the rows before");
+      if (!number)
+        refuse(row,
+               "must be a number, as in the rows before; delete the line if it is no measurement");
       run_.time_s.push_back(number.value_or(NAN));
     }
     return problems_.empty() && !run_.time_s.empty();
@@ -261,7 +263,10 @@ class TimeReader {
         refuse_form();
         return;
       }
-      if (!stamp) refuse(row, "must be a time in the form of the rows before");
+      if (!stamp)
+        refuse(row,
+               "must be a time in the form of the rows before; delete the line if it is no "
+               "measurement");
       stamps.push_back(stamp.value_or(TimeStamp{}));
     }
     if (!problems_.empty() || stamps.empty() || !clock_is_clear(stamps)) return;
