@@ -299,7 +299,8 @@ class Case:
     def __init__(self, folder):
         self.folder, self.wrong = folder, []
         self.expected = tomllib.loads((folder / "expected.toml").read_text())
-        self.room = pathlib.Path(tempfile.mkdtemp(prefix="field_"))
+        self.box = tempfile.TemporaryDirectory(prefix="field_", ignore_cleanup_errors=True)
+        self.room = pathlib.Path(self.box.name)
         for each in folder.rglob("*"):
             if each.is_file():
                 target = self.room / each.relative_to(folder)
@@ -483,7 +484,6 @@ class Case:
             print("WRONG", line)
         if self.wrong and "daemon" in self.expected:
             print("---- status\n" + getattr(self, "output", ""))
-        shutil.rmtree(self.room, ignore_errors=True)
         return 1 if self.wrong else 0
 
 

@@ -1,6 +1,6 @@
 // Probings until a candidate is called better, and the rate of false calls. The errors of both
 // models are autocorrelated, half in common, with noise of the probe.
-// `estimator_tests "[contest]" -s` prints the figures.
+// `cycle_test "[contest]" -s` prints the figures.
 #include <cmath>
 #include <random>
 #include <vector>

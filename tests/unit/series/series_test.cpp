@@ -4,10 +4,10 @@
 #include <filesystem>
 #include <fstream>
 #include <random>
-#include <unistd.h>
 
 #include <catch2/catch.hpp>
 
+#include "../temp_folder.hpp"
 #include "config/model/model_file.hpp"
 
 namespace thermocomp::series {
@@ -70,9 +70,9 @@ std::vector<Statistics> sisters(int count = 6) {
   return machines;
 }
 
-std::filesystem::path written(const std::string& name, const std::string& text) {
-  const auto path =
-      std::filesystem::temp_directory_path() / (std::to_string(::getpid()) + "_" + name);
+std::filesystem::path written(const char* name, const std::string& text) {
+  static const thermocomp::testing::TempFolder folder;
+  const auto path = folder / name;
   std::ofstream(path) << text;
   return path;
 }
