@@ -21,6 +21,7 @@ class ProveCourse {
   /// The move has ended and the read-back has returned to within a register's resolution.
   [[nodiscard]] bool is_settled() const noexcept;
   [[nodiscard]] bool passed() const noexcept { return went() && over() && is_back(); }
+  [[nodiscard]] bool reads_back() const noexcept;
   /// "sent +3.20 um, read back +3.15 um", both relative to the start
   [[nodiscard]] std::string progress() const;
   /// Sentences with the outcome and the values read.
@@ -33,7 +34,6 @@ class ProveCourse {
     double read_um{0.0};
   };
   [[nodiscard]] bool went() const noexcept;
-  [[nodiscard]] bool reads_back() const noexcept;
 
   double move_um_;
   double tolerance_um_;

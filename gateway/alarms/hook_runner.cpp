@@ -82,7 +82,7 @@ struct HookRunner::Parts {
 
   const GatewaySettings& settings;
   HookLimit limit;
-  bool is_over_limit{false};
+  std::size_t dropped{0};  ///< since the limit was reached
   std::mutex mutex;
   std::condition_variable changed;
   std::deque<AlarmChange> waiting;
@@ -115,13 +115,13 @@ std::vector<std::string> HookRunner::Parts::environment(const AlarmChange& chang
 
 void HookRunner::Parts::begin(const AlarmChange& change) {
   if (!limit.take(steady_s())) {
-    if (!is_over_limit)
+    if (dropped++ == 0)
       spdlog::warn("alarm commands: more than {} in an hour; dropped until the limit allows more",
                    settings.alarm.per_hour_max);
-    is_over_limit = true;
     return;
   }
-  is_over_limit = false;
+  if (dropped > 0) spdlog::warn("alarm commands: {} were dropped", dropped);
+  dropped = 0;
   const pid_t pid = spawn(settings.alarm.command, environment(change));
   if (pid > 0) wait_for(pid);
 }

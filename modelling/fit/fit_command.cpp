@@ -160,6 +160,13 @@ int run_prior(const Options& options, const std::vector<RunFile>& runs, const Me
     std::fprintf(stderr,
                  "warning: the machine's own fit leaves less than the prior of these runs. Next: "
                  "judge both (fit with and without --prior) on the next run\n");
+  if (prior.machines.size() == 1 && prior.past_of.empty())
+    std::fprintf(stderr,
+                 "warning: %s is of one machine: how far this one differs from it is assumed "
+                 "(--scatter of series, --drift-percent), not measured, and so is the error beyond "
+                 "the temperatures and loads of these runs. Next: judge both (fit with and without "
+                 "--prior) on a run that goes beyond\n",
+                 options.prior.c_str());
   cli::write_file(options.model, model_text(options, adapted.model));
   if (options.model == "-") return 0;
   cli::write_file("-", series::adapted_text(prior, machine, adapted, judgement, options.json));

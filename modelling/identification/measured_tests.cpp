@@ -125,6 +125,15 @@ std::vector<std::string> usable(const std::vector<RunFile>& runs, Wanted wanted,
   return names;
 }
 
+/// The first notes as a clause.
+std::string reasons(const std::vector<std::string>& notes) {
+  constexpr std::size_t shown_max = 4;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(notes.size(), shown_max); ++i)
+    text += (i == 0 ? ": " : "; ") + notes[i];
+  return text;
+}
+
 /// True if the column varies by more than the rounding of a converted or summed position.
 bool varies(const std::vector<RunFile>& runs, const std::string& column) {
   double least = std::numeric_limits<double>::infinity();
@@ -369,7 +378,8 @@ MeasuredTests measured_tests(const std::vector<RunFile>& given, const TestOption
         make_run(run, tests.places, tests.outputs, tests.signals, options.between_probings));
   find_unmoved(tests);
   leave_out_still_places(tests);
-  if (tests.places.empty()) refuse(runs.front().name, "", "has no temperature that can be used");
+  if (tests.places.empty())
+    refuse(runs.front().name, "", "has no temperature that can be used" + reasons(tests.notes));
   tests.folds = make_folds(tests.runs, options.folds_of_one_run);
   tests.hot = hot_half(tests.runs);
   return tests;

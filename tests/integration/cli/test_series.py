@@ -90,6 +90,17 @@ def test_a_prior_that_leaves_no_less_than_no_model_is_not_used(series, tmp_path)
     assert left_um(model, test, tmp_path) < 0.5 * left_um(last_year, test, tmp_path)
 
 
+def test_a_prior_of_one_machine_is_not_evidence_of_the_scatter(series, tmp_path):
+    one, new = tmp_path / "one.toml", write_run(tmp_path / "new.csv", 96, 5.0)
+    done = run("series", tmp_path / "m0", "--scatter", 0.15, "-o", one)
+    assert done.returncode == 0, done.stderr
+    for prior, warned in ((one, True), (series, False)):
+        done = run("fit", f"{new}@:7200", "--outputs", "z_um", "--prior", prior, "-o",
+                   tmp_path / "model.toml")
+        assert done.returncode == 0 and "is not used" not in done.stderr, done.stderr
+        assert (f"{prior} is of one machine" in done.stderr) is warned, done.stderr
+
+
 def test_a_machine_whose_sensors_are_exchanged_departs_from_its_sisters(series, tmp_path):
     healthy = write_run(tmp_path / "healthy.csv", 92, 5.0)
     printed = run("inspect", healthy, "--series", series, "--json", "-")

@@ -130,6 +130,7 @@ def test_prove_waits_for_the_end_of_the_move_and_reports_read_backs(daemon, ther
     assert asked == ["offsets", "prove"] + 3 * ["offsets"]
     assert daemon.requests[1]["params"] == {"axis": "z", "value_um": 5.0}
     assert answer.returncode == status and words in answer.stdout, answer.stdout
+    assert ("change the sign" in answer.stdout) is (status == 0), answer.stdout
     assert "\033" not in answer.stdout + answer.stderr
 
 

@@ -194,6 +194,9 @@ TEST_CASE("rows with a missing value, constant places and absent ones are left o
   CHECK(tests.notes.size() == 1);
   CHECK_THROWS_AS(measured_tests(runs, {{}, {"y_um"}, 2}), ConfigurationError);
   CHECK_THROWS_AS(measured_tests(runs, {{"z_um"}, {}, 2}), ConfigurationError);
+  runs.push_back(parse_run("time_s,d_degC,z_um\n0,20,0\n60,21,1\n120,22,2\n", "b.csv"));
+  CHECK_THROWS_WITH(measured_tests(runs, {{}, {"z_um"}, 2}),
+                    Catch::Contains("a_degC is left out: not every run has it"));
 }
 
 }  // namespace
