@@ -201,9 +201,8 @@ std::vector<AxisConfig> read_axes(const std::vector<TomlTable>& tables) {
     const int sign = table.integer("sign", -1, 1, 1);
     if (sign == 0) table.problem("sign", "must be 1 or -1");
     axis.sign = sign;
-    for (const auto& number : LimiterConfig::numbers()) {  // bound and slew limit have no default
-      if (!table.has(number.key)) table.problem(number.key, "must be given");
-    }
+    for (const char* key : {"offset_um_max", "rate_um_per_s_max"})  // they have no default
+      if (!table.has(key)) table.problem(key, "must be given");
     read_numbers(table, LimiterConfig{}, axis.limiter);
     const bool has_nodes = table.has("line") || table.has("table");
     const bool fitted = axes.size() <= axes_max;
