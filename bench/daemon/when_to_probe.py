@@ -97,9 +97,9 @@ def when_to_probe(folder):
     for day in range(DAYS):
         path = simulated(folder, f"day{day}", shift(day), day)
         run(BIN / "thermocomp", "predict", "--model", model, path, "-o", folder / "out.csv")
-        measured, told = columns(path), columns(folder / "out.csv")
+        measured, predicted = columns(path), columns(folder / "out.csv")
         for axis in AXES:
-            days[axis].append((measured["time_s"], measured[f"{axis}_um"], told[f"{axis}_predicted_um"]))
+            days[axis].append((measured["time_s"], measured[f"{axis}_um"], predicted[f"{axis}_predicted_um"]))
     for axis in AXES:
         claim = claims[f"{axis}_um"]
         share = claim["left_out_rms_um"] / claim["no_model_rms_um"]

@@ -37,9 +37,9 @@ struct Blunders {
 /// Sets outliers to missing. An outlier deviates from the median of its neighbours (four on each
 /// side; at an end from a robust line through its neighbours) by more than twelve robust standard
 /// deviations and a quarter (at an end half) of the column's range. A step is not an outlier, since
-/// the values after it agree. A column is stuck at ten rows or more of one value, three times as
-/// many as in any other such stretch, that end with a jump beyond twelve robust standard deviations
-/// of the changes between rows and a quarter of the range.
+/// the values after it agree. A column is stuck where it keeps one value for ten rows or more,
+/// three times as many as anywhere else, and then jumps by more than a quarter of its range and
+/// twelve robust standard deviations of its changes between rows.
 /// @param columns  of displacement or tilt
 std::vector<Blunders> leave_out_blunders(RunFile& run, const std::vector<std::string>& columns);
 

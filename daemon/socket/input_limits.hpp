@@ -1,5 +1,5 @@
-/// What a client of the status socket may send: the length of a line and the rate of requests. Only
-/// for this folder's .cpp files.
+/// Limits of a client's input at the status socket: the length of a line and the rate of requests.
+/// Included by this folder's .cpp files only.
 #pragma once
 
 #include <algorithm>

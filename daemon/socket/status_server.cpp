@@ -133,7 +133,7 @@ void ServedClient::flush(Clock::time_point now) {
     sent += static_cast<std::size_t>(count);
     last_taken = now;
   }
-  line_begun = now;  // nothing was read from it until now
+  line_begun = now;  // the server did not read from this client until now
   sent = 0;
   output.clear();
   if (output.capacity() > kept_bytes) output = std::string();

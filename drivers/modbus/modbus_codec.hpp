@@ -88,7 +88,7 @@ class ModbusFrames {
   std::size_t unasked_{0};   ///< TCP: of these, received before the request
   std::span<const std::uint8_t> answer_;
   bool echoes_{false};  ///< RTU: the line echoes our requests
-  // Of the present exchange:
+  // The present exchange:
   bool echoed_{false};
   bool late_{false};
   std::string other_;

@@ -80,8 +80,9 @@ void take_coefficients(Extended& longer, const ThermalModel& fitted, const Exten
       longer.model.matrix_um_per_K[output] = before.model.matrix_um_per_K[output];
 }
 
-/// Extends the model by one finding after another, its coefficients fitted anew with the first, and
-/// measures the gain of each. A finding that the test runs contradict is reported, not added.
+/// Extends the model by one finding after another and measures the gain of each; an output takes
+/// the coefficients fitted jointly with all findings as soon as they leave it no worse. A finding
+/// that the test runs contradict is reported, not added.
 Extended extend(Diagnosis& diagnosis, const SearchResult& result, const MeasuredData& train,
                 const MeasuredData& test) {
   Extended extended{train.model, {}};
