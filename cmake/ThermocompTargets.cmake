@@ -118,6 +118,16 @@ endif()
 thermocomp_precompiled(thermocomp_precompiled_runs_once
   HEADERS ${THERMOCOMP_STD_HEADERS} OPTIONS ${THERMOCOMP_RUNS_ONCE})
 
+# Eight files of a target are compiled as one: two fifths of the time of compiling. So a name of an
+# anonymous namespace occurs once in a target, and the preset debug reads each file by itself.
+option(THERMOCOMP_TOGETHER "Compile the files of a target together" OFF)
+if(THERMOCOMP_TOGETHER)
+  set(CMAKE_UNITY_BUILD ON)
+  set(CMAKE_UNITY_BUILD_BATCH_SIZE 8)
+  # GCC takes the members of a file's own types for those of a header.
+  target_compile_options(thermocomp_flags INTERFACE -Wno-subobject-linkage)
+endif()
+
 # thermocomp_include_folders(TARGET [VISIBILITY] FOLDER...): headers of FOLDER become visible as
 # "FOLDER/name.hpp" to TARGET and to whoever links it - and to nobody else. Each target gets an
 # include root of its own with links to its folders, so that including a header of a library that

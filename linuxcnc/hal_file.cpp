@@ -8,7 +8,7 @@
 namespace thermocomp_linuxcnc {
 namespace {
 
-std::string number(double value) {
+std::string number_text(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.9g", value);
   return text;
@@ -34,7 +34,7 @@ void check(const HalFileOptions& options) {
   const auto positive = [](double value, double most, const char* what) {
     // Negated, so that NaN is refused too.
     if (!(value > 0.0 && value <= most))
-      throw BadOption(std::string(what) + " must be more than 0 and at most " + number(most));
+      throw BadOption(std::string(what) + " must be more than 0 and at most " + number_text(most));
   };
   positive(options.offset_mm_max, 1.0, "the largest offset in mm");
   positive(options.speed_mm_per_s, 10.0, "the speed in mm/s");
@@ -159,8 +159,8 @@ void write_warning(Writer& out) {
 void write_limits(Writer& out, const std::string& axis) {
   const HalFileOptions& options = out.options();
   const std::string limit = "tc.limit-" + axis;
-  out.set(limit + ".min", number(-options.offset_mm_max));
-  out.set(limit + ".max", number(options.offset_mm_max));
+  out.set(limit + ".min", number_text(-options.offset_mm_max));
+  out.set(limit + ".max", number_text(options.offset_mm_max));
   out.line("net tc-asked-" + axis + " => tc.gate-" + axis + ".in1");
   out.set("tc.gate-" + axis + ".in0", "0");
   out.line("net " + out.taking() + " => tc.gate-" + axis + ".sel");
@@ -203,10 +203,10 @@ void write_joint(Writer& out) {
       "\n# ---- offsets apply while all joints are homed, else they return to zero, so that none\n"
       "# ---- is in effect during homing");
   out.from_machine("motion.is-all-homed", "tc-homed", "tc.speed.sel tc.acceleration.sel");
-  out.set("tc.speed.in0", number(options.homing_speed_mm_per_s));
-  out.set("tc.speed.in1", number(options.speed_mm_per_s));
-  out.set("tc.acceleration.in0", number(options.homing_acceleration_mm_per_s2));
-  out.set("tc.acceleration.in1", number(options.acceleration_mm_per_s2));
+  out.set("tc.speed.in0", number_text(options.homing_speed_mm_per_s));
+  out.set("tc.speed.in1", number_text(options.speed_mm_per_s));
+  out.set("tc.acceleration.in0", number_text(options.homing_acceleration_mm_per_s2));
+  out.set("tc.acceleration.in1", number_text(options.acceleration_mm_per_s2));
   out.line("net tc-speed tc.speed.out");
   out.line("net tc-acceleration tc.acceleration.out");
   out.each([&](const std::string& axis, const std::string& joint, const std::string&) {
@@ -264,13 +264,13 @@ void write_external(Writer& out) {
     out.line("\n# ---- axis " + axis);
     write_limits(out, axis);
     out.line("net tc-clear => " + limit + ".load " + axis_pin + ".eoffset-clear");
-    out.set(limit + ".maxv", number(options.speed_mm_per_s));
-    out.set(limit + ".maxa", number(options.acceleration_mm_per_s2));
+    out.set(limit + ".maxv", number_text(options.speed_mm_per_s));
+    out.set(limit + ".maxa", number_text(options.acceleration_mm_per_s2));
     out.net("tc-limited-" + axis, limit + ".out", "tc.scale-" + axis + ".in");
-    out.set("tc.scale-" + axis + ".gain", number(1.0 / count_mm));
+    out.set("tc.scale-" + axis + ".gain", number_text(1.0 / count_mm));
     out.net("tc-scaled-" + axis, "tc.scale-" + axis + ".out", "tc.count-" + axis + ".in");
     out.net("tc-counts-" + axis, "tc.count-" + axis + ".out", axis_pin + ".eoffset-counts");
-    out.set(axis_pin + ".eoffset-scale", number(count_mm));
+    out.set(axis_pin + ".eoffset-scale", number_text(count_mm));
     out.set(axis_pin + ".eoffset-enable", "1");
     out.line("net tc-wanted-" + axis + " " + axis_pin + ".eoffset-request");
     out.line("net tc-applied-" + axis + " " + axis_pin + ".eoffset");

@@ -35,7 +35,7 @@ constexpr double legend_row = 16.0;
 constexpr double legend_stroke = 16.0;
 constexpr double legend_gap = 14.0;
 
-struct Range {
+struct Extent {
   double low{0.0};
   double high{1.0};
   [[nodiscard]] double share(double value) const { return (value - low) / (high - low); }
@@ -43,8 +43,8 @@ struct Range {
 
 using Values = std::span<const double>;
 
-Range range_of(const std::vector<Values>& columns) {
-  Range range{1e300, -1e300};
+Extent range_of(const std::vector<Values>& columns) {
+  Extent range{1e300, -1e300};
   for (const Values column : columns) {
     for (const double value : column) {
       if (!std::isfinite(value)) continue;
@@ -113,15 +113,15 @@ struct Box {
   double y;
   double width;
   double height;
-  [[nodiscard]] double across(const Range& range, double value) const {
+  [[nodiscard]] double across(const Extent& range, double value) const {
     return x + width * range.share(value);
   }
-  [[nodiscard]] double up(const Range& range, double value) const {
+  [[nodiscard]] double up(const Extent& range, double value) const {
     return y + height * (1.0 - range.share(value));
   }
 };
 
-std::string vertical_axis(const Box& box, const Range& range, int wanted) {
+std::string vertical_axis(const Box& box, const Extent& range, int wanted) {
   std::string svg;
   for (const double tick : round_ticks(range.low, range.high, wanted)) {
     const double at = box.up(range, tick);
@@ -131,7 +131,7 @@ std::string vertical_axis(const Box& box, const Range& range, int wanted) {
   return svg + line_path(box.x, box.y, way('v', box.height), "axis");
 }
 
-std::string horizontal_axis(const Box& box, const Range& range, const std::string& unit,
+std::string horizontal_axis(const Box& box, const Extent& range, const std::string& unit,
                             int wanted) {
   std::string svg;
   for (const double tick : round_ticks(range.low, range.high, wanted)) {
@@ -143,7 +143,7 @@ std::string horizontal_axis(const Box& box, const Range& range, const std::strin
   return svg + label(box.x + box.width, box.y + box.height + 28, unit, "text-anchor=\"end\"");
 }
 
-std::string named_axis(const Box& box, const Range& x, const std::vector<TimeTick>& ticks) {
+std::string named_axis(const Box& box, const Extent& x, const std::vector<TimeTick>& ticks) {
   std::string svg = line_path(box.x, box.y + box.height, way('h', box.width), "axis");
   for (std::size_t i = 0; i < ticks.size(); ++i) {
     const double at = box.across(x, ticks[i].at_s);
@@ -156,7 +156,7 @@ std::string named_axis(const Box& box, const Range& x, const std::vector<TimeTic
 }
 
 /// Longest gap of a line that is bridged.
-double gap_max(const Range& x, Values time, Values values) {
+double gap_max(const Extent& x, Values time, Values values) {
   std::vector<double> steps;
   double last = std::nan("");
   for (std::size_t row = 0; row < time.size(); ++row) {
@@ -190,8 +190,8 @@ std::string dash_attribute(const PlotLine& line) {
   return pattern == 0 ? "" : std::string("\" stroke-dasharray=\"") + patterns[pattern];
 }
 
-std::string curve(const Box& box, const Range& x, const Range& y, Values time, const PlotLine& line,
-                  std::size_t points) {
+std::string curve(const Box& box, const Extent& x, const Extent& y, Values time,
+                  const PlotLine& line, std::size_t points) {
   std::string svg = "<path fill=\"none\" stroke=\"";
   svg.append(line.colour);
   if (line.as_dots) svg.append("\" stroke-width=\"5\" stroke-linecap=\"round");
@@ -216,7 +216,7 @@ std::string curve(const Box& box, const Range& x, const Range& y, Values time, c
   return svg + "\"/>";
 }
 
-std::string span_svg(const PlotSpan& span, const Box& box, const Range& x, bool named) {
+std::string span_svg(const PlotSpan& span, const Box& box, const Extent& x, bool named) {
   const double from = box.across(x, std::max(x.low, span.from_s));
   double to = box.across(x, std::min(x.high, span.to_s));
   if (!(to > from)) return "";
@@ -297,11 +297,11 @@ class Legend {
 };
 
 std::string panel_svg(const PlotPanel& panel, const Legend& legend, const Box& box, Values time,
-                      const Range& x) {
+                      const Extent& x) {
   std::vector<Values> columns;
   columns.reserve(panel.lines.size());
   for (const PlotLine& line : panel.lines) columns.push_back(line.values);
-  const Range y = range_of(columns);
+  const Extent y = range_of(columns);
   std::string svg = label(4, box.y - title_up - legend.below(), title_of(panel), "class=\"title\"");
   svg += vertical_axis(box, y, panel.height > 100 ? 5 : 3);
   svg += legend.svg(box.y - title_up - legend.below());
@@ -316,7 +316,7 @@ Drawing panels_drawing(Values along, const std::string& along_title,
                        const std::vector<PlotPanel>& panels, const std::vector<PlotSpan>& spans,
                        const std::vector<TimeTick>& ticks) {
   Drawing drawing{width, axis_height, "", ""};
-  const Range x = range_of({along});
+  const Extent x = range_of({along});
   for (const PlotPanel& panel : panels) {
     const Legend legend(panel);
     const double top = drawing.height - axis_height + title_height + legend.below();
@@ -431,8 +431,8 @@ Drawing heat_map_drawing(const HeatMap& map) {
 }
 
 std::string scatter_plot(const PlotDots& dots) {
-  const Range across = range_of({dots.x});
-  const Range up = range_of({dots.y});
+  const Extent across = range_of({dots.x});
+  const Extent up = range_of({dots.y});
   const Box box{left, title_height + 4, small_width - left - right,
                 small_height - title_height - 4 - axis_height};
   std::string svg =

@@ -289,13 +289,13 @@ std::string door_text(const gateway::HttpSettings& http) {
 void print_gateway(const gateway::GatewaySettings& settings) {
   const gateway::MqttSettings& mqtt = settings.mqtt;
   const gateway::ShdrSettings& shdr = settings.shdr;
-  std::string commands = settings.commands.users.empty() ? "none" : "";
+  std::string allowed = settings.commands.users.empty() ? "none" : "";
   for (const std::string& method : settings.commands.methods)
-    commands += (commands.empty() ? "" : ", ") + method;
+    allowed += (allowed.empty() ? "" : ", ") + method;
   std::cout << "gateway of machine " << settings.machine << ", daemon at "
             << settings.socket.string() << '\n'
             << door_text(settings.http) << '\n'
-            << "commands: " << commands << '\n'
+            << "commands: " << allowed << '\n'
             << "mqtt: "
             << (mqtt.enabled ? mqtt.host + " port " + std::to_string(mqtt.port) +
                                    (mqtt.authority.empty() ? ", no TLS" : ", TLS")

@@ -25,9 +25,7 @@
 namespace thermocomp::cli {
 namespace {
 
-constexpr int tries_max = 2;
-
-struct Place {
+struct RegisterPlace {
   ModbusValue value;
   ScanValue shown;
   std::vector<std::uint16_t> words;
@@ -35,9 +33,9 @@ struct Place {
   std::size_t axis{axes_max};  ///< axis whose single offset, sent or applied, this is
 };
 
-Place place_of(const ModbusValue& value, const std::string& what, const std::string& unit,
-               bool is_written = false) {
-  Place place{value, {}, std::vector<std::uint16_t>(words_of(value.table, value.encoding))};
+RegisterPlace place_of(const ModbusValue& value, const std::string& what, const std::string& unit,
+                       bool is_written = false) {
+  RegisterPlace place{value, {}, std::vector<std::uint16_t>(words_of(value.table, value.encoding))};
   place.shown.what = what;
   place.shown.unit = unit;
   place.shown.is_written = is_written;
@@ -48,10 +46,10 @@ Place place_of(const ModbusValue& value, const std::string& what, const std::str
 }
 
 /// Registers of a set with their meanings: "begin", "offset at 400 mm", ...
-std::vector<Place> places_of_set(const ModbusTravel& travel, const AxisConfig& axis,
-                                 const std::vector<ModbusValue>& values, const std::string& before,
-                                 bool is_written) {
-  std::vector<Place> places;
+std::vector<RegisterPlace> places_of_set(const ModbusTravel& travel, const AxisConfig& axis,
+                                         const std::vector<ModbusValue>& values,
+                                         const std::string& before, bool is_written) {
+  std::vector<RegisterPlace> places;
   const std::string unit(unit_of(axis.output).symbol);
   for (std::size_t i = 0; i < values.size(); ++i) {
     const TravelValueText text = travel_value_text(travel, unit, i);
@@ -62,13 +60,14 @@ std::vector<Place> places_of_set(const ModbusTravel& travel, const AxisConfig& a
 }
 
 /// Values that the daemon reads, in its order, so that the requests are the same.
-std::vector<Place> read_places(const DaemonConfig& config, const ModbusControllerConfig& modbus) {
-  std::vector<Place> places;
+std::vector<RegisterPlace> read_places(const DaemonConfig& config,
+                                       const ModbusControllerConfig& modbus) {
+  std::vector<RegisterPlace> places;
   const std::vector<AxisSpan> spans = axis_spans(config.estimator.axes);
   for (std::size_t i = 0; i < modbus.axes.size(); ++i) {
     const AxisConfig& axis = config.estimator.axes[spans[i].first];
     if (const auto& travel = modbus.axes[i].travel) {
-      for (Place& place : places_of_set(*travel, axis, travel->applied, "applied ", false))
+      for (RegisterPlace& place : places_of_set(*travel, axis, travel->applied, "applied ", false))
         places.push_back(std::move(place));
     }
     if (!modbus.axes[i].applied) continue;
@@ -83,16 +82,16 @@ std::vector<Place> read_places(const DaemonConfig& config, const ModbusControlle
   return places;
 }
 
-std::vector<Place> written_places(const DaemonConfig& config,
-                                  const ModbusControllerConfig& modbus) {
-  std::vector<Place> places;
+std::vector<RegisterPlace> written_places(const DaemonConfig& config,
+                                          const ModbusControllerConfig& modbus) {
+  std::vector<RegisterPlace> places;
   const std::vector<AxisSpan> spans = axis_spans(config.estimator.axes);
   for (std::size_t i = 0; i < modbus.axes.size(); ++i) {
     const AxisConfig& axis = config.estimator.axes[spans[i].first];
     if (const auto& travel = modbus.axes[i].travel) {
       const std::string of_axis = " of axis " + axis_name(axis);
       places.push_back(place_of(travel->begin, "begin" + of_axis, "", true));
-      for (Place& place : places_of_set(*travel, axis, travel->values, "", true))
+      for (RegisterPlace& place : places_of_set(*travel, axis, travel->values, "", true))
         places.push_back(std::move(place));
       places.push_back(place_of(travel->end, "end" + of_axis, "", true));
       places.back().shown.is_needed = true;  // the next set's number follows from it
@@ -113,23 +112,24 @@ std::vector<Place> written_places(const DaemonConfig& config,
   return places;
 }
 
-const Place* of_axis(const std::vector<Place>& places, std::size_t axis) {
+const RegisterPlace* of_axis(const std::vector<RegisterPlace>& places, std::size_t axis) {
   const auto found = std::find_if(places.begin(), places.end(),
-                                  [&](const Place& place) { return place.axis == axis; });
+                                  [&](const RegisterPlace& place) { return place.axis == axis; });
   return found == places.end() ? nullptr : &*found;
 }
 
 /// Reason why writing the registers' present values might move an axis; empty: all are in effect.
-std::string why_it_may_move(const ModbusControllerConfig& modbus, const std::vector<Place>& read,
-                            const std::vector<Place>& written) {
-  const Place* valid_bits = nullptr;
-  for (const Place& place : written) {
+std::string why_it_may_move(const ModbusControllerConfig& modbus,
+                            const std::vector<RegisterPlace>& read,
+                            const std::vector<RegisterPlace>& written) {
+  const RegisterPlace* valid_bits = nullptr;
+  for (const RegisterPlace& place : written) {
     if (!place.shown.is_there()) return place.shown.what + " cannot be read";
     if (place.stage == WriteStage::valid_bits) valid_bits = &place;
   }
   for (std::size_t axis = 0; axis < modbus.axes.size(); ++axis) {
-    const Place* applied = of_axis(read, axis);
-    const Place* offset = of_axis(written, axis);
+    const RegisterPlace* applied = of_axis(read, axis);
+    const RegisterPlace* offset = of_axis(written, axis);
     if (offset == nullptr) return "each set along a travel has its own number";
     if (applied == nullptr) return offset->shown.what + " is not read back";
     const double step = std::abs(applied->value.scale) + std::abs(offset->value.scale);
@@ -169,7 +169,7 @@ class ControllerScan {
   /// @param read  read together, as the daemon does
   /// @param written  read one by one
   /// @param writes_back  writes the present values back
-  void run(std::vector<Place>& read, std::vector<Place>& written, bool writes_back,
+  void run(std::vector<RegisterPlace>& read, std::vector<RegisterPlace>& written, bool writes_back,
            ScanController& result) {
     if (!connection_.connect()) {
       result.error = "cannot be opened: " + connection_.last_error();
@@ -180,10 +180,11 @@ class ControllerScan {
       mark_all(read, written, "no answer");
       return;
     }
-    for (Place& place : written) ask_alone(place);
+    for (RegisterPlace& place : written) ask_alone(place);
     if (!writes_back) return;
-    const bool is_read = std::all_of(read.begin(), read.end(),
-                                     [](const Place& place) { return place.shown.is_there(); });
+    const bool is_read = std::all_of(read.begin(), read.end(), [](const RegisterPlace& place) {
+      return place.shown.is_there();
+    });
     if (!is_read || !result.refused.empty()) return;
     const std::string why_not_tried = why_it_may_move(config_, read, written);
     if (why_not_tried.empty())
@@ -193,14 +194,15 @@ class ControllerScan {
   }
 
  private:
-  static void mark_all(std::vector<Place>& read, std::vector<Place>& written,
+  static void mark_all(std::vector<RegisterPlace>& read, std::vector<RegisterPlace>& written,
                        const std::string& why) {
-    for (Place& place : read) place.shown.why = why;
-    for (Place& place : written) place.shown.why = why;
+    for (RegisterPlace& place : read) place.shown.why = why;
+    for (RegisterPlace& place : written) place.shown.why = why;
   }
 
   Exchange ask(ModbusTable table, std::uint16_t address, std::span<std::uint16_t> words) {
     Exchange exchange;
+    constexpr int tries_max = 2;
     for (int tried = 0; tried < tries_max; ++tried) {
       // A single-client gateway may still hold the connection of the sensors' bus.
       if (!connection_.connected() && tried > 0)
@@ -213,10 +215,10 @@ class ControllerScan {
   }
 
   /// @return false: the unit does not answer; result.error gives the reason
-  bool ask_together(std::vector<Place>& places, ScanController& result) {
+  bool ask_together(std::vector<RegisterPlace>& places, ScanController& result) {
     std::vector<ModbusValue> values;
     values.reserve(places.size());
-    for (const Place& place : places) values.push_back(place.value);
+    for (const RegisterPlace& place : places) values.push_back(place.value);
     const ReadPlan plan = plan_reads(values, config_);
     for (std::size_t r = 0; r < plan.requests.size(); ++r) {
       const ReadRequest& request = plan.requests[r];
@@ -253,9 +255,9 @@ class ControllerScan {
                      "): gap_registers_max = 0 in [controller] reads no registers between";
   }
 
-  void write_back(const std::vector<Place>& written, ScanController& result) {
+  void write_back(const std::vector<RegisterPlace>& written, ScanController& result) {
     std::vector<WriteField> fields;
-    for (const Place& place : written)
+    for (const RegisterPlace& place : written)
       fields.push_back({place.value.address, place.stage, place.words});
     for (const WriteField& request : join_writes(fields, config_.registers_per_write())) {
       if (!connection_.connected()) connection_.connect();
@@ -269,7 +271,7 @@ class ControllerScan {
         "shows whether a new offset is applied)";
   }
 
-  void ask_alone(Place& place) {
+  void ask_alone(RegisterPlace& place) {
     const Exchange exchange = ask(place.value.table, place.value.address, place.words);
     if (exchange.ok())
       take(exchange, place);
@@ -278,7 +280,7 @@ class ControllerScan {
   }
 
   /// Hint at another table that answers where this one is refused.
-  std::string elsewhere(const Place& place, const Exchange& refused) {
+  std::string elsewhere(const RegisterPlace& place, const Exchange& refused) {
     const ModbusTable table = place.value.table;
     const bool may_move =
         table == ModbusTable::input || (table == ModbusTable::holding && !place.shown.is_written);
@@ -293,7 +295,7 @@ class ControllerScan {
                : "";
   }
 
-  static void take(const Exchange& exchange, Place& place) {
+  static void take(const Exchange& exchange, RegisterPlace& place) {
     ScanValue& shown = place.shown;
     const ModbusValue& value = place.value;
     shown.raw = hex_words(place.words);
@@ -333,15 +335,15 @@ ScanController scan_modbus_controller(const DaemonConfig& config,
   const S7Block* s7 = s7_of(modbus.line);
   result.address =
       s7 != nullptr ? "DB" + std::to_string(s7->db) : "unit " + std::to_string(modbus.unit);
-  std::vector<Place> read = read_places(config, modbus);
-  std::vector<Place> written = written_places(config, modbus);
+  std::vector<RegisterPlace> read = read_places(config, modbus);
+  std::vector<RegisterPlace> written = written_places(config, modbus);
   const SerialHolder holder = rtu != nullptr ? holder_of(rtu->device) : SerialHolder{};
   if (holder.is_daemon) {
     result.error = "is in use by " + holder.name +
                    ": two masters on one line garble each other. Stop it first (systemctl stop "
                    "thermocompd)";
-    for (std::vector<Place>* places : {&read, &written})
-      for (Place& place : *places) place.shown.why = "was not requested";
+    for (std::vector<RegisterPlace>* places : {&read, &written})
+      for (RegisterPlace& place : *places) place.shown.why = "was not requested";
   } else {
     progress("controller " + modbus.name + ": reading its registers");
     const bool may_write = writes_back && !config.dry_run && !ask_running_daemon(config, result);
@@ -351,8 +353,8 @@ ScanController scan_modbus_controller(const DaemonConfig& config,
       result.error = error.what();
     }
   }
-  for (std::vector<Place>* places : {&read, &written})
-    for (Place& place : *places) result.values.push_back(std::move(place.shown));
+  for (std::vector<RegisterPlace>* places : {&read, &written})
+    for (RegisterPlace& place : *places) result.values.push_back(std::move(place.shown));
   return result;
 }
 

@@ -19,7 +19,6 @@
 namespace thermocomp::cli {
 namespace {
 
-constexpr int tries_max = 2;
 constexpr double busy_s_max = 5.0;  ///< default of stale_after_s
 
 std::string place_of(const ModbusChannel& channel) {
@@ -80,6 +79,7 @@ class ModbusScan {
 
   Answer ask(int unit, ModbusTable table, std::uint16_t address, std::size_t count) {
     Answer answer{{}, std::vector<std::uint16_t>(count)};
+    constexpr int tries_max = 2;
     for (int tried = 0; tried < tries_max; ++tried) {
       answer.exchange = connection_.read(unit, table, address, answer.words);
       if (answer.exchange.unit_answered()) return answer;

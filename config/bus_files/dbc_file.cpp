@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "config/bus_files/dbc_scanner.hpp"
+#include "config/text/printable_text.hpp"
 
 namespace thermocomp {
 namespace {
@@ -17,9 +18,7 @@ constexpr std::uint32_t extended_id_max = 0x1FFFFFFF;
 constexpr std::uint64_t message_bytes_max = 1785;  // of a J1939 transport, the longest in use
 constexpr std::size_t classic_bytes_max = 8;
 constexpr std::size_t signals_max = 4096;  // per message
-constexpr std::size_t flaws_max = 1000;
 constexpr std::string_view no_message = "VECTOR__INDEPENDENT_SIG_MSG";
-constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
 constexpr std::string_view frame_format = "VFrameFormat";
 constexpr std::string_view long_signal = "SystemSignalLongSymbol";
 constexpr std::string_view long_message = "SystemMessageLongSymbol";

@@ -6,12 +6,10 @@
 
 #include <system_error>
 
+#include "config/text/printable_text.hpp"
+
 namespace thermocomp {
 namespace {
-
-bool is_digit(char c) {
-  return c >= '0' && c <= '9';
-}
 
 /// "CM_ ...", " SG_ ...": not part of a string but a statement reached through an unbalanced quote.
 bool begins_statement(std::string_view text) {

@@ -7,10 +7,11 @@
 #include <map>
 #include <tuple>
 
+#include "config/text/printable_text.hpp"
+
 namespace thermocomp {
 namespace {
 
-constexpr std::size_t flaws_max = 1000;
 constexpr std::size_t shown_max = 60;  // characters of a value in a flaw
 constexpr std::uint64_t object_variable = 0x7;
 constexpr std::uint64_t object_domain = 0x2;
@@ -127,7 +128,6 @@ class EdsReader {
   }
 
   void read_lines(std::string_view text) {
-    constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
     if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
     Section* section = nullptr;
     int line = 0;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "config/text/printable_text.hpp"
 #include "config/text/problems.hpp"
 
 namespace thermocomp {
@@ -90,7 +91,7 @@ RunText run_text(std::string_view bytes, const std::string& name) {
     if (bytes.starts_with(binary.begin)) refuse(binary.rule);
   if (bytes.starts_with("\xFF\xFE") || bytes.starts_with("\xFE\xFF"))
     return {utf8_of_utf16(bytes.substr(2), bytes.front() == '\xFF'), false};
-  if (bytes.starts_with("\xEF\xBB\xBF")) bytes.remove_prefix(3);
+  if (bytes.starts_with(byte_order_mark)) bytes.remove_prefix(byte_order_mark.size());
   // A logger that lost power leaves preallocated zeros.
   while (!bytes.empty() && bytes.back() == '\0') bytes.remove_suffix(1);
   if (bytes.substr(0, 4096).find('\0') != std::string_view::npos)

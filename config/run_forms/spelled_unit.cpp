@@ -4,6 +4,7 @@
 #include <array>
 
 #include "config/run_forms/field_text.hpp"
+#include "config/text/printable_text.hpp"
 #include "config/text/units.hpp"
 
 namespace thermocomp {
@@ -236,13 +237,7 @@ std::string plain_name(std::string_view base) {
   return name;
 }
 
-namespace {
-
-bool is_digit(char c) {
-  return c >= '0' && c <= '9';
-}
-
-}  // namespace
+namespace {}  // namespace
 
 bool is_grouped(std::string_view text, char sign) {
   std::string_view part;

@@ -6,6 +6,7 @@
 
 #include "config/run_forms/spelled_unit.hpp"
 #include "config/run_forms/time_stamp.hpp"
+#include "config/text/printable_text.hpp"
 
 namespace thermocomp {
 namespace {
@@ -61,10 +62,6 @@ std::string unquoted(std::string_view field) {
   for (auto at = text.find("\"\""); at != std::string::npos; at = text.find("\"\"", at + 1))
     text.erase(at, 1);
   return text;
-}
-
-bool is_digit(char c) {
-  return c >= '0' && c <= '9';
 }
 
 /// Before a digit: replaces a typeset minus by '-', removes a blank that groups digits.

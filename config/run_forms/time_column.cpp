@@ -12,7 +12,7 @@ namespace thermocomp {
 namespace {
 
 constexpr double day_s = 86400.0;
-constexpr std::size_t rows_judged = 100;
+constexpr std::size_t rows_read = 100;
 
 constexpr auto time_names = std::to_array<std::string_view>(
     {"time",          "zeit",      "timestamp", "zeitstempel",  "datetime",     "date",
@@ -72,7 +72,7 @@ enum class Holds { other, date, clock, both };
 /// The kind of content of a column's first rows, if the same in all of them.
 Holds content(const TextTable& table, std::size_t column) {
   Holds holds = Holds::other;
-  for (std::size_t row = 0; row < std::min(table.rows(), rows_judged); ++row) {
+  for (std::size_t row = 0; row < std::min(table.rows(), rows_read); ++row) {
     const auto stamp = parse_time_stamp(table.field(row, column));
     if (!stamp) return Holds::other;
     const Holds here = !stamp->has_date    ? Holds::clock
@@ -88,7 +88,7 @@ Holds content(const TextTable& table, std::size_t column) {
 std::vector<double> first_numbers(const TextTable& table, std::size_t column,
                                   const NumberForm& form) {
   std::vector<double> numbers;
-  for (std::size_t row = 0; row < std::min(table.rows(), rows_judged); ++row) {
+  for (std::size_t row = 0; row < std::min(table.rows(), rows_read); ++row) {
     const auto number = number_of(table.field(row, column), form);
     if (!number) return {};
     numbers.push_back(*number);

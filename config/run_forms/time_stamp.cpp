@@ -8,6 +8,7 @@
 #include <string>
 
 #include "config/run_forms/field_text.hpp"
+#include "config/text/printable_text.hpp"
 
 namespace thermocomp {
 namespace {
@@ -15,10 +16,6 @@ namespace {
 constexpr std::array<std::string_view, 24> month_names{
     "jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec",
     "jan", "feb", "mrz", "apr", "mai", "jun", "jul", "aug", "sep", "okt", "nov", "dez"};
-
-bool is_digit(char c) {
-  return c >= '0' && c <= '9';
-}
 
 /// Takes one to `digits_max` leading digits.
 std::optional<int> take_digits(std::string_view& text, std::size_t digits_max) {

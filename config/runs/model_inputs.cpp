@@ -266,6 +266,13 @@ ModelInputs model_inputs(const ThermalModel& model, const RunFile& run) {
   return inputs;
 }
 
+bool is_mostly_known(const std::vector<double>& column) {
+  constexpr double missing_share_max = 0.2;
+  const auto missing =
+      std::count_if(column.begin(), column.end(), [](double x) { return !std::isfinite(x); });
+  return static_cast<double>(missing) <= missing_share_max * static_cast<double>(column.size());
+}
+
 std::optional<double> first_value(const std::vector<double>& column) {
   const auto first =
       std::find_if(column.begin(), column.end(), [](double value) { return std::isfinite(value); });

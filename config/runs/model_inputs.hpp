@@ -55,6 +55,9 @@ struct ModelInputs {
 /// @throws ConfigurationError when a column is missing, or one needed as reference has no value
 [[nodiscard]] ModelInputs model_inputs(const ThermalModel& model, const RunFile& run);
 
+/// At most a fifth of the values are missing.
+[[nodiscard]] bool is_mostly_known(const std::vector<double>& column);
+
 /// The first value that is not missing; nullopt: none.
 [[nodiscard]] std::optional<double> first_value(const std::vector<double>& column);
 

@@ -357,7 +357,6 @@ std::string selected_name(const RunFile& run) {
 
 RunFile parse_run(std::string_view text, const std::string& name, const RunSelection& selection,
                   const ColumnMap* map) {
-  constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
   if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
   const std::string_view header = header_of(text);
   const bool own =

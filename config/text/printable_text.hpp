@@ -6,6 +6,13 @@
 
 namespace thermocomp {
 
+[[nodiscard]] constexpr bool is_digit(char c) {
+  return c >= '0' && c <= '9';
+}
+
+/// UTF-8's mark, which programs of Windows write at the start of a text.
+inline constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
+
 /// Without control characters (C0, DEL, C1), Unicode's directional marks, embeddings, overrides and
 /// isolates, line and paragraph separators, zero-width characters except joiners, and invalid
 /// UTF-8.

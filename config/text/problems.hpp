@@ -1,11 +1,15 @@
 /// Problems of a configuration file: all at once, each with its place and rule.
 #pragma once
 
+#include <cstddef>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 namespace thermocomp {
+
+/// More flaws of one file are not collected.
+inline constexpr std::size_t flaws_max = 1000;
 
 /// One broken rule. Parts that do not apply are empty (line: 0).
 struct Problem {

@@ -19,12 +19,7 @@ using std::chrono::milliseconds;
 
 constexpr int time_outs_of_dead_connection = 2;
 constexpr int closings_of_a_habit = 3;
-constexpr std::uint8_t exception_bit = 0x80;
 constexpr milliseconds silence_min{10};
-
-constexpr std::uint16_t word_at(std::span<const std::uint8_t> bytes, std::size_t at) noexcept {
-  return static_cast<std::uint16_t>((bytes[at] << 8) | bytes[at + 1]);
-}
 
 constexpr std::uint8_t read_function(ModbusTable table) noexcept {
   switch (table) {

@@ -10,12 +10,8 @@ namespace {
 
 constexpr std::size_t head_bytes = 7;  // TCP: transaction id, protocol, length, unit
 constexpr std::size_t checksum_bytes = 2;
-constexpr std::uint8_t exception_bit = 0x80;
 constexpr std::uint8_t write_single_register = 6;
 
-constexpr std::uint16_t word_at(std::span<const std::uint8_t> bytes, std::size_t at) noexcept {
-  return static_cast<std::uint16_t>((bytes[at] << 8) | bytes[at + 1]);
-}
 constexpr std::uint8_t high_byte(std::size_t word) noexcept {
   return static_cast<std::uint8_t>((word >> 8) & 0xFF);
 }

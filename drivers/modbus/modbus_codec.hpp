@@ -22,6 +22,14 @@
 
 namespace thermocomp {
 
+inline constexpr std::uint8_t exception_bit = 0x80;  ///< of the function code of an answer
+
+/// The big-endian 16 bit number at `at`. @pre at + 1 < bytes.size()
+[[nodiscard]] constexpr std::uint16_t word_at(std::span<const std::uint8_t> bytes,
+                                              std::size_t at) noexcept {
+  return static_cast<std::uint16_t>((bytes[at] << 8) | bytes[at + 1]);
+}
+
 /// "0B 04 02 ...", for display; a long text is cut.
 [[nodiscard]] std::string hex_text(std::span<const std::uint8_t> bytes);
 

@@ -19,7 +19,6 @@ constexpr std::size_t count_at = 10;
 constexpr std::size_t written_at = 13;
 constexpr std::uint8_t read_registers = 3;
 constexpr std::uint8_t write_registers = 16;
-constexpr std::uint8_t exception_bit = 0x80;
 
 // Byte positions in an S7 frame: TPKT, COTP, header of a job or its answer, parameters, data.
 constexpr std::size_t tpkt_bytes = 4;
@@ -34,8 +33,8 @@ constexpr std::uint8_t read_variable = 4;
 constexpr std::uint8_t write_variable = 5;
 constexpr int good = 0xFF;
 
-constexpr std::size_t word_at(std::span<const std::uint8_t> bytes, std::size_t at) noexcept {
-  return static_cast<std::size_t>((bytes[at] << 8) | bytes[at + 1]);
+constexpr std::size_t size_at(std::span<const std::uint8_t> bytes, std::size_t at) noexcept {
+  return word_at(bytes, at);
 }
 
 void push_word(Bytes& bytes, std::size_t word) {
@@ -75,19 +74,19 @@ Bytes connection_request(const S7Block& block) {
 /// S7 job that reads or writes the bytes of a request's words.
 Bytes job_of(std::span<const std::uint8_t> request, const S7Block& block) {
   const bool writes = request[function_at] == write_registers;
-  const std::size_t bytes = 2 * word_at(request, count_at);
-  const std::size_t first_bit = 16 * word_at(request, address_at);
+  const std::size_t bytes = 2 * size_at(request, count_at);
+  const std::size_t first_bit = 16 * size_at(request, address_at);
   Bytes item{writes ? write_variable : read_variable, 1, 0x12, 10, 0x10, 2};  // counted in bytes
   push_word(item, bytes);
   push_word(item, static_cast<std::size_t>(block.db));
   item.push_back(0x84);  // area: data block
   item.push_back(static_cast<std::uint8_t>(first_bit >> 16));
   push_word(item, first_bit);
-  if (!writes) return job(word_at(request, 0), item);
+  if (!writes) return job(size_at(request, 0), item);
   Bytes data{0, 4};  // length in bits
   push_word(data, 8 * bytes);
   append(data, request.subspan(written_at, bytes));
-  return job(word_at(request, 0), item, data);
+  return job(size_at(request, 0), item, data);
 }
 
 bool is_answer(std::span<const std::uint8_t> frame) noexcept {
@@ -113,7 +112,7 @@ std::string setup_problem(std::span<const std::uint8_t> frame) {
   if (!is_answer(frame) || frame.size() < pdu_bytes_at + 2 || frame[error_class_at] != 0 ||
       frame[answer_at] != setup)
     return "the setup is refused: " + hex_text(frame.subspan(tpkt_bytes));
-  const std::size_t bytes = word_at(frame, pdu_bytes_at);
+  const std::size_t bytes = size_at(frame, pdu_bytes_at);
   if (bytes >= S7Block::pdu_bytes) return "";
   return "PDUs of " + std::to_string(bytes) + " bytes, " + std::to_string(S7Block::pdu_bytes) +
          " are needed";
@@ -223,7 +222,7 @@ std::size_t S7Port::next_frame() const noexcept {
   constexpr std::size_t frame_bytes_max = 2048;
   if (!stream_.empty() && stream_[0] != 3) return SIZE_MAX;
   if (stream_.size() < tpkt_bytes) return 0;
-  const std::size_t size = word_at(stream_, 2);
+  const std::size_t size = size_at(stream_, 2);
   if (size < s7_at || size > frame_bytes_max) return SIZE_MAX;
   return size <= stream_.size() ? size : 0;
 }
@@ -283,7 +282,7 @@ Bytes S7Port::pdu_of_answer() {
   if (const int error = frame_[error_class_at]; error != 0)
     return refused(error, "error class " + hex_code(error) + ", code " +
                               hex_code(frame_[error_class_at + 1]) + ": " + permit);
-  const std::size_t item = answer_at + word_at(frame_, parameter_size_at);
+  const std::size_t item = answer_at + size_at(frame_, parameter_size_at);
   if (item == answer_at || item >= frame_.size()) return {};
   if (frame_[item] != good)
     return refused(frame_[item], refusal_of(frame_[item], "DB" + std::to_string(block_.db)));
@@ -293,7 +292,7 @@ Bytes S7Port::pdu_of_answer() {
   if (item + item_head_bytes > frame_.size()) return {};
   // Data of another length are passed on: the connection reports the expected length.
   constexpr int last_type_in_bits = 5;
-  const std::size_t length = word_at(frame_, item + 2);
+  const std::size_t length = size_at(frame_, item + 2);
   const auto data = std::span<const std::uint8_t>(frame_).subspan(item + item_head_bytes);
   const std::size_t size = std::min({frame_[item + 1] <= last_type_in_bits ? length / 8 : length,
                                      data.size(), S7Block::pdu_bytes});

@@ -41,10 +41,10 @@ int init(const std::string& conninfo) {
 
 /// Creates a file that only the owner can read; fails if it exists.
 void write_secret(const fs::path& file, const std::string& text) {
-  const int descriptor = open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+  const int descriptor = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
   if (descriptor < 0) throw cli::Failure(file.string() + ": " + std::strerror(errno));
-  const ssize_t written = write(descriptor, text.data(), text.size());
-  if (close(descriptor) != 0 || written != static_cast<ssize_t>(text.size()))
+  const ssize_t written = ::write(descriptor, text.data(), text.size());
+  if (::close(descriptor) != 0 || written != static_cast<ssize_t>(text.size()))
     throw cli::Failure(file.string() + ": could not be written completely");
 }
 

@@ -27,10 +27,6 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::size_t waiting_max = 32;
 
-double steady_s() {
-  return std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
-}
-
 std::vector<char*> pointers(std::vector<std::string>& texts) {
   std::vector<char*> list;
   list.reserve(texts.size() + 1);
@@ -114,7 +110,7 @@ std::vector<std::string> HookRunner::Parts::environment(const AlarmChange& chang
 }
 
 void HookRunner::Parts::begin(const AlarmChange& change) {
-  if (!limit.take(steady_s())) {
+  if (!limit.take(std::chrono::duration<double>(Clock::now().time_since_epoch()).count())) {
     if (dropped++ == 0)
       spdlog::warn("alarm commands: more than {} in an hour; dropped until the limit allows more",
                    settings.alarm.per_hour_max);

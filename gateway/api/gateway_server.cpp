@@ -12,6 +12,7 @@
 #include "gateway/api/history_answer.hpp"
 #include "gateway/api/page_commands.hpp"
 #include "gateway/feed/page_state.hpp"
+#include "gateway/http/answer_thread.hpp"
 #include "gateway/http/http_server.hpp"
 #include "gateway/http/request_rules.hpp"
 #include "status/status.hpp"
@@ -22,10 +23,6 @@ namespace {
 using nlohmann::json;
 
 constexpr std::size_t page_events_max = 12;
-
-std::string dumped(const json& value) {
-  return value.dump(-1, ' ', false, json::error_handler_t::replace);
-}
 
 /// A further entry of page_state()'s problems. Compensation is not affected, so the verdict stays.
 json broker_is_away(const MqttSettings& mqtt) {

@@ -21,10 +21,6 @@ namespace {
 
 using nlohmann::json;
 
-std::string dumped(const json& value) {
-  return value.dump(-1, ' ', false, json::error_handler_t::replace);
-}
-
 JsonAnswer error_answer(unsigned status, const std::string& text) {
   return {status, error_text(text)};
 }

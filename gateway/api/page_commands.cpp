@@ -20,7 +20,7 @@ namespace {
 using nlohmann::json;
 
 JsonAnswer answer(unsigned status, const json& value) {
-  return {status, value.dump(-1, ' ', false, json::error_handler_t::replace)};
+  return {status, dumped(value)};
 }
 
 JsonAnswer error(unsigned status, const std::string& text) {

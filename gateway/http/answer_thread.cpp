@@ -6,8 +6,6 @@
 #include <thread>
 #include <utility>
 
-#include <nlohmann/json.hpp>
-
 namespace thermocomp::gateway {
 
 struct AnswerThread::Parts {
@@ -64,9 +62,12 @@ void AnswerThread::stop() noexcept {
   if (parts_->thread.joinable()) parts_->thread.join();
 }
 
+std::string dumped(const nlohmann::json& value) {
+  return value.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
 std::string error_text(const std::string& text) {
-  return nlohmann::json{{"error", text}}.dump(-1, ' ', false,
-                                              nlohmann::json::error_handler_t::replace);
+  return dumped({{"error", text}});
 }
 
 }  // namespace thermocomp::gateway

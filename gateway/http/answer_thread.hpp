@@ -6,7 +6,12 @@
 #include <memory>
 #include <string>
 
+#include <nlohmann/json.hpp>
+
 namespace thermocomp::gateway {
+
+/// The text of `value`; bytes that are not UTF-8 are replaced.
+[[nodiscard]] std::string dumped(const nlohmann::json& value);
 
 struct JsonAnswer {
   unsigned status{200};

@@ -11,7 +11,6 @@ namespace thermocomp::placement {
 
 namespace {
 
-constexpr double far = std::numeric_limits<double>::infinity();
 constexpr double gains_by = 1e-9;  ///< share of the trace; less is rounding
 constexpr int sweeps_max = 50;
 
@@ -51,7 +50,7 @@ class ErrorTrace {
 
   struct Best {
     Index node{0};
-    double change{far};  ///< change of the trace
+    double change{std::numeric_limits<double>::infinity()};  ///< change of the trace
   };
   [[nodiscard]] Best best_node(std::size_t block) const {
     // The trace changes by sum_f 2 x_f g_f + x_f^2 |P_b|^2; x is the block's change.

@@ -63,11 +63,10 @@ std::string name_of(const Pattern& pattern, double percent, double share) {
 }  // namespace
 
 BlockBounds bounds_of(const PlacementProblem& problem, const Field& field) {
-  constexpr double far = std::numeric_limits<double>::infinity();
   BlockBounds bounds;
   for (const BlockOfSensors& block : problem.blocks) {
-    double low = far;
-    double high = -far;
+    double low = std::numeric_limits<double>::infinity();
+    double high = -low;
     for (const Index node : block.candidates) {
       low = std::min(low, field.rise_K[node]);
       high = std::max(high, field.rise_K[node]);

@@ -101,7 +101,7 @@ json number(double value) {
   return std::isfinite(value) ? json(value) : json(nullptr);
 }
 
-json figure_json(const Figure& figure) {
+json bounded_json(const Figure& figure) {
   if (!figure.is_there()) return nullptr;
   return {{"value", number(figure.value)}, {"ci99", {number(figure.low), number(figure.high)}}};
 }
@@ -112,12 +112,12 @@ json axis_json(const AxisFigures& axis) {
           {"values", axis.values},
           {"noise", number(axis.noise)},
           {"smoothed", axis.smoothed},
-          {"range_first_60_min", figure_json(axis.first_hour)},
-          {"range_until_end", figure_json(axis.until_end)},
-          {"range_cooling", figure_json(axis.cooling)},
-          {"range_whole", figure_json(axis.whole)},
-          {"range_largest_60_min", figure_json(axis.largest_hour)},
-          {"last_by_first_60_min", figure_json(axis.last_by_first)},
+          {"range_first_60_min", bounded_json(axis.first_hour)},
+          {"range_until_end", bounded_json(axis.until_end)},
+          {"range_cooling", bounded_json(axis.cooling)},
+          {"range_whole", bounded_json(axis.whole)},
+          {"range_largest_60_min", bounded_json(axis.largest_hour)},
+          {"last_by_first_60_min", bounded_json(axis.last_by_first)},
           {"settled", axis.settled ? json(*axis.settled) : json(nullptr)}};
 }
 
@@ -126,8 +126,8 @@ json figures_json(const TestFigures& figures) {
               {"from_s", figures.phases.from_s},
               {"to_s", figures.phases.to_s},
               {"axes", json::array()},
-              {"combined_until_end_um", figure_json(figures.combined_until_end)},
-              {"combined_whole_um", figure_json(figures.combined_whole)},
+              {"combined_until_end_um", bounded_json(figures.combined_until_end)},
+              {"combined_whole_um", bounded_json(figures.combined_whole)},
               {"temperatures", json::array()}};
   if (figures.phases.runs) {
     result["running_from_s"] = figures.phases.running_from_s;
@@ -152,9 +152,9 @@ std::string report_json(const TestAnswer& answer) {
               {"after_by_before", json::object()},
               {"notes", answer.notes}};
   for (const AxisRatio& ratio : answer.ratios)
-    result["after_by_before"][ratio.name] = {{"first_60_min", figure_json(ratio.first_hour)},
-                                             {"until_end", figure_json(ratio.until_end)},
-                                             {"whole", figure_json(ratio.whole)}};
+    result["after_by_before"][ratio.name] = {{"first_60_min", bounded_json(ratio.first_hour)},
+                                             {"until_end", bounded_json(ratio.until_end)},
+                                             {"whole", bounded_json(ratio.whole)}};
   return result.dump(2, ' ', false, json::error_handler_t::replace) + "\n";
 }
 

@@ -8,7 +8,7 @@
 namespace thermocomp {
 namespace {
 
-constexpr nanoseconds retry = std::chrono::milliseconds(200);
+constexpr nanoseconds open_again_after = std::chrono::milliseconds(200);
 
 template <class Channel>
 std::vector<std::size_t> find_columns(const std::vector<Channel>& channels, const std::string& user,
@@ -92,7 +92,7 @@ std::vector<FieldNodes::Place> FieldNodes::places() const {
 
 void FieldNodes::update(nanoseconds now, std::span<const double> row) {
   for (const auto& node : nodes_) {
-    if (!node->socket.is_open() && now >= node->tried_at + retry) {
+    if (!node->socket.is_open() && now >= node->tried_at + open_again_after) {
       node->tried_at = now;
       node->socket.open();
     }

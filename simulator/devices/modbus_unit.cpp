@@ -16,10 +16,6 @@ constexpr std::size_t words_read_max = 125;
 constexpr std::size_t bits_written_max = 1968;
 constexpr std::size_t words_written_max = 123;
 
-std::uint16_t word_at(std::span<const std::uint8_t> bytes, std::size_t offset) {
-  return static_cast<std::uint16_t>((bytes[offset] << 8) | bytes[offset + 1]);
-}
-
 void append(std::vector<std::uint8_t>& bytes, std::uint16_t word) {
   bytes.push_back(static_cast<std::uint8_t>(word >> 8));
   bytes.push_back(static_cast<std::uint8_t>(word & 0xFF));

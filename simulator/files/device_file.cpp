@@ -14,8 +14,6 @@
 namespace thermocomp {
 namespace {
 
-constexpr double large = 1e9;
-
 const Names<ModbusTable> table_names{{"coil", ModbusTable::coil},
                                      {"discrete_input", ModbusTable::discrete_input},
                                      {"holding", ModbusTable::holding},

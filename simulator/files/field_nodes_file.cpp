@@ -9,8 +9,6 @@
 namespace thermocomp {
 namespace {
 
-constexpr double large = 1e9;
-
 std::string read_column(const TomlTable& table, const MachineConfig& machine) {
   std::string column = table.text("column");
   if (!machine.plant || column.empty()) return column;  // a replayed file defines the columns

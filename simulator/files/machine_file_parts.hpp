@@ -13,6 +13,8 @@
 
 namespace thermocomp {
 
+inline constexpr double large = 1e9;  ///< limit of numbers without one of their own
+
 /// Reads the optional lists open_, short_circuit_codes, over_, under_range_codes and error_codes.
 [[nodiscard]] FaultCodes read_fault_codes(const TomlTable& table, std::int64_t low,
                                           std::int64_t high);

@@ -6,8 +6,6 @@
 namespace thermocomp {
 namespace {
 
-constexpr double large = 1e9;
-
 void read_signal_steps(const TomlTable& table, SignalConfig& signal) {
   signal.times_s = table.numbers("times_s", Range::between(0.0, large));
   signal.values = table.numbers("values", Range::between(-large, large));

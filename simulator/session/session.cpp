@@ -26,13 +26,6 @@
 namespace thermocomp {
 namespace {
 
-double seconds_of(nanoseconds time) {
-  return std::chrono::duration<double>(time).count();
-}
-nanoseconds from_seconds(double s) {
-  return std::chrono::duration_cast<nanoseconds>(std::chrono::duration<double>(s));
-}
-
 /// {"ready": true, "ports": {...}, "paths": {...}, "unavailable": {...}}
 std::string ready_line(const std::vector<BusPlace>& places) {
   nlohmann::ordered_json line{{"ready", true},

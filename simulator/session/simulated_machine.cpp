@@ -23,13 +23,6 @@ constexpr std::uint64_t garbage_stream = 0x40000;
 constexpr std::uint64_t probe_stream = 0x50000;
 constexpr std::uint8_t gateway_target_failed = 0x0B;
 
-double seconds_of(nanoseconds time) {
-  return std::chrono::duration<double>(time).count();
-}
-nanoseconds from_seconds(double s) {
-  return std::chrono::duration_cast<nanoseconds>(std::chrono::duration<double>(s));
-}
-
 std::size_t index_in(const std::vector<std::string>& columns, const std::string& column,
                      const std::string& user, const std::string& source) {
   const auto found = std::find(columns.begin(), columns.end(), column);

@@ -14,6 +14,13 @@
 
 namespace thermocomp {
 
+[[nodiscard]] inline double seconds_of(std::chrono::nanoseconds time) {
+  return std::chrono::duration<double>(time).count();
+}
+[[nodiscard]] inline std::chrono::nanoseconds from_seconds(double s) {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::duration<double>(s));
+}
+
 struct BusPlace {
   std::string name;
   SimulatedBusKind kind{SimulatedBusKind::modbus_tcp};

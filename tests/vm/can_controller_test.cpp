@@ -247,7 +247,7 @@ constexpr std::uint32_t near_frame = 0x110, far_frame = 0x111, bits_frame = 0x11
 constexpr std::uint32_t near_shown = 0x210, far_shown = 0x211;
 
 /// One axis with two nodes in two frames, with the set's number in the third byte.
-CanControllerConfig two_nodes(const std::string& interface) {
+CanControllerConfig two_controlled_nodes(const std::string& interface) {
   const auto number = [](std::uint32_t id) {
     CanSignal signal = place(id, 16, 8);
     signal.is_signed = false;
@@ -347,7 +347,7 @@ TEST_CASE("a set goes in several frames with one number that counts up",
           "[vm][controller][travel]") {
   Interpolator machine("vcan0");
   Candump dump("vcan0,110:7FE");
-  CanController link(two_nodes("vcan0"));
+  CanController link(two_controlled_nodes("vcan0"));
   Cycle cycle(link);
   cycle.want(0, 1.0);
   cycle.want(1, -2.0);
@@ -370,7 +370,7 @@ TEST_CASE("what is applied counts when all frames carry the number of one set",
   machine.number_in_effect = 7;
   machine.near_counts = 100;
   machine.far_counts = 300;
-  CanController link(two_nodes("vcan0"));
+  CanController link(two_controlled_nodes("vcan0"));
   Cycle cycle(link);
   REQUIRE(eventually([&] { return cycle.state().online; }));
   CHECK(cycle.state().applied_um[1] == Approx(3.0));
@@ -398,7 +398,7 @@ TEST_CASE("what is applied counts when all frames carry the number of one set",
 TEST_CASE("while one node must stand, the set stays and its valid bit is 0",
           "[vm][controller][travel]") {
   Interpolator machine("vcan0");
-  CanController link(two_nodes("vcan0"));
+  CanController link(two_controlled_nodes("vcan0"));
   Cycle cycle(link);
   cycle.want(0, 1.0);
   cycle.want(1, 2.0);

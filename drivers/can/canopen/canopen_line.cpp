@@ -17,7 +17,6 @@ constexpr std::uint32_t emergency_id = 0x080;
 constexpr std::uint32_t sdo_answer_id = 0x580;
 constexpr std::uint32_t heartbeat_id = 0x700;
 constexpr std::uint32_t standard_id_max = 0x7FF;
-constexpr std::uint8_t state_operational = 0x05;
 constexpr int node_max = 127;
 
 CanFrame plain_frame(std::uint32_t id, std::size_t size) {

@@ -15,7 +15,6 @@ using namespace std::chrono_literals;
 constexpr std::uint8_t command_start = 0x01;
 constexpr std::uint8_t command_pre_operational = 0x80;
 constexpr std::uint8_t state_boot_up = 0x00;
-constexpr std::uint8_t state_operational = 0x05;
 constexpr std::uint8_t toggle_bit = 0x80;  // of node guarding, which uses the same identifier
 
 constexpr std::uint16_t error_register_object = 0x1001;

@@ -20,6 +20,9 @@
 
 namespace thermocomp {
 
+/// State of a node, and the command that demands it, CiA 301.
+inline constexpr std::uint8_t state_operational = 0x05;
+
 using std::chrono::nanoseconds;
 
 /// Detects a second sender: counts arrivals in windows of eight periods. Two senders give sixteen;

@@ -25,7 +25,7 @@ constexpr std::uint8_t response_segment = 0x00;
 constexpr std::uint8_t response_read = 0x40;
 constexpr std::uint8_t response_written = 0x60;
 constexpr std::uint8_t response_abort = 0x80;
-constexpr std::uint8_t toggle_bit = 0x10;
+constexpr std::uint8_t segment_toggle_bit = 0x10;
 constexpr std::uint8_t expedited_bit = 0x02;
 constexpr std::uint8_t size_bit = 0x01;
 constexpr std::uint8_t last_segment_bit = 0x01;
@@ -237,11 +237,11 @@ void SdoClient::take_first(std::span<const std::uint8_t> data, nanoseconds now) 
 
 void SdoClient::ask_segment(nanoseconds now) {
   deadline_ = now + timeout_;
-  send(static_cast<std::uint8_t>(ask_read_segment | (toggle_ ? toggle_bit : 0)), {}, 0);
+  send(static_cast<std::uint8_t>(ask_read_segment | (toggle_ ? segment_toggle_bit : 0)), {}, 0);
 }
 
 void SdoClient::take_segment(std::span<const std::uint8_t> data, nanoseconds now) {
-  if (((data[0] & toggle_bit) != 0) != toggle_) {
+  if (((data[0] & segment_toggle_bit) != 0) != toggle_) {
     abort(SdoOutcome::broken, toggle_not_alternated);
     return;
   }

@@ -34,9 +34,9 @@ std::string hexadecimal(std::uint64_t name) {
 /// All bytes of a single-frame group; of a longer one the bytes of the parameter.
 std::span<const std::uint8_t> bytes_of(std::span<const std::uint8_t> group,
                                        const J1939Parameter& parameter) {
-  constexpr std::size_t frame_bytes = 8;
+  constexpr std::size_t one_frame_bytes = 8;
   const auto first = static_cast<std::size_t>(parameter.start_byte);
-  if (group.size() <= frame_bytes || first >= group.size()) return group;
+  if (group.size() <= one_frame_bytes || first >= group.size()) return group;
   const int bytes = (parameter.start_bit + parameter.length_bits + 7) / 8;
   return group.subspan(first, std::min(group.size() - first, static_cast<std::size_t>(bytes)));
 }

@@ -127,15 +127,8 @@ std::vector<double> linear_grid(double low, double high, std::size_t count) {
 
 namespace {
 
-constexpr double missing_share_max = 0.2;
 /// Typical relative error of coefficients that were fitted or calculated.
 constexpr double coefficient_sd = 0.03;
-
-double missing_share(const std::vector<double>& values) {
-  const auto missing =
-      std::count_if(values.begin(), values.end(), [](double x) { return !std::isfinite(x); });
-  return static_cast<double>(missing) / static_cast<double>(values.size());
-}
 
 /// The column at the rows; a missing value is replaced by the last one, at the start by the first.
 Column taken(const std::vector<double>& values, const std::vector<std::size_t>& rows) {
@@ -212,7 +205,7 @@ SharedColumns shared_columns(const ThermalModel& model, const std::vector<RunFil
         is_output(name))
       continue;
     const auto has = [&name](const RunFile& run) {
-      return run.find(name) && missing_share(run.column(name)) <= missing_share_max;
+      return run.find(name) && is_mostly_known(run.column(name));
     };
     const bool everywhere = std::all_of(runs.begin(), runs.end(), has) &&
                             std::all_of(further.begin(), further.end(), has);

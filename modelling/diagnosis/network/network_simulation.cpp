@@ -22,7 +22,6 @@ constexpr double start_s = 300.0;
 /// Two sensors in one place must not contradict each other without end.
 constexpr double sensor_give = 1e-6;
 constexpr double slowest_per_s = 1e-9;
-constexpr double missing_share_max = 0.2;
 
 /// Every row up to the selection's end, missing values held.
 Column held(const RunFile& file, const std::string& column) {
@@ -171,11 +170,7 @@ std::vector<std::string> shared_signals(const std::vector<RunFile>& files) {
   for (const std::string& name : files.front().columns) {
     if (name == "time_s" || !is_operating(name) || name.ends_with("_mm")) continue;
     const bool everywhere = std::all_of(files.begin(), files.end(), [&](const RunFile& file) {
-      if (!file.find(name)) return false;
-      const std::vector<double>& values = file.column(name);
-      const auto missing = std::count_if(values.begin(), values.end(),
-                                         [](double value) { return !std::isfinite(value); });
-      return static_cast<double>(missing) <= missing_share_max * static_cast<double>(values.size());
+      return file.find(name) && is_mostly_known(file.column(name));
     });
     if (everywhere) names.push_back(name);
   }

@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::size_t heats_max = 4;
 constexpr double gain_min = 0.05;
-constexpr std::array<double, 6> taus_s{60.0, 300.0, 900.0, 2700.0, 8100.0, 24300.0};
+constexpr std::array<double, 6> all_taus_s{60.0, 300.0, 900.0, 2700.0, 8100.0, 24300.0};
 
 constexpr std::size_t starts_min = 3;
 constexpr double starts_apart_K = 1.0;
@@ -59,7 +59,7 @@ std::vector<HeatColumn> candidates(const MeasuredTests& tests, const Equation& e
   for (std::size_t signal = 0; signal < tests.signals.size(); ++signal) {
     if (!tests.moved(tests.signals[signal])) continue;
     for (const double power : {1.0, 2.0})
-      for (const double tau_s : taus_s)
+      for (const double tau_s : all_taus_s)
         if (tau_s <= longest_s / 3.0) all.push_back({signal, power, tau_s});
   }
   add_starts(tests, equation, all);

@@ -12,8 +12,6 @@
 namespace thermocomp::identification {
 namespace {
 
-constexpr double singular_share = 1e-10;
-
 std::vector<double> time_constants(const MeasuredTests& tests, std::size_t count) {
   double duration_s = 0.0;
   double step_s = std::numeric_limits<double>::infinity();

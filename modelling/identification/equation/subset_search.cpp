@@ -9,8 +9,6 @@
 namespace thermocomp::identification {
 namespace {
 
-constexpr double singular_share = 1e-10;
-
 class Best {
  public:
   explicit Best(std::size_t kept) : kept_(kept) {}

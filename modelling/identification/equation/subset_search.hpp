@@ -10,6 +10,9 @@
 
 namespace thermocomp::identification {
 
+/// A pivot below this share of its column's square sum counts as 0.
+inline constexpr double singular_share = 1e-10;
+
 /// X'X, X'Y and Y'Y: candidates first, then outputs; shape (candidates + outputs) squared.
 struct NormalEquations {
   Eigen::Index candidates{0};

@@ -10,7 +10,7 @@ using namespace thermocomp::test;
 
 namespace {
 
-DaemonConfig parse(const std::string& text, const std::string& model_text) {
+DaemonConfig parse_with(const std::string& text, const std::string& model_text) {
   return parse_daemon_config(text, "machine.toml", model_text, "model.toml");
 }
 
@@ -349,7 +349,7 @@ TEST_CASE("each broken configuration is refused with file, line, key, value and 
   CHECK(broken_small_machine().size() >= 75);
   for (const Broken& broken : broken_small_machine()) {
     check_refused(broken, good, "machine.toml",
-                  [&](const std::string& text) { return parse(text, model); });
+                  [&](const std::string& text) { return parse_with(text, model); });
   }
 }
 
@@ -358,7 +358,7 @@ TEST_CASE("each broken CAN configuration is refused with file, line, key, value 
   const std::string model = example("column_model.toml");
   for (const Broken& broken : broken_can()) {
     check_refused(broken, example("can.toml"), "machine.toml",
-                  [&](const std::string& text) { return parse(text, model); });
+                  [&](const std::string& text) { return parse_with(text, model); });
   }
 }
 
@@ -377,7 +377,7 @@ TEST_CASE("a dry run accepts no place for offsets", "[config]") {
   };
   for (const Broken& broken : table) {
     check_refused(broken, good, "machine.toml",
-                  [&](const std::string& text) { return parse(text, model); });
+                  [&](const std::string& text) { return parse_with(text, model); });
   }
 }
 
@@ -392,7 +392,7 @@ TEST_CASE("all problems are reported at once, in both files, in the order of the
   text = edited(text, "output = \"y_um\"", "output = \"w_um\"");
   const std::string model =
       edited(example("small_machine_model.toml"), "tau_s = 900.0", "tau_s = -900.0");
-  const auto problems = problems_of([&] { return parse(text, model); });
+  const auto problems = problems_of([&] { return parse_with(text, model); });
   CHECK(problems.size() == 7);
   CHECK(mentions(problems, "loop.rate_hz", "[1, 1000]"));
   CHECK(mentions(problems, "bus[cabinet].prt", "unknown key"));
@@ -411,15 +411,15 @@ TEST_CASE("suspected sensors can be weighed down only with a covariance", "[conf
   const std::string asked = edited(example("small_machine.toml"), "suspected_sensors = \"warn\"",
                                    "suspected_sensors = \"weigh_down\"");
   const std::string model = example("small_machine_model.toml");
-  CHECK(mentions(problems_of([&] { return parse(asked, model); }), "compensation.suspected_sensors",
-                 "thermocomp covariance"));
+  CHECK(mentions(problems_of([&] { return parse_with(asked, model); }),
+                 "compensation.suspected_sensors", "thermocomp covariance"));
   const std::string blind =
       edited(asked, "estimate_lost_blocks = true", "estimate_lost_blocks = false");
-  CHECK(mentions(problems_of([&] { return parse(blind, model); }),
+  CHECK(mentions(problems_of([&] { return parse_with(blind, model); }),
                  "compensation.estimate_lost_blocks", "must be true where suspected_sensors"));
   const std::string odd = edited(asked, "\"weigh_down\"", "\"ignore\"");
-  CHECK(mentions(problems_of([&] { return parse(odd, model); }), "compensation.suspected_sensors",
-                 "\"weigh_down\""));
+  CHECK(mentions(problems_of([&] { return parse_with(odd, model); }),
+                 "compensation.suspected_sensors", "\"weigh_down\""));
   const ThermalModel read = parse_model(model, "model.toml");
   std::string rows;
   for (std::size_t i = 0; i < read.inputs.size(); ++i) {
@@ -428,14 +428,15 @@ TEST_CASE("suspected sensors can be weighed down only with a covariance", "[conf
     rows += "], ";
   }
   const std::string able = model + "\n[covariance]\nmatrix_K2 = [" + rows + "]\n";
-  CHECK(parse(asked, able).estimator.compensation.suspected_sensors == SuspectedPolicy::weigh_down);
+  CHECK(parse_with(asked, able).estimator.compensation.suspected_sensors ==
+        SuspectedPolicy::weigh_down);
 }
 
 TEST_CASE("a model that needs a signal is refused without a controller", "[config]") {
   const std::string model = example("column_model.toml") +
                             "[[term]]\nkind = \"speed_growth\"\nsubject = \"spindle_rpm\"\n"
                             "gain_um_per_unit2 = { z_um = 1e-7 }\n";
-  CHECK(mentions(problems_of([&] { return parse(example("modbus_rtu.toml"), model); }),
+  CHECK(mentions(problems_of([&] { return parse_with(example("modbus_rtu.toml"), model); }),
                  "controller.signal", "kind and dry_run = true"));
 }
 
@@ -443,7 +444,7 @@ TEST_CASE("an edit that breaks several rules is reported once per rule", "[confi
   const std::string good = example("small_machine.toml");
   const std::string model = example("small_machine_model.toml");
   const auto problems_after = [&](const std::string& from, const std::string& to) {
-    return problems_of([&] { return parse(edited(good, from, to), model); });
+    return problems_of([&] { return parse_with(edited(good, from, to), model); });
   };
   CHECK(mentions(problems_after("name = \"bed_rear\"", "name = \"bed_front\""),
                  "sensor[bed_front].name", "used twice"));
@@ -473,7 +474,7 @@ TEST_CASE("a cycle of reference sensors is refused", "[config]") {
                             "\"spindle_rear\"\nscreening");
   text = edited(text, "address = 6\n", "address = 6\nreference_sensor = \"spindle_front\"\n");
   const auto problems =
-      problems_of([&] { return parse(text, example("small_machine_model.toml")); });
+      problems_of([&] { return parse_with(text, example("small_machine_model.toml")); });
   CHECK(problems.size() == 2);
   CHECK(mentions(problems, "sensor[spindle_front].reference_sensor", "lead back"));
   CHECK(mentions(problems, "sensor[spindle_rear].reference_sensor", "lead back"));
@@ -486,22 +487,22 @@ TEST_CASE("too many axes and too many signals are refused", "[config]") {
             "\"\noutput = \"z_um\"\noffset_um_max = 1\nrate_um_per_s_max = 1\n";
   }
   const std::string model = example("column_model.toml");
-  CHECK(mentions(problems_of([&] { return parse(text, model); }), "axis[a15].name",
+  CHECK(mentions(problems_of([&] { return parse_with(text, model); }), "axis[a15].name",
                  "at most 16 axes"));
   text = example("can.toml");
   for (int i = 0; i < 48; ++i) {
     text += "[[controller.signal]]\nname = \"s" + std::to_string(i) +
             "\"\nid = 5\nstart_bit = 0\nlength_bits = 8\n";
   }
-  CHECK(mentions(problems_of([&] { return parse(text, model); }), "controller.signal[s47].name",
-                 "at most 48 signals"));
+  CHECK(mentions(problems_of([&] { return parse_with(text, model); }),
+                 "controller.signal[s47].name", "at most 48 signals"));
 }
 
 TEST_CASE("invalid TOML is refused with its line", "[config]") {
   const std::string model = example("column_model.toml");
   for (const std::string text : {"format = 1\nformat = 2\n", "format = 1\n[loop\n",
                                  "format = 1\nx = \n", "format = 1\nx = \"\xff\"\n"}) {
-    const auto problems = problems_of([&] { return parse(text, model); });
+    const auto problems = problems_of([&] { return parse_with(text, model); });
     REQUIRE(problems.size() == 1);
     CHECK(problems.front().line == 2);
     CHECK_THAT(problems.front().rule, Catch::Contains("not TOML"));
@@ -509,7 +510,7 @@ TEST_CASE("invalid TOML is refused with its line", "[config]") {
 }
 
 TEST_CASE("an empty file is reported with all missing keys", "[config]") {
-  const auto problems = problems_of([] { return parse("", ""); });
+  const auto problems = problems_of([] { return parse_with("", ""); });
   for (const char* key : {"format", "model", "bus", "device", "sensor", "block", "axis",
                           "controller", "inputs", "outputs"}) {
     INFO(key);
@@ -549,7 +550,7 @@ TEST_CASE("a damaged file is at worst refused", "[config][property]") {
       if (sort == 1) text.insert(at, text.substr(next(text.size()), next(60)));
       if (sort == 2) text[at] = static_cast<char>(next(256));
     }
-    for (const Problem& problem : problems_of([&] { return parse(text, model); })) {
+    for (const Problem& problem : problems_of([&] { return parse_with(text, model); })) {
       CHECK(!problem.rule.empty());
     }
   }

@@ -15,7 +15,7 @@ class Folder : public ExampleFolder {
 };
 
 /// The problems after one edit of the configuration.
-std::string error_after(const std::string& from, const std::string& to) {
+std::string database_error_after(const std::string& from, const std::string& to) {
   const Folder folder;
   folder.edit("can_dbc.toml", from, to);
   return folder.problems_text();
@@ -24,16 +24,17 @@ std::string error_after(const std::string& from, const std::string& to) {
 }  // namespace
 
 TEST_CASE("names that are not in the DBC file are refused with a suggestion", "[dbc]") {
-  CHECK_THAT(error_after("signal = \"Column\"", "signal = \"Colum\""),
+  CHECK_THAT(database_error_after("signal = \"Column\"", "signal = \"Colum\""),
              Catch::Contains("sensor[column].signal = \"Colum\": must be a signal of the message "
                              "NODE_TEMPERATURES; did you mean \"Column\"?"));
-  CHECK_THAT(error_after("message = \"NODE_PAGES\"", "message = \"NODE_PAGE\""),
+  CHECK_THAT(database_error_after("message = \"NODE_PAGES\"", "message = \"NODE_PAGE\""),
              Catch::Contains("sensor[spindle].message = \"NODE_PAGE\": must be a message of the "
                              "bus' DBC file; did you mean \"NODE_PAGES\"?"));
-  CHECK_THAT(error_after("counter = \"Alive\"", "counter = \"Dead\""),
+  CHECK_THAT(database_error_after("counter = \"Alive\"", "counter = \"Dead\""),
              Catch::Contains("device[node].counter = \"Dead\": must be a signal of the message"));
-  CHECK_THAT(error_after("signal = \"Spindle\"", "signal = \"Spindle\"\ncounter = \"Oil\""),
-             Catch::Contains("sensor[spindle].counter = \"Oil\": must be in every frame"));
+  CHECK_THAT(
+      database_error_after("signal = \"Spindle\"", "signal = \"Spindle\"\ncounter = \"Oil\""),
+      Catch::Contains("sensor[spindle].counter = \"Oil\": must be in every frame"));
 }
 
 TEST_CASE("a key overrides the DBC file, and the rest is taken from there", "[dbc]") {
@@ -64,13 +65,16 @@ TEST_CASE("a key overrides the DBC file, and the rest is taken from there", "[db
     s.byte_order = ByteOrder::big_endian;
     s.start_bit = 23;
   });
-  CHECK_THAT(error_after("signal = \"Column\"", "signal = \"Column\"\nmultiplexor_value = 1"),
-             Catch::Contains("sensor[column].multiplexor_value = 1: is given by the DBC file"));
-  CHECK_THAT(error_after("signal = \"Column\"",
-                         "signal = \"Column\"\nlength_bits = 12\nbyte_order = \"big_endian\""),
-             Catch::Contains("start_bit = (missing): must be given: the value is not in whole"));
-  CHECK_THAT(error_after("signal = \"Spindle\"", "signal = \"Spindle\"\nextended_id = false"),
-             Catch::Contains("extended_id = false: is false, but the file's number has more"));
+  CHECK_THAT(
+      database_error_after("signal = \"Column\"", "signal = \"Column\"\nmultiplexor_value = 1"),
+      Catch::Contains("sensor[column].multiplexor_value = 1: is given by the DBC file"));
+  CHECK_THAT(
+      database_error_after("signal = \"Column\"",
+                           "signal = \"Column\"\nlength_bits = 12\nbyte_order = \"big_endian\""),
+      Catch::Contains("start_bit = (missing): must be given: the value is not in whole"));
+  CHECK_THAT(
+      database_error_after("signal = \"Spindle\"", "signal = \"Spindle\"\nextended_id = false"),
+      Catch::Contains("extended_id = false: is false, but the file's number has more"));
 }
 
 TEST_CASE("a flaw of the DBC file counts if a sensor uses it and no key overrides it", "[dbc]") {
@@ -132,16 +136,16 @@ TEST_CASE("two sensors that read one place cause a warning", "[dbc]") {
 }
 
 TEST_CASE("named signals require a DBC file and a message", "[dbc]") {
-  CHECK_THAT(error_after("dbc = \"can_dbc.dbc\"", ""),
+  CHECK_THAT(database_error_after("dbc = \"can_dbc.dbc\"", ""),
              Catch::Contains("sensor[column].signal = \"Column\": needs a bus that names a DBC"));
-  CHECK_THAT(error_after("message = \"NODE_TEMPERATURES\"", ""),
+  CHECK_THAT(database_error_after("message = \"NODE_TEMPERATURES\"", ""),
              Catch::Contains("sensor[column].message = (missing): must be given"));
-  CHECK_THAT(error_after("dbc = \"can_dbc.dbc\"", "dbc = \"other.dbc\""),
+  CHECK_THAT(database_error_after("dbc = \"can_dbc.dbc\"", "dbc = \"other.dbc\""),
              Catch::Contains("bus[machine_bus].dbc = \"other.dbc\": no such file"));
 }
 
 TEST_CASE("a code out of range of the named signal is refused", "[dbc]") {
-  CHECK_THAT(error_after("[0x7FFF]", "[0x10000]"), Catch::Contains("open_circuit_codes"));
+  CHECK_THAT(database_error_after("[0x7FFF]", "[0x10000]"), Catch::Contains("open_circuit_codes"));
 }
 
 TEST_CASE("a broken DBC file is reported once, by its own name and line", "[dbc]") {

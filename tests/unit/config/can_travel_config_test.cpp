@@ -9,7 +9,7 @@ using namespace thermocomp::test;
 
 namespace {
 
-DaemonConfig parse(const std::string& text) {
+DaemonConfig parse_travel(const std::string& text) {
   return parse_daemon_config(text, "machine.toml", example("travel_model.toml"), "model.toml");
 }
 
@@ -155,7 +155,7 @@ TEST_CASE("a travel is in frames, each with the number of its set", "[config][tr
 TEST_CASE("an invalid travel in frames is refused with file, line, key and rule",
           "[config][travel][can]") {
   for (const Broken& broken : broken_frames())
-    check_refused(broken, example("travel_can.toml"), "machine.toml", parse);
+    check_refused(broken, example("travel_can.toml"), "machine.toml", parse_travel);
 }
 
 TEST_CASE("a frame of the controller's set must not be one that is sent", "[config][travel][can]") {
@@ -164,7 +164,7 @@ TEST_CASE("a frame of the controller's set must not be one that is sent", "[conf
     text = edited(text, std::string(key) + " = { id = 0x290", std::string(key) + " = { id = 0x210");
   text = edited(text, "set_numbers = [{ id = 0x290", "set_numbers = [{ id = 0x210");
   std::size_t reported = 0;
-  for (const Problem& problem : problems_of([&] { return parse(text); }))
+  for (const Problem& problem : problems_of([&] { return parse_travel(text); }))
     if (problem.rule == "is in a frame that is sent, not received") ++reported;
   CHECK(reported == 3);
 }
@@ -172,17 +172,17 @@ TEST_CASE("a frame of the controller's set must not be one that is sent", "[conf
 TEST_CASE("either all sets in frames are read back or none", "[config][travel][can]") {
   std::string text = example("travel_can.toml");
   text.resize(text.find("[axis.table.applied]"));
-  CHECK_THROWS_WITH(parse(text), Catch::Contains("must be given for all axes or for none"));
+  CHECK_THROWS_WITH(parse_travel(text), Catch::Contains("must be given for all axes or for none"));
   const auto begin = text.find("[axis.line.applied]");
   text.erase(begin, text.find("[[axis]]\nname = \"z\"") - begin);
-  const DaemonConfig config = parse(text);
+  const DaemonConfig config = parse_travel(text);
   CHECK_FALSE(config.estimator.controller_reads_back);
   CHECK_FALSE(controller_of(config).axes[0].reads_back());
 }
 
 TEST_CASE("set numbers must not repeat while a read-back is still valid", "[config][travel][can]") {
   const auto with = [](const char* silent_after_s) {
-    return parse(
+    return parse_travel(
         edited(example("travel_can.toml"), "period_s = 0.1\nvalid",
                std::string("period_s = 0.05\nsilent_after_s = ") + silent_after_s + "\nvalid"));
   };
@@ -203,7 +203,8 @@ TEST_CASE("P0 has a place of sufficient range in the frames", "[config][travel][
                     "0x214, start_bit = 48, length_bits = 16 }]"),
              "p0_mm = 0.0 ", "p0_mm = 12.5 ");
   const auto with_p0 = [&](const char* place) {
-    return parse(edited(wide, "# p0_signal_mm = { ... } ", std::string("p0_signal_mm = ") + place));
+    return parse_travel(
+        edited(wide, "# p0_signal_mm = { ... } ", std::string("p0_signal_mm = ") + place));
   };
   const DaemonConfig config =
       with_p0("{ id = 0x214, start_bit = 0, length_bits = 16, scale = 0.1 }");
@@ -216,14 +217,14 @@ TEST_CASE("P0 has a place of sufficient range in the frames", "[config][travel][
 
 TEST_CASE("a reload cannot change a place in the frames", "[config][travel][can]") {
   const std::string text = example("travel_can.toml");
-  const DaemonConfig running = parse(text);
-  CHECK(restart_needed(running, parse(text)).empty());
+  const DaemonConfig running = parse_travel(text);
+  CHECK(restart_needed(running, parse_travel(text)).empty());
   const std::vector<std::string> changed{"controller, or registers of the axes"};
   const std::string moved =
       edited(edited(text, "{ id = 0x212, start_bit = 16, length_bits = 16, scale = 0.01 }",
                     "{ id = 0x212, start_bit = 32, length_bits = 16, scale = 0.01 }"),
              "rate_um_per_s_max = 0.5", "rate_um_per_s_max = 0.4");
-  CHECK(restart_needed(running, parse(moved)) == changed);
+  CHECK(restart_needed(running, parse_travel(moved)) == changed);
 }
 
 TEST_CASE("only a controller on Modbus or CAN accepts a set", "[config][travel]") {
@@ -232,5 +233,5 @@ TEST_CASE("only a controller on Modbus or CAN accepts a set", "[config][travel]"
   const std::string bridge = text.substr(0, begin) +
                              "[controller]\nname = \"mill\"\nkind = \"linuxcnc\"\n" +
                              text.substr(text.find("[[axis]]"));
-  CHECK_THROWS_WITH(parse(bridge), Catch::Contains("takes a set of values as a whole"));
+  CHECK_THROWS_WITH(parse_travel(bridge), Catch::Contains("takes a set of values as a whole"));
 }

@@ -10,7 +10,7 @@ using namespace thermocomp::test;
 
 namespace {
 
-const std::string good = R"(format = 1
+const std::string good_tables = R"(format = 1
 inputs = ["a_degC", "b_degC"]
 outputs = ["z_um", "c_urad"]
 reference = "first_sample"
@@ -96,7 +96,7 @@ const std::vector<Broken>& broken_tables() {
 TEST_CASE("each broken bank or made_from is refused with file, line, key and rule",
           "[config][model]") {
   for (const Broken& broken : broken_tables()) {
-    check_refused(broken, good, "model.toml",
+    check_refused(broken, good_tables, "model.toml",
                   [](const std::string& text) { return parse_model(text, "model.toml"); });
   }
 }
@@ -113,7 +113,7 @@ TEST_CASE("an empty bank is refused", "[config][model]") {
 
 TEST_CASE("a bank and what a model was made from are read and written bit for bit",
           "[config][model]") {
-  ThermalModel model = parse_model(good, "model.toml");
+  ThermalModel model = parse_model(good_tables, "model.toml");
   REQUIRE(model.terms.size() == 1);
   CHECK(model.terms[0].bank.taus_s == std::vector<double>{0.0, 300.0, 900.0});
   CHECK(model.temperature_columns() == std::vector<std::string>{"a_degC", "b_degC", "oil_degC"});
@@ -130,7 +130,7 @@ TEST_CASE("a bank and what a model was made from are read and written bit for bi
 }
 
 TEST_CASE("a model is compared if each output has errors on rows left out", "[config][model]") {
-  ThermalModel model = parse_model(good, "model.toml");
+  ThermalModel model = parse_model(good_tables, "model.toml");
   CHECK_FALSE(is_compared(model));  // no data on the second output
   model.made_from->outputs["c_urad"] = {};
   CHECK(is_compared(model));

@@ -14,7 +14,7 @@ using namespace thermocomp::test;
 
 namespace {
 
-const std::string good =
+const std::string good_run =
     "# measured on a Monday\n"
     "time_s,t1_degC,z_um,coolant_on\n"
     "0,20.5,0,0\n"
@@ -22,7 +22,7 @@ const std::string good =
     "15,,1.25,1\n"
     "31.5,nan,-2e-3,1\n";
 
-RunFile parse(const std::string& text) {
+RunFile parsed(const std::string& text) {
   return parse_run(text, "run.csv");
 }
 
@@ -45,7 +45,7 @@ TEST_CASE("a room temperature is recognised by the beginning of a word", "[runs]
 }
 
 TEST_CASE("a run file is read column by column", "[config][run]") {
-  const RunFile run = parse(good);
+  const RunFile run = parsed(good_run);
   CHECK(run.columns == std::vector<std::string>{"time_s", "t1_degC", "z_um", "coolant_on"});
   CHECK(run.rows() == 3);
   CHECK(run.time_s() == std::vector<double>{0, 15, 31.5});
@@ -60,11 +60,11 @@ TEST_CASE("a run file is read column by column", "[config][run]") {
 
 TEST_CASE("line ends, byte order mark, blanks and empty last lines do not matter",
           "[config][run]") {
-  const RunFile run = parse("\xEF\xBB\xBFtime_s, z_um\r\n0, +1\r\n 1 ,NaN\r\n\r\n\n");
+  const RunFile run = parsed("\xEF\xBB\xBFtime_s, z_um\r\n0, +1\r\n 1 ,NaN\r\n\r\n\n");
   CHECK(run.columns[1] == "z_um");
   CHECK(run.rows() == 2);
   CHECK(run.column("z_um")[0] == 1.0);
-  CHECK(parse("time_s\n0\n1").rows() == 2);
+  CHECK(parsed("time_s\n0\n1").rows() == 2);
 }
 
 TEST_CASE("each invalid run file is refused with file, line, column and rule", "[config][run]") {
@@ -96,7 +96,7 @@ TEST_CASE("each invalid run file is refused with file, line, column and rule", "
       {"backwards past a comment", "time_s,a\n5,1\n#\n4,2\n", 4, "time_s", "greater than"},
   };
   for (const BadRun& bad : table) {
-    const auto problems = problems_of([&] { return parse(bad.text); });
+    const auto problems = problems_of([&] { return parsed(bad.text); });
     INFO(bad.what);
     REQUIRE(problems.size() == 1);
     INFO(to_string(problems.front()));
@@ -108,17 +108,17 @@ TEST_CASE("each invalid run file is refused with file, line, column and rule", "
 }
 
 TEST_CASE("several problems of a run file are reported at once, up to a limit", "[config][run]") {
-  CHECK(problems_of([] { return parse("time_s,a,b\n0,x,y\n0,1\n-1,2,3\n"); }).size() == 4);
+  CHECK(problems_of([] { return parsed("time_s,a,b\n0,x,y\n0,1\n-1,2,3\n"); }).size() == 4);
   std::string text = "time_s,a\n";
   for (int i = 0; i < 1000; ++i) text += std::to_string(i) + ",x\n";
-  CHECK(problems_of([&] { return parse(text); }).size() == 100);
+  CHECK(problems_of([&] { return parsed(text); }).size() == 100);
 }
 
 TEST_CASE("writing then reading a run preserves every bit", "[config][run]") {
   RunFile run;
   run.columns = {"time_s", "a"};
   run.values = {{0.1, 1.0 / 3.0, 1e9}, {-0.0, std::nan(""), 5e-324}};
-  const RunFile back = parse(write_run(run));
+  const RunFile back = parsed(write_run(run));
   CHECK(back.columns == run.columns);
   CHECK(back.values[0] == run.values[0]);
   CHECK(std::signbit(back.values[1][0]));
@@ -166,7 +166,7 @@ TEST_CASE("a number in any form is read as the nearest double", "[config][run][p
   std::string file = "time_s,z_um\n";
   for (std::size_t i = 0; i < texts.size(); ++i)
     file.append(std::to_string(i)).append(",").append(texts[i]).append("\n");
-  const RunFile run = parse(file);
+  const RunFile run = parsed(file);
   REQUIRE(run.rows() == texts.size());
   for (std::size_t i = 0; i < texts.size(); ++i) {
     const double expected = std::strtod(texts[i].c_str(), nullptr);
@@ -179,16 +179,16 @@ TEST_CASE("a number in any form is read as the nearest double", "[config][run][p
 TEST_CASE("a field that only begins with a number is refused", "[config][run]") {
   for (const char* text : {"-", "1-", "1.2.3", "1.5x", "12 3", "1,", "--1", "1.e", "0x10"}) {
     INFO(text);
-    CHECK_THROWS_AS(parse(std::string("time_s,z_um\n0,").append(text).append("\n")),
+    CHECK_THROWS_AS(parsed(std::string("time_s,z_um\n0,").append(text).append("\n")),
                     ConfigurationError);
   }
 }
 
 TEST_CASE("a selection is a half-open interval of time, and the run stays whole", "[config][run]") {
   const auto selected = [](const std::string& argument) {
-    const RunFile run = parse_run(good, "run.csv", parse_selection(argument));
+    const RunFile run = parse_run(good_run, "run.csv", parse_selection(argument));
     CHECK(run.rows() == 3);
-    const RunFile again = parse_run(good, "run.csv", parse_selection(selected_name(run)));
+    const RunFile again = parse_run(good_run, "run.csv", parse_selection(selected_name(run)));
     CHECK(again.selected_begin == run.selected_begin);
     CHECK(again.selected_end == run.selected_end);
     return std::pair(run.selected_begin, run.selected_end);
@@ -213,14 +213,14 @@ TEST_CASE("invalid selections are refused", "[config][run]") {
     INFO(argument);
     CHECK(problems_of([&] { return parse_selection(argument); }).size() == 1);
   }
-  const auto problems =
-      problems_of([] { return parse_run(good, "run.csv", parse_selection("run.csv@100:200")); });
+  const auto problems = problems_of(
+      [] { return parse_run(good_run, "run.csv", parse_selection("run.csv@100:200")); });
   REQUIRE(problems.size() == 1);
   CHECK_THAT(problems.front().rule, Catch::Contains("selects no row"));
 }
 
 TEST_CASE("a missing column is named with its file", "[config][run]") {
-  const RunFile run = parse(good);
+  const RunFile run = parsed(good_run);
   const auto problems = problems_of([&] { return run.column("t9_degC"); });
   REQUIRE(problems.size() == 1);
   CHECK(problems.front().file == "run.csv");

@@ -49,11 +49,6 @@ ModbusControllerConfig three_axes(int port) {
   return config;
 }
 
-std::int32_t int32_of(const ModbusMachine& machine, int address) {
-  const std::uint32_t high = machine.holding(address);
-  return static_cast<std::int32_t>((high << 16) | machine.holding(address + 1));
-}
-
 }  // namespace
 
 TEST_CASE("offsets are written to the controller's registers with sign and scale",

@@ -174,4 +174,10 @@ class ModbusMachine {
   std::thread thread_;
 };
 
+/// Two holding registers, the high one first.
+[[nodiscard]] inline std::int32_t int32_of(const ModbusMachine& machine, int address) {
+  const std::uint32_t high = machine.holding(address);
+  return static_cast<std::int32_t>((high << 16) | machine.holding(address + 1));
+}
+
 }  // namespace thermocomp::test

@@ -34,7 +34,7 @@ CanSignal number_at(std::uint32_t id, int start_bit, int length_bits = 8) {
 }
 
 /// K0 in 0x210, slope and P0 in 0x211; the number at different positions.
-CanTravel line() {
+CanTravel frames_of_line() {
   CanTravel travel;
   travel.nodes_mm = {-100.0, 700.0};
   travel.p0_mm = 200.0;
@@ -112,7 +112,7 @@ CanControllerConfig config_of(const CanTravel& travel) {
 
 TEST_CASE("each frame of a set carries its number with its values", "[controllers][travel]") {
   const std::vector<double> offset_um{-4.0, 12.0};  // 20 um/m, 2 um at P0
-  const auto frames = frames_of(line(), 0xA7, offset_um);
+  const auto frames = frames_of(frames_of_line(), 0xA7, offset_um);
   REQUIRE(frames.size() == 2);
   const auto bytes = [&](std::size_t frame) {
     const auto payload = frames[frame].payload();
@@ -124,8 +124,8 @@ TEST_CASE("each frame of a set carries its number with its values", "[controller
 
 TEST_CASE("a number wraps to 0", "[controllers][travel]") {
   const std::vector<double> offset_um{1.0, 2.0};
-  CHECK(set_numbers(line().sent) == 256);
-  CHECK(frames_of(line(), 256 + 3, offset_um)[0].data[3] == 3);
+  CHECK(set_numbers(frames_of_line().sent) == 256);
+  CHECK(frames_of(frames_of_line(), 256 + 3, offset_um)[0].data[3] == 3);
 }
 
 TEST_CASE("other bits in a frame of a set are unchanged", "[controllers][travel]") {
@@ -133,7 +133,7 @@ TEST_CASE("other bits in a frame of a set are unchanged", "[controllers][travel]
   frame.id = {0x210, false};
   frame.size = 8;
   frame.data.fill(0xFF);
-  put_set(line().sent, std::vector<double>{0.0, 0.0, 200.0}, 0, frame);
+  put_set(frames_of_line().sent, std::vector<double>{0.0, 0.0, 200.0}, 0, frame);
   CHECK(frame.data[3] == 0);
   CHECK(frame.data[4] == 0xFF);
   CHECK(frame.data[7] == 0xFF);
@@ -235,7 +235,7 @@ TEST_CASE("a link that loses, repeats and breaks off frames never gives a mixtur
   const auto seed = GENERATE(range(0u, 100u));
   CAPTURE(seed);
   std::mt19937 engine(seed);
-  const CanTravel travel = seed % 4 == 0 ? line() : table(seed % 4);
+  const CanTravel travel = seed % 4 == 0 ? frames_of_line() : table(seed % 4);
   const double period_s = 0.01;
   CanSetReader reader(travel.sent);
   std::vector<std::vector<double>> sets;
@@ -297,8 +297,8 @@ TEST_CASE("a number that has wrapped around completes no set with an expired fra
 }
 
 TEST_CASE("a node moves by one count of each value that it depends on", "[controllers][travel]") {
-  CHECK(resolution_um(line(), line().sent, 1) == Approx(0.001 + 0.0005));
-  CHECK(resolution_um(line(), table(2).applied, 1) == 0.0);  // not read back
+  CHECK(resolution_um(frames_of_line(), frames_of_line().sent, 1) == Approx(0.001 + 0.0005));
+  CHECK(resolution_um(frames_of_line(), table(2).applied, 1) == 0.0);  // not read back
   CHECK(resolution_um(table(2), table(2).sent, 4) == Approx(0.01));
   CanTravel floats = table(3);
   for (CanSignal& value : floats.sent.values) {
@@ -309,36 +309,41 @@ TEST_CASE("a node moves by one count of each value that it depends on", "[contro
 }
 
 TEST_CASE("impossible sets of frames are refused", "[controllers][travel]") {
-  CHECK_NOTHROW(CanController(config_of(line())));
+  CHECK_NOTHROW(CanController(config_of(frames_of_line())));
   CHECK_NOTHROW(CanController(config_of(table(3))));
   const auto refused = [](const char* rule, CanTravel travel, auto change) {
     INFO(rule);
     change(travel);
     CHECK_THROWS_WITH(CanController(config_of(travel)), Catch::Contains(rule));
   };
-  refused("each frame with a value must have the number", line(),
+  refused("each frame with a value must have the number", frames_of_line(),
           [](auto& bad) { bad.sent.numbers.pop_back(); });
-  refused("must be one in each frame", line(), [](auto& bad) { bad.sent.numbers.clear(); });
-  refused("must be in a frame with a value", line(),
+  refused("must be one in each frame", frames_of_line(),
+          [](auto& bad) { bad.sent.numbers.clear(); });
+  refused("must be in a frame with a value", frames_of_line(),
           [](auto& bad) { bad.sent.numbers.push_back(number_at(0x212, 0)); });
-  refused("a frame must have one number", line(),
+  refused("a frame must have one number", frames_of_line(),
           [](auto& bad) { bad.sent.numbers.push_back(number_at(0x211, 40)); });
-  refused("the same length", line(), [](auto& bad) { bad.sent.numbers[1].length_bits = 7; });
-  refused("8 to 32 bits", line(), [](auto& bad) {
+  refused("the same length", frames_of_line(),
+          [](auto& bad) { bad.sent.numbers[1].length_bits = 7; });
+  refused("8 to 32 bits", frames_of_line(), [](auto& bad) {
     for (CanSet* set : {&bad.sent, &bad.applied})
       for (CanSignal& number : set->numbers) number.length_bits = 7;
   });
-  refused("the same length", line(), [](auto& bad) { bad.applied.numbers[0].length_bits = 16; });
-  refused("without scale", line(), [](auto& bad) { bad.sent.numbers[0].scale = 2.0; });
-  refused("must not overlap", line(), [](auto& bad) { bad.sent.numbers[0].start_bit = 20; });
-  refused("must not overlap", line(), [](auto& bad) { bad.applied.numbers[0].start_bit = 40; });
-  refused("cannot be one the controller sends", line(), [](auto& bad) {
+  refused("the same length", frames_of_line(),
+          [](auto& bad) { bad.applied.numbers[0].length_bits = 16; });
+  refused("without scale", frames_of_line(), [](auto& bad) { bad.sent.numbers[0].scale = 2.0; });
+  refused("must not overlap", frames_of_line(),
+          [](auto& bad) { bad.sent.numbers[0].start_bit = 20; });
+  refused("must not overlap", frames_of_line(),
+          [](auto& bad) { bad.applied.numbers[0].start_bit = 40; });
+  refused("cannot be one the controller sends", frames_of_line(), [](auto& bad) {
     for (CanSignal& value : bad.applied.values) value.id = 0x211;
     bad.applied.numbers[0].id = 0x211;
   });
   refused("what the set is made of", table(2), [](auto& bad) { bad.sent.values.pop_back(); });
   refused("must increase", table(2), [](auto& bad) { bad.nodes_mm[1] = 400.0; });
-  CanControllerConfig config = config_of(line());
+  CanControllerConfig config = config_of(frames_of_line());
   config.silent_after_s = 30.0;
   CHECK_THROWS_WITH(CanController(config), Catch::Contains("set numbers repeat"));
   config = config_of(table(3));

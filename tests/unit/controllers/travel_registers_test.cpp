@@ -119,11 +119,6 @@ ModbusControllerConfig config_of(int port, const ModbusTravel& travel) {
   return config;
 }
 
-std::int32_t int32_of(const ModbusMachine& machine, int address) {
-  const std::uint32_t high = machine.holding(address);
-  return static_cast<std::int32_t>((high << 16) | machine.holding(address + 1));
-}
-
 }  // namespace
 
 TEST_CASE("a line is K0 at P0 and its slope", "[controllers][travel]") {

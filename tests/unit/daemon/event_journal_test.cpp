@@ -10,7 +10,7 @@ namespace {
 
 const Subject bed{SubjectKind::sensor, "bed"};
 
-struct Bench {
+struct Journal {
   std::chrono::nanoseconds monotonic{1000s};
   std::chrono::nanoseconds wall{1'700'000'000s};
   EventJournal journal{[this] { return EventJournal::Moment{monotonic, wall}; }};
@@ -23,7 +23,7 @@ struct Bench {
 }  // namespace
 
 TEST_CASE("an outage has a fault, a recovery and a duration", "[daemon][events]") {
-  Bench bench;
+  Journal bench;
   bench.journal.fault({.subject = bed, .code = "no_answer"});
   bench.pass(2s);
   bench.journal.fault({.subject = bed, .code = "no_answer"});  // repeated
@@ -45,7 +45,7 @@ TEST_CASE("an outage has a fault, a recovery and a duration", "[daemon][events]"
 }
 
 TEST_CASE("an intermittent fault is one outage of four events", "[daemon][events]") {
-  Bench bench;
+  Journal bench;
   int message = 0;
   for (int i = 0; i < 1200; ++i) {  // 4 Hz for five minutes
     message +=
@@ -78,7 +78,7 @@ TEST_CASE("an intermittent fault is one outage of four events", "[daemon][events
 }
 
 TEST_CASE("each kind of fault is reported once per outage", "[daemon][events]") {
-  Bench bench;
+  Journal bench;
   for (int i = 0; i < 1000; ++i) {
     bench.journal.fault({.subject = bed, .code = i % 2 == 0 ? "no_answer" : "stale"});
     bench.journal.fault({.subject = {SubjectKind::bus, "a"}, .code = std::to_string(i)});
@@ -89,7 +89,7 @@ TEST_CASE("each kind of fault is reported once per outage", "[daemon][events]") 
 }
 
 TEST_CASE("setting the clock does not change durations", "[daemon][events]") {
-  Bench bench;
+  Journal bench;
   bench.journal.mode("compensating");
   bench.pass(60s);
   bench.wall -= 24h;
@@ -104,7 +104,7 @@ TEST_CASE("setting the clock does not change durations", "[daemon][events]") {
 }
 
 TEST_CASE("recently ended outages are reported, newest first", "[daemon][events]") {
-  Bench bench;
+  Journal bench;
   for (const char* name : {"a", "b", "c"}) {
     const Subject subject{SubjectKind::bus, name};
     bench.journal.fault({.subject = subject, .code = "not_connected", .detail = "refused"});
@@ -122,7 +122,7 @@ TEST_CASE("recently ended outages are reported, newest first", "[daemon][events]
 }
 
 TEST_CASE("the journal is bounded", "[daemon][events]") {
-  Bench bench;
+  Journal bench;
   for (std::size_t i = 0; i < EventJournal::kept_max + 10; ++i)
     bench.journal.command({.code = std::to_string(i)});
   CHECK(bench.journal.events().size() == EventJournal::kept_max);

@@ -13,9 +13,9 @@ using namespace thermocomp::diagnosis;
 
 namespace {
 
-constexpr int rows = 900;
+constexpr int rows_of_a_run = 900;
 
-ThermalModel one_input() {
+ThermalModel one_sensor() {
   ThermalModel model;
   model.inputs = {"t1_degC"};
   model.outputs = {"z_um"};
@@ -38,7 +38,7 @@ RunFile machine(unsigned seed, double lags_um, double noise_um) {
   double slow_K = 0.0;
   double warm = 0.0;
   double rpm = 0.0;
-  for (int row = 0; row < rows; ++row) {
+  for (int row = 0; row < rows_of_a_run; ++row) {
     if (row % 45 == 20) rpm = 1500.0 * speed(random);
     rise_K += (rpm / 500.0 - rise_K) / 40.0;
     quick_K += (rise_K - quick_K) / 8.0;
@@ -60,7 +60,7 @@ MeasuredData data_of(const ThermalModel& model, const RunFile& run) {
 }
 
 std::optional<RemainderBank> bank_of(const RunFile& run) {
-  const MeasuredData data = data_of(one_input(), run);
+  const MeasuredData data = data_of(one_sensor(), run);
   std::vector<double> predictable;
   return remainder_bank(data, residuals(data), {false}, predictable);
 }
@@ -76,16 +76,16 @@ TEST_CASE("a bank of several lags predicts another run", "[diagnosis]") {
   REQUIRE(bank);
   const LeftOutRms gain = bank->left_out.at("z_um");
   CHECK(gain.after_um < 0.3 * gain.before_um);
-  ThermalModel longer = one_input();
+  ThermalModel longer = one_sensor();
   longer.terms.push_back(bank->term);
   const RunFile other = machine(2, 3.0, 0.1);
-  CHECK(left_um(longer, other) < 0.3 * left_um(one_input(), other));
+  CHECK(left_um(longer, other) < 0.3 * left_um(one_sensor(), other));
 }
 
 TEST_CASE("a bank survives writing and reading of the model file", "[diagnosis]") {
   const auto bank = bank_of(machine(1, 3.0, 0.1));
   REQUIRE(bank);
-  ThermalModel longer = one_input();
+  ThermalModel longer = one_sensor();
   longer.terms.push_back(bank->term);
   const ThermalModel read = parse_model(write_model(longer), "model.toml");
   const RunFile other = machine(2, 3.0, 0.1);
@@ -105,17 +105,17 @@ TEST_CASE("a displacement probed every half hour is enough for a bank", "[diagno
     if (row % 30 != 0) run.values[3][row] = std::nan("");
   const auto bank = bank_of(run);
   REQUIRE(bank);
-  ThermalModel longer = one_input();
+  ThermalModel longer = one_sensor();
   longer.terms.push_back(bank->term);
   const RunFile other = machine(2, 3.0, 0.1);
-  CHECK(left_um(longer, other) < 0.7 * left_um(one_input(), other));
+  CHECK(left_um(longer, other) < 0.7 * left_um(one_sensor(), other));
 }
 
 TEST_CASE("a matrix fitted to the rows is fitted again in cross-validation", "[diagnosis]") {
   // Two speeds of one reading: what a static fit leaves of its own rows is little, and less of it
   // can be predicted than of what it leaves of others.
   const RunFile run = machine(1, 3.0, 0.1);
-  const MeasuredData probe = data_of(one_input(), run);
+  const MeasuredData probe = data_of(one_sensor(), run);
   double square = 0.0;
   double product = 0.0;
   for (std::size_t row = 0; row < run.rows(); ++row) {
@@ -123,7 +123,7 @@ TEST_CASE("a matrix fitted to the rows is fitted again in cross-validation", "[d
     square += rise_K * rise_K;
     product += rise_K * (run.values[3][row] - run.values[3][0]);
   }
-  ThermalModel fitted = one_input();
+  ThermalModel fitted = one_sensor();
   fitted.matrix_um_per_K = {{product / square}};
   const MeasuredData data = data_of(fitted, run);
   std::vector<double> predictable;

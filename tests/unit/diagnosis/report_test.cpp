@@ -16,12 +16,12 @@ using namespace thermocomp::diagnosis;
 
 namespace {
 
-constexpr Eigen::Index rows = 120;
+constexpr Eigen::Index rows_shown = 120;
 const std::string rude = "run <b>&\"1\".csv";
 
 Column wave(double size, double turn) {
-  Column values(rows);
-  for (Eigen::Index i = 0; i < rows; ++i)
+  Column values(rows_shown);
+  for (Eigen::Index i = 0; i < rows_shown; ++i)
     values[i] = size * std::sin(turn * static_cast<double>(i));
   return values;
 }
@@ -30,8 +30,8 @@ ReportData one_run() {
   ReportData data{{"z_um"}, {"spindle_rpm"}, {"t1_degC"}, {}};
   ReportRun run{rude,
                 true,
-                Column::LinSpaced(rows, 0.0, 60.0 * (rows - 1)),
-                std::vector<Phase>(rows, Phase::heating),
+                Column::LinSpaced(rows_shown, 0.0, 60.0 * (rows_shown - 1)),
+                std::vector<Phase>(rows_shown, Phase::heating),
                 {wave(20.0, 0.02)},
                 {wave(5.0, 0.1)},
                 {wave(1.0, 0.3)},
@@ -243,7 +243,7 @@ TEST_CASE("a test run that the model was fitted to is not called unseen", "[diag
   for (const char* name : {"friday.csv", "monday.csv", "friday.csv@3600:", "friday.csv@3000:"}) {
     MeasuredRun run;
     run.name = name;
-    run.time_s = Column::LinSpaced(rows, 0.0, 60.0 * (rows - 1));
+    run.time_s = Column::LinSpaced(rows_shown, 0.0, 60.0 * (rows_shown - 1));
     run.measured_um = {wave(20.0, 0.02)};
     measured.runs.push_back(run);
   }

@@ -27,7 +27,7 @@ ModeInput working(int second) {
   return input;
 }
 
-ModeInput lost(int second) {
+ModeInput lost_for(int second) {
   ModeInput input = working(second);
   input.displacement_known = false;
   return input;
@@ -52,7 +52,8 @@ TEST_CASE("it compensates once displacement and controller are known and the off
 
 TEST_CASE("before the first data the mode is starting, for any time, and never holding", "[mode]") {
   ModeDecision decision(config());
-  for (int second = 0; second < 100; ++second) CHECK(decision.step(lost(second)) == Mode::starting);
+  for (int second = 0; second < 100; ++second)
+    CHECK(decision.step(lost_for(second)) == Mode::starting);
 }
 
 TEST_CASE("after hold_s without data it ramps to zero if so configured, and returns", "[mode]") {
@@ -60,22 +61,22 @@ TEST_CASE("after hold_s without data it ramps to zero if so configured, and retu
   ModeDecision ramps(config(LossPolicy::ramp_to_zero));
   for (ModeDecision* decision : {&holds, &ramps}) {
     CHECK(decision->step(working(0)) == Mode::compensating);
-    CHECK(decision->step(lost(1)) == Mode::holding);
-    CHECK(decision->step(lost(10)) == Mode::holding);  // exactly hold_s
+    CHECK(decision->step(lost_for(1)) == Mode::holding);
+    CHECK(decision->step(lost_for(10)) == Mode::holding);  // exactly hold_s
   }
-  CHECK(holds.step(lost(11)) == Mode::holding);
-  CHECK(ramps.step(lost(11)) == Mode::ramping_to_zero);
+  CHECK(holds.step(lost_for(11)) == Mode::holding);
+  CHECK(ramps.step(lost_for(11)) == Mode::ramping_to_zero);
   CHECK(ramps.step(working(12)) == Mode::compensating);
-  CHECK(ramps.step(lost(22)) == Mode::holding);  // counted anew
+  CHECK(ramps.step(lost_for(22)) == Mode::holding);  // counted anew
 }
 
 TEST_CASE("without any data so far, the loss counts from the first step", "[mode]") {
   ModeDecision decision(config(LossPolicy::ramp_to_zero));
-  ModeInput late = lost(1000);
+  ModeInput late = lost_for(1000);
   late.time.first = true;
   CHECK(decision.step(late) == Mode::starting);
-  CHECK(decision.step(lost(1010)) == Mode::starting);
-  CHECK(decision.step(lost(1011)) == Mode::ramping_to_zero);
+  CHECK(decision.step(lost_for(1010)) == Mode::starting);
+  CHECK(decision.step(lost_for(1011)) == Mode::ramping_to_zero);
 }
 
 TEST_CASE("either switch disables, in any state", "[mode]") {
@@ -83,7 +84,7 @@ TEST_CASE("either switch disables, in any state", "[mode]") {
   CHECK(decision.step(working(0)) == Mode::compensating);
   decision.enable(false);
   CHECK(decision.step(working(1)) == Mode::disabled);
-  CHECK(decision.step(lost(100)) == Mode::disabled);
+  CHECK(decision.step(lost_for(100)) == Mode::disabled);
   decision.stop();
   CHECK(decision.step(working(101)) == Mode::disabled);
   decision.enable(true);
@@ -98,7 +99,7 @@ TEST_CASE("a stop ramps to zero with and without good data, and keeps the switch
   CHECK(decision.step(working(0)) == Mode::compensating);
   decision.stop();
   CHECK(decision.step(working(1)) == Mode::ramping_to_zero);
-  CHECK(decision.step(lost(2)) == Mode::ramping_to_zero);
+  CHECK(decision.step(lost_for(2)) == Mode::ramping_to_zero);
   CHECK(decision.state().enabled);
 }
 
@@ -107,18 +108,18 @@ TEST_CASE("mode_since is the time of the last change", "[mode]") {
   (void)decision.step(working(5));
   (void)decision.step(working(6));
   CHECK(decision.state().mode_since == 5s);
-  (void)decision.step(lost(7));
-  (void)decision.step(lost(8));
+  (void)decision.step(lost_for(7));
+  (void)decision.step(lost_for(8));
   CHECK(decision.state().mode_since == 7s);
 }
 
 TEST_CASE("a reload continues in the same mode, with the time already lost", "[mode]") {
   ModeDecision before(config(LossPolicy::ramp_to_zero));
   (void)before.step(working(0));
-  (void)before.step(lost(9));
+  (void)before.step(lost_for(9));
   ModeDecision after(config(LossPolicy::ramp_to_zero));
   after.adopt(before);
   CHECK(after.state().mode == Mode::holding);
   CHECK(after.state().mode_since == 9s);
-  CHECK(after.step(lost(11)) == Mode::ramping_to_zero);
+  CHECK(after.step(lost_for(11)) == Mode::ramping_to_zero);
 }

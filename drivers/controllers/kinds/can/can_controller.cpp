@@ -6,15 +6,12 @@
 #include <set>
 
 #include "drivers/bus_thread.hpp"
+#include "drivers/can/signal_codec.hpp"
 #include "drivers/controllers/travel_values.hpp"
 #include "estimator/checks.hpp"
 
 namespace thermocomp {
 namespace {
-
-CanId id_of(const CanSignal& signal) {
-  return {signal.id, signal.extended_id};
-}
 
 std::vector<const CanSignal*> signals_of(const CanSet& set) {
   std::vector<const CanSignal*> signals;

@@ -10,10 +10,6 @@
 namespace thermocomp {
 namespace {
 
-CanId id_of(const CanSignal& signal) {
-  return {signal.id, signal.extended_id};
-}
-
 void check_numbers(const CanSet& set, int length_bits) {
   std::map<CanId, int> numbers;
   for (const CanSignal& number : set.numbers) {

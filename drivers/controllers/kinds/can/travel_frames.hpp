@@ -11,6 +11,10 @@
 
 namespace thermocomp {
 
+[[nodiscard]] inline CanId id_of(const CanSignal& signal) noexcept {
+  return {signal.id, signal.extended_id};
+}
+
 /// Checks nodes, values and numbers, but no overlaps with other signals.
 /// @throws InvalidValue for impossible nodes or signals
 void check_travel(const CanTravel& travel);
