@@ -119,9 +119,10 @@ thermocomp_precompiled(thermocomp_precompiled_runs_once
   HEADERS ${THERMOCOMP_STD_HEADERS} OPTIONS ${THERMOCOMP_RUNS_ONCE})
 
 # Eight files of a target are compiled as one: two fifths of the time of compiling. So a name of an
-# anonymous namespace occurs once in a target, and the preset debug reads each file by itself.
-option(THERMOCOMP_TOGETHER "Compile the files of a target together" OFF)
-if(THERMOCOMP_TOGETHER)
+# anonymous namespace occurs once in a target. The preset debug, the sanitizers and clang-tidy read each
+# file by itself.
+option(THERMOCOMP_TOGETHER "Release: compile the files of a target together" ON)
+if(THERMOCOMP_TOGETHER AND CMAKE_BUILD_TYPE STREQUAL "Release")
   set(CMAKE_UNITY_BUILD ON)
   set(CMAKE_UNITY_BUILD_BATCH_SIZE 8)
   # GCC takes the members of a file's own types for those of a header.

@@ -2,6 +2,7 @@
 import json
 import os
 import pathlib
+import re
 import shlex
 import subprocess
 
@@ -16,7 +17,13 @@ COMMANDS = BUILD / "compile_commands.json"
 def commands():
     if not COMMANDS.exists():
         pytest.skip("this build tells no compile commands")
-    return {each["file"]: each for each in json.loads(COMMANDS.read_text(encoding="utf-8"))}
+    found = {}
+    for each in json.loads(COMMANDS.read_text(encoding="utf-8")):
+        found[each["file"]] = each
+        if "/Unity/" in each["file"]:  # several files of a target, compiled as one
+            together = pathlib.Path(each["file"]).read_text(encoding="utf-8")
+            found.update({file: each for file in re.findall(r'#include "(.*\.cpp)"', together)})
+    return found
 
 
 def compile_beside(commands, file, header, folder):
