@@ -31,15 +31,13 @@ namespace {
 bool add_finding(Extended& model, const Finding& finding, const MeasuredData& train) {
   const std::vector<TermSpec> terms = terms_of(finding, train);
   model.model.terms.insert(model.model.terms.end(), terms.begin(), terms.end());
-  const Cause& cause = cause_named(finding.explanation.hypothesis->cause);
-  bool corrects = false;
-  for (std::size_t output = 0; output < train.model.outputs.size(); ++output) {
-    if (cause.correction == nullptr || finding.explanation.gains[output].size() == 0) continue;
-    model.corrections.push_back(cause.correction(parameters_of(finding, train)));
-    model.corrections.back().output = output;
-    corrects = true;
-  }
-  return corrects || !terms.empty();
+  const Hypothesis& hypothesis = *finding.explanation.hypothesis;
+  const Cause& cause = cause_named(hypothesis.cause);
+  if (cause.correction == nullptr) return !terms.empty();
+  model.corrections.push_back(cause.correction(parameters_of(finding, train), hypothesis.subject));
+  for (const Eigen::VectorXd& gains : finding.explanation.gains)
+    model.corrections.back().affects.push_back(gains.size() > 0);
+  return true;
 }
 
 std::map<std::string, TestGain> gains_on_test(const Extended& before, const Extended& after,

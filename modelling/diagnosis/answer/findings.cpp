@@ -7,8 +7,6 @@
 #include <random>
 #include <utility>
 
-#include <Eigen/Cholesky>
-
 #include "modelling/diagnosis/causes/cause.hpp"
 #include "modelling/identification/families/bank_fit.hpp"
 
@@ -127,19 +125,6 @@ namespace {
 
 constexpr int resamples = 400;
 constexpr int test_blocks = 16;
-constexpr double turn = 6.283185307179586;
-
-/// Sine of known period and amplitude, fitted to the residual: only phase and level are free.
-Column sine_in(const Column& time_s, const Column& residual, const Correction& correction) {
-  const Eigen::ArrayXd angle = turn / correction.period_s * time_s.array();
-  Eigen::MatrixXd waves(time_s.size(), 3);
-  waves << angle.sin(), angle.cos(), Eigen::ArrayXd::Ones(time_s.size());
-  const Eigen::ArrayXd there = residual.array().isFinite().cast<double>();
-  const Column values = residual.array().isFinite().select(residual.array(), 0.0);
-  waves.array().colwise() *= there;
-  const Eigen::Vector3d of = (waves.transpose() * waves).ldlt().solve(waves.transpose() * values);
-  return correction.amplitude_um * (angle + std::atan2(of[1], of[0])).sin();
-}
 
 /// Sums of squares before and after, by blocks of rows.
 std::vector<Eigen::Array2d> squares_by_block(const Residuals& before, const Residuals& after) {
@@ -179,20 +164,18 @@ std::vector<Residuals> residuals(const MeasuredData& data) {
 
 std::vector<Residuals> residuals(const Extended& extended, const MeasuredData& data) {
   std::vector<Residuals> all(data.model.outputs.size());
-  for (const MeasuredRun& run : data.runs) {
+  for (MeasuredRun run : data.runs) {
+    for (const Correction& correction : extended.corrections)
+      if (correction.readings) correction.readings(data, run);
     std::vector<Column> predictions = model_over(extended.model, run, data);
     for (std::size_t output = 0; output < all.size(); ++output) {
       Column& predicted = predictions[output];
       const Column& measured = run.measured_um[output];
       Eigen::Index start = 0;
       while (start < run.rows() && !std::isfinite(measured[start])) ++start;
-      for (const Correction& correction : extended.corrections) {
-        if (correction.output != output) continue;
-        if (correction.period_s > 0)
-          predicted += sine_in(run.time_s, measured - predicted, correction);
-        else
-          predicted = shifted(run.time_s, predicted, correction.shift_s);
-      }
+      for (const Correction& correction : extended.corrections)
+        if (correction.prediction && correction.affects[output])
+          correction.prediction(run, output, predicted);
       if (start < run.rows()) predicted.array() -= double(predicted[start]);
       all[output].emplace_back((measured - predicted).tail(run.rows() - run.begin));
     }

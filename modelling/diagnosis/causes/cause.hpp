@@ -243,13 +243,14 @@ enum class Experiment {
   other_duty,      ///< anything else
 };
 
-/// Correction of one output for a cause without a term in the model file: a shift in time, or a
-/// sine of known period and amplitude, whose phase is fitted in each run.
+/// Effect of a finding whose cause has no term in the model file; each function may be empty.
 struct Correction {
-  std::size_t output{0};
-  double shift_s{0.0};
-  double period_s{0.0};
-  double amplitude_um{0.0};
+  /// Changes the readings of a run before the model is evaluated.
+  std::function<void(const MeasuredData& data, MeasuredRun& run)> readings{};
+  /// Changes the prediction of an affected output over all rows of the run.
+  std::function<void(const MeasuredRun& run, std::size_t output, Column& predicted_um)>
+      prediction{};
+  std::vector<bool> affects{};  ///< per output; set from the finding
 };
 
 struct Cause {
@@ -268,8 +269,9 @@ struct Cause {
   std::vector<Hypothesis> (*hypotheses)(const Material& material, const Subject& subject){nullptr};
   /// Converts its gains to parameters; null: one per gain.
   std::vector<Parameter> (*gains)(const FoundGains& found){nullptr};
-  /// Correction from its parameters, for a cause of all runs without a term. Null: none.
-  Correction (*correction)(const std::vector<Parameter>& parameters){nullptr};
+  /// Correction from a finding, for a cause of all runs without a term. Null: none.
+  Correction (*correction)(const std::vector<Parameter>& parameters,
+                           const std::string& subject){nullptr};
 
   /// Hypotheses of its effect on the temperatures of a thermal network. Null: not in the thermal
   /// layer.

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <numbers>
 
+#include <Eigen/Cholesky>
+
 #include "modelling/diagnosis/causes/cause.hpp"
 #include "modelling/diagnosis/data/measured_runs.hpp"
 
@@ -46,8 +48,11 @@ Cause time_shift() {
       "Set the clocks of both recorders, or correct the time column before anything is fitted."};
   cause.experiment = Experiment::up_and_down;
   cause.hypotheses = time_shift_hypotheses;
-  cause.correction = [](const std::vector<Parameter>& parameters) {
-    return Correction{0, shared_value(parameters, "shift_s"), 0.0, 0.0};
+  cause.correction = [](const std::vector<Parameter>& parameters, const std::string&) {
+    return Correction{.prediction = [shift_s = shared_value(parameters, "shift_s")](
+                                        const MeasuredRun& run, std::size_t, Column& predicted_um) {
+      predicted_um = shifted(run.time_s, predicted_um, shift_s);
+    }};
   };
   return cause;
 }
@@ -107,6 +112,20 @@ std::vector<Parameter> amplitude(const FoundGains& found) {
   return {{"amplitude_um", {{"", 2.0 * sum / static_cast<double>(waves.size())}}, {}}};
 }
 
+/// Sine of known period and amplitude, fitted to the residual: only phase and level are free.
+Column sine_in(const Column& time_s, const Column& residual,
+               const std::vector<Parameter>& parameters) {
+  const Eigen::ArrayXd angle =
+      2.0 * std::numbers::pi / shared_value(parameters, "period_s") * time_s.array();
+  Eigen::MatrixXd waves(time_s.size(), 3);
+  waves << angle.sin(), angle.cos(), Eigen::ArrayXd::Ones(time_s.size());
+  const Eigen::ArrayXd there = residual.array().isFinite().cast<double>();
+  const Column values = residual.array().isFinite().select(residual.array(), 0.0);
+  waves.array().colwise() *= there;
+  const Eigen::Vector3d of = (waves.transpose() * waves).ldlt().solve(waves.transpose() * values);
+  return shared_value(parameters, "amplitude_um") * (angle + std::atan2(of[1], of[0])).sin();
+}
+
 /// A sine unrelated to any input, its phase another one in every run: a cooler's or a room's cycle.
 Cause periodic_disturbance() {
   Cause cause{"periodic_disturbance", "datum"};
@@ -118,9 +137,11 @@ Cause periodic_disturbance() {
                  "ventilation."};
   cause.hypotheses = periodic_disturbance_hypotheses;
   cause.gains = amplitude;
-  cause.correction = [](const std::vector<Parameter>& parameters) {
-    return Correction{0, 0.0, shared_value(parameters, "period_s"),
-                      shared_value(parameters, "amplitude_um")};
+  cause.correction = [](const std::vector<Parameter>& parameters, const std::string&) {
+    return Correction{.prediction = [parameters](const MeasuredRun& run, std::size_t output,
+                                                 Column& predicted_um) {
+      predicted_um += sine_in(run.time_s, run.measured_um[output] - predicted_um, parameters);
+    }};
   };
   return cause;
 }
