@@ -69,15 +69,14 @@ class Limiter {
   void start_from(double offset_um) noexcept { offset_um_ = offset_um; }
 
   [[nodiscard]] double offset_um() const noexcept { return offset_um_; }
-  [[nodiscard]] double bound_um() const noexcept { return bound_um_; }
-  [[nodiscard]] double rate_um_per_s() const noexcept { return rate_um_per_s_; }
+  [[nodiscard]] double bound_um() const noexcept { return config_.offset_um_max; }
+  [[nodiscard]] double rate_um_per_s() const noexcept { return config_.rate_um_per_s_max; }
   /// True if the last target was outside the bound.
   [[nodiscard]] bool at_bound() const noexcept { return at_bound_; }
   void visit_state(StateArchive& archive) { archive(offset_um_, at_bound_); }
 
  private:
-  double bound_um_;
-  double rate_um_per_s_;
+  const LimiterConfig config_;
   double offset_um_{0.0};
   bool at_bound_{false};
 };
