@@ -12,7 +12,7 @@ import cases  # first: sets the number of threads
 import hidden_heat as hidden
 
 LEVEL = 2
-WRONG_MAX = 1  # of 9
+WRONG_MAX = 1
 NULLS = 3
 FEW = ("wrong_heat_source", "wrong_conductance")
 
