@@ -13,7 +13,7 @@ import cases  # first: sets the number of threads
 import hidden_effects as hidden
 
 LEVEL = 2
-WRONG_MAX = 3
+WRONG_MAX = 1
 NULLS = 6
 # A heat of 51 min; the model's misfit makes one of 2 min more likely, which explains nothing.
 QUICK_PEAK = 1, 120003, "missing_heat_source"
