@@ -71,6 +71,10 @@ FileLock::FileLock(const std::filesystem::path& file) : path_(lock_path(file)) {
     // NOFOLLOW: in a folder that others can write to, a link must not point us to a file of ours.
     // 0600: a user who can read the file could lock it and keep its owner out.
     fd_ = open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0600);
+    if (fd_ < 0 && errno == ENOENT)
+      throw LockImpossible(
+          path_.parent_path().string() +
+          ": there is no such folder: make it, or name another in the configuration");
     if (fd_ < 0) throw LockImpossible(path_.string() + ": " + std::strerror(errno));
     if (flock(fd_, LOCK_EX | LOCK_NB) != 0) {
       const int reason = errno;
