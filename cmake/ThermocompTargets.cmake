@@ -118,7 +118,7 @@ endif()
 thermocomp_precompiled(thermocomp_precompiled_runs_once
   HEADERS ${THERMOCOMP_STD_HEADERS} OPTIONS ${THERMOCOMP_RUNS_ONCE})
 
-# Eight files of a target are compiled as one: two fifths of the time of compiling. So a name of an
+# Eight files of a target are compiled as one: three tenths of the time of compiling. So a name of an
 # anonymous namespace occurs once in a target. The preset debug, the sanitizers and clang-tidy read each
 # file by itself.
 option(THERMOCOMP_TOGETHER "Release: compile the files of a target together" ON)
