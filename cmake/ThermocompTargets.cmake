@@ -119,10 +119,9 @@ thermocomp_precompiled(thermocomp_precompiled_runs_once
   HEADERS ${THERMOCOMP_STD_HEADERS} OPTIONS ${THERMOCOMP_RUNS_ONCE})
 
 # Eight files of a target are compiled as one: three tenths of the time of compiling. So a name of an
-# anonymous namespace occurs once in a target. The preset debug, the sanitizers and clang-tidy read each
-# file by itself.
-option(THERMOCOMP_TOGETHER "Release: compile the files of a target together" ON)
-if(THERMOCOMP_TOGETHER AND CMAKE_BUILD_TYPE STREQUAL "Release")
+# anonymous namespace occurs once in a target. The preset debug and clang-tidy read each file by itself.
+option(THERMOCOMP_TOGETHER "All but Debug: compile the files of a target together" ON)
+if(THERMOCOMP_TOGETHER AND NOT CMAKE_BUILD_TYPE STREQUAL "Debug" AND NOT THERMOCOMP_FUZZ)
   set(CMAKE_UNITY_BUILD ON)
   set(CMAKE_UNITY_BUILD_BATCH_SIZE 8)
   # GCC takes the members of a file's own types for those of a header.
