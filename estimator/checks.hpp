@@ -2,6 +2,7 @@
 /// bad input (throws with name, value and rule).
 #pragma once
 
+#include <cstdint>
 #include <stdexcept>
 #include <string>
 
@@ -33,11 +34,26 @@ struct NumberKey {
   double min{0.0};
   double max{0.0};
   bool min_excluded{false};
+  std::uint64_t Config::*whole_member{nullptr};  ///< of a whole number, instead of `member`
 
   /// (min, max]
   static constexpr NumberKey above(const char* key, double Config::*member, double min,
                                    double max) {
     return {key, member, min, max, true};
+  }
+  static constexpr NumberKey whole(const char* key, std::uint64_t Config::*member,
+                                   std::uint64_t min, std::uint64_t max) {
+    return {key, nullptr, static_cast<double>(min), static_cast<double>(max), false, member};
+  }
+
+  [[nodiscard]] double of(const Config& config) const {
+    return whole_member != nullptr ? static_cast<double>(config.*whole_member) : config.*member;
+  }
+  void copy(const Config& from, Config& to) const {
+    if (whole_member != nullptr)
+      to.*whole_member = from.*whole_member;
+    else
+      to.*member = from.*member;
   }
 };
 
@@ -48,7 +64,7 @@ void require_in(double value, const char* key, double min, double max, bool min_
 template <class Config>
 void require_numbers(const Config& config) {
   for (const NumberKey<Config>& each : Config::numbers())
-    require_in(config.*each.member, each.key, each.min, each.max, each.min_excluded);
+    require_in(each.of(config), each.key, each.min, each.max, each.min_excluded);
 }
 
 [[noreturn]] void abort_with(const char* expression, const char* file, int line) noexcept;

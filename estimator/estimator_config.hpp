@@ -111,8 +111,8 @@ struct SmoothingConfig {
   SmoothingForm form{SmoothingForm::sliding_line};
   SmoothingHistory history{SmoothingHistory::screened};
   double period_s{60.0};     ///< one value of the sensor per period; 0: every reading
-  std::size_t samples{6};    ///< n, values in a line (3..32)
-  std::size_t blocks{3};     ///< line_of_lines: number of lines extrapolated from (1..6)
+  std::uint64_t samples{6};  ///< n, values in a line
+  std::uint64_t blocks{3};   ///< line_of_lines: number of lines extrapolated from
   double half_width_K{0.3};  ///< w, half the band
   double outage_s{5.0};      ///< a gap longer than this and than two periods restarts the history
 
@@ -121,11 +121,13 @@ struct SmoothingConfig {
     using C = SmoothingConfig;
     return std::array{
         Key{"period_s", &C::period_s, 0, 3600},
+        Key::whole("samples", &C::samples, 3, 32),
+        Key::whole("blocks", &C::blocks, 1, smoothing_blocks_max),
         Key::above("half_width_K", &C::half_width_K, 0, 100),
         Key::above("outage_s", &C::outage_s, 0, 86400),
     };
   }
-  void validate() const;  ///< @throws InvalidValue
+  void validate() const { require_numbers(*this); }  ///< @throws InvalidValue
 };
 
 struct SensorConfig {
@@ -241,6 +243,7 @@ struct CompensationConfig {
     using Key = NumberKey<CompensationConfig>;
     using C = CompensationConfig;
     return std::array{
+        Key::whole("cycles_per_update", &C::cycles_per_update, 1, 1'000'000),
         Key{"cycle_ahead", &C::cycle_ahead, 0, 1},
         Key{"hold_s", &C::hold_s, 0, 1e6},
         Key::above("stop_ramp_s_max", &C::stop_ramp_s_max, 0, 3600),

@@ -53,7 +53,12 @@ template <class Config>
 void read_numbers(const TomlTable& table, const Config& fallback, Config& config) {
   constexpr auto numbers = Config::numbers();
   for (const auto& number : numbers) {
-    config.*number.member = table.number(number.key, Range::any(), fallback.*number.member);
+    if (number.whole_member != nullptr)
+      config.*number.whole_member = table.integer<std::uint64_t>(
+          number.key, static_cast<std::uint64_t>(number.min),
+          static_cast<std::uint64_t>(number.max), fallback.*number.whole_member);
+    else
+      config.*number.member = table.number(number.key, Range::any(), fallback.*number.member);
   }
   for (std::size_t attempt = 0; attempt <= numbers.size(); ++attempt) {
     try {
@@ -67,14 +72,14 @@ void read_numbers(const TomlTable& table, const Config& fallback, Config& config
       }
       bool reset = false;
       for (const auto& number : numbers) {
-        if (number.key != error.key() || config.*number.member == fallback.*number.member) continue;
-        config.*number.member = fallback.*number.member;
+        if (number.key != error.key() || number.of(config) == number.of(fallback)) continue;
+        number.copy(fallback, config);
         reset = true;
       }
       if (!reset) break;  // only a fallback is left: the cause cannot be isolated
     }
   }
-  for (const auto& number : numbers) config.*number.member = fallback.*number.member;
+  for (const auto& number : numbers) number.copy(fallback, config);
 }
 
 }  // namespace thermocomp::sections

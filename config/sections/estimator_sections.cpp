@@ -26,8 +26,6 @@ SmoothingConfig read_smoothing(const TomlTable& table, const SmoothingConfig& fa
   config.history = table.choice<SmoothingHistory>(
       "history", {{"raw", SmoothingHistory::raw}, {"screened", SmoothingHistory::screened}},
       fallback.history);
-  config.samples = table.integer<std::size_t>("samples", 3, 32, fallback.samples);
-  config.blocks = table.integer<std::size_t>("blocks", 1, smoothing_blocks_max, fallback.blocks);
   read_numbers(table, fallback, config);
   return config;
 }
@@ -246,8 +244,6 @@ CompensationConfig read_compensation(const TomlTable& table,
   config.update = table.choice<UpdateRule>(
       "update", {{"continuous", UpdateRule::continuous}, {"each_cycle", UpdateRule::each_cycle}},
       config.update);
-  config.cycles_per_update =
-      table.integer<std::uint64_t>("cycles_per_update", 1, 1'000'000, config.cycles_per_update);
   config.hold_while_cutting = table.flag("hold_while_cutting", config.hold_while_cutting);
   read_numbers(table, CompensationConfig{}, config);
   const auto read_signal = [&](std::string_view key) {
