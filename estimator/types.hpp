@@ -156,8 +156,8 @@ enum class Mode : std::uint8_t {
   starting,  ///< never compensated since the start; offsets stay
   disabled,  ///< by an operator or the controller's switch; offsets at zero or on the way
   compensating,
-  holding,         ///< data lost: offsets stay
-  ramping_to_zero  ///< daemon stopping, or data lost for hold_s and on_loss = ramp_to_zero
+  holding,         ///< inputs or controller lost: offsets stay
+  ramping_to_zero  ///< daemon stopping, or lost for hold_s and on_loss = ramp_to_zero
 };
 [[nodiscard]] std::string_view to_string(Mode mode) noexcept;
 

@@ -19,12 +19,12 @@ struct Entry {
 using enum Severity;
 
 constexpr std::array<Entry<Mode>, 5> mode_table{{
-    {Mode::starting, fault, "starting: waiting for the first good values", ""},
+    {Mode::starting, fault, "starting: nothing compensated yet, offsets stay", ""},
     {Mode::disabled, intended, "switched off: offsets at or on the way to zero", ""},
     {Mode::compensating, normal, "compensating", ""},
-    {Mode::holding, fault, "data lost: offsets held",
+    {Mode::holding, fault, "offsets held",
      "the correction is frozen and the tool may drift from here; do not finish a precise cut"},
-    {Mode::ramping_to_zero, fault, "data lost: offsets on the way to zero",
+    {Mode::ramping_to_zero, fault, "offsets on the way to zero",
      "the correction is being removed; do not finish a precise cut"},
 }};
 constexpr CodeText dry_run_text{"dry_run", "dry run: nothing is written to the controller", "",

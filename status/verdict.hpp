@@ -18,14 +18,14 @@ struct Verdict {
   bool compensating{false};
   bool intended{false};  ///< not compensating on purpose: switched off, dry run
   std::string answer;    ///< "yes", "no", "no: DRY RUN"
-  std::string meaning;   ///< "data lost: offsets held"; may be empty
+  std::string meaning;   ///< "offsets held"; may be empty
   double for_s{not_a_number};
   std::string advice{};  ///< may be empty
 };
 [[nodiscard]] Verdict verdict(const Status& status);
-/// "for 2 h 10 min", "data lost: offsets held, for 3 s: the correction is frozen ..."
+/// "for 2 h 10 min", "offsets held, for 3 s: the correction is frozen ..."
 [[nodiscard]] std::string detail_of(const Verdict& verdict);
-/// Answer and detail in one line: "yes, for 2 h 10 min", "no (data lost: ...)".
+/// Answer and detail in one line: "yes, for 2 h 10 min", "no (offsets held: ...)".
 [[nodiscard]] std::string verdict_text(const Verdict& verdict);
 
 /// Reasons why `thermocomp status` exits with 1, one line each; empty: it exits with 0.
