@@ -28,11 +28,7 @@ constexpr nanoseconds long_ago = nanoseconds::min() / 2;
 }  // namespace
 
 Screening::Screening(const ScreeningConfig& config)
-    : min_degC_(config.temp_degC_min),
-      max_degC_(config.temp_degC_max),
-      rate_K_per_ns_(config.rate_K_per_s_max * 1e-9),
-      allowance_K_(config.rate_allowance_K),
-      outage_K_max_(config.outage_K_max),
+    : config_(config),
       stale_after_(to_nanoseconds(config.stale_after_s)),
       settle_(to_nanoseconds(config.settle_s)),
       stuck_after_(to_nanoseconds(config.stuck_after_s)) {
@@ -65,8 +61,8 @@ bool Screening::take(nanoseconds now, const Reading& reading) noexcept {
 /// without differences, which could overflow.
 bool Screening::is_continuous(nanoseconds now, const Reading& reading) const noexcept {
   return reading.fault == Fault::none && !state_.waiting && state_.good.known &&
-         std::abs(reading.temp_degC - state_.good.temp_degC) <= allowance_K_ &&
-         reading.temp_degC >= min_degC_ && reading.temp_degC <= max_degC_ &&
+         std::abs(reading.temp_degC - state_.good.temp_degC) <= config_.rate_allowance_K &&
+         reading.temp_degC >= config_.temp_degC_min && reading.temp_degC <= config_.temp_degC_max &&
          reading.taken_at > state_.good.at && reading.taken_at <= state_.good.at + stale_after_ &&
          reading.taken_at >= now - stale_after_ && reading.taken_at <= now + stale_after_ &&
          stuck_after_ <= nanoseconds{0};
@@ -75,7 +71,7 @@ bool Screening::is_continuous(nanoseconds now, const Reading& reading) const noe
 Fault Screening::check(nanoseconds now, const Reading& reading) const noexcept {
   if (reading.fault != Fault::none) return reading.fault;
   // Written so that NaN fails.
-  if (!(reading.temp_degC >= min_degC_ && reading.temp_degC <= max_degC_))
+  if (!(reading.temp_degC >= config_.temp_degC_min && reading.temp_degC <= config_.temp_degC_max))
     return Fault::out_of_range;
   // A time far ahead would make every later reading look old.
   if (!(reading.taken_at >= now - stale_after_ && reading.taken_at <= now + stale_after_))
@@ -90,7 +86,8 @@ void Screening::note(const Reading& reading) noexcept {
   const Value before = newest();
   const nanoseconds gap = before.known ? reading.taken_at - before.at : nanoseconds{0};
   const double step_K = std::abs(reading.temp_degC - before.temp_degC);
-  if (!(before.known && gap <= stale_after_ && step_K <= allowance_K_ + change_K(gap))) {
+  if (!(before.known && gap <= stale_after_ &&
+        step_K <= config_.rate_allowance_K + change_K(gap))) {
     state_.run_since = reading.taken_at;
     state_.run_count = 0;
   }
@@ -142,7 +139,7 @@ void Screening::count(bool refutes) noexcept {
 }
 
 void Screening::restore_jump(double from_degC) noexcept {
-  if (!(from_degC >= min_degC_ && from_degC <= max_degC_)) return;
+  if (!(from_degC >= config_.temp_degC_min && from_degC <= config_.temp_degC_max)) return;
   state_.good = {true, from_degC, long_ago};
   state_.waiting = true;
 }
@@ -156,7 +153,8 @@ bool Screening::accept() noexcept {
 
 double Screening::change_K(nanoseconds unread) const noexcept {
   const auto unread_ns = static_cast<double>(unread.count());
-  return std::min(rate_K_per_ns_ * unread_ns, outage_K_max_ + slow_K_per_ns * unread_ns);
+  return std::min(config_.rate_K_per_s_max * 1e-9 * unread_ns,
+                  config_.outage_K_max + slow_K_per_ns * unread_ns);
 }
 
 /// True if the structure can have changed from the last confirmed value to the newest one.
@@ -165,9 +163,9 @@ bool Screening::possible() const noexcept {
   const nanoseconds since_good = state_.newest.at - state_.good.at;
   const nanoseconds late =
       since_good <= stale_after_ ? std::min(since_good, shown_late_max) : nanoseconds{0};
+  const double shown_late_K = config_.rate_K_per_s_max * 1e-9 * static_cast<double>(late.count());
   const double allowed_K =
-      allowance_K_ +
-      std::max(change_K(state_.unread), rate_K_per_ns_ * static_cast<double>(late.count()));
+      config_.rate_allowance_K + std::max(change_K(state_.unread), shown_late_K);
   if (off_K <= allowed_K) return true;
   if (!state_.jumped) return false;
   const auto jumped_ns = static_cast<double>((state_.newest.at - state_.jumped_at).count());
@@ -182,14 +180,15 @@ bool Screening::settled() const noexcept {
 }
 
 bool Screening::expected() const noexcept {
-  return surroundings_.expected_sd_K <= expectation_share * allowance_K_ &&
-         std::abs(state_.newest.temp_degC - surroundings_.expected_degC) <= allowance_K_;
+  return surroundings_.expected_sd_K <= expectation_share * config_.rate_allowance_K &&
+         std::abs(state_.newest.temp_degC - surroundings_.expected_degC) <=
+             config_.rate_allowance_K;
 }
 
 /// False without an expectation.
 bool Screening::unexpected() const noexcept {
   return std::abs(state_.newest.temp_degC - surroundings_.expected_degC) >
-         std::max(allowance_K_, unexpected_sd * surroundings_.expected_sd_K);
+         std::max(config_.rate_allowance_K, unexpected_sd * surroundings_.expected_sd_K);
 }
 
 namespace {

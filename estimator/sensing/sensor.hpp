@@ -161,11 +161,7 @@ class Screening {
   [[nodiscard]] bool expected() const noexcept;
   [[nodiscard]] bool unexpected() const noexcept;
 
-  const double min_degC_;
-  const double max_degC_;
-  const double rate_K_per_ns_;
-  const double allowance_K_;
-  const double outage_K_max_;
+  const ScreeningConfig config_;
   const nanoseconds stale_after_;
   const nanoseconds settle_;
   const nanoseconds stuck_after_;  ///< 0: never
