@@ -223,14 +223,15 @@ TEST_CASE("the end of the CAN link sends the newest command once more", "[vm][co
   config.period_s = 60.0;
   CanController link(config);
   link.start();
+  Candump dump("vcan0,100:7FF");
+  RawSender bus("vcan0");
+  REQUIRE(eventually([&] { return dump.listens(bus, 0x100); }));
+  // Only now: on a slow machine candump takes longer to start than the link may be silent.
   ControllerState state;
   REQUIRE(eventually([&] {
     link.newest(state);
     return state.online;
   }));
-  Candump dump("vcan0,100:7FF");
-  RawSender bus("vcan0");
-  REQUIRE(eventually([&] { return dump.listens(bus, 0x100); }));
   OffsetCommand command;
   command.link_epoch = state.link_epoch;
   command.look = state.look;
