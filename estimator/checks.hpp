@@ -41,6 +41,7 @@ struct NumberKey {
                                    double max) {
     return {key, member, min, max, true};
   }
+  /// A whole number in [min, max]
   static constexpr NumberKey whole(const char* key, std::uint64_t Config::*member,
                                    std::uint64_t min, std::uint64_t max) {
     return {key, nullptr, static_cast<double>(min), static_cast<double>(max), false, member};

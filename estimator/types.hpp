@@ -157,7 +157,7 @@ enum class Mode : std::uint8_t {
   disabled,  ///< by an operator or the controller's switch; offsets at zero or on the way
   compensating,
   holding,         ///< inputs or controller lost: offsets stay
-  ramping_to_zero  ///< daemon stopping, or lost for hold_s and on_loss = ramp_to_zero
+  ramping_to_zero  ///< daemon stopping, or holding for hold_s with on_loss = ramp_to_zero
 };
 [[nodiscard]] std::string_view to_string(Mode mode) noexcept;
 
