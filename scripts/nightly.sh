@@ -35,6 +35,8 @@ part "includes" scripts/check_includes.py
 part "format" scripts/check-format.sh
 part "clang-tidy" scripts/check-tidy.sh
 part "fuzz" scripts/fuzz.sh --minutes 10
+# ./test.sh --all has compiled file by file, for the planted bugs: what follows concerns what is installed.
+part "build as installed" ./test.sh --build-only
 bin=build/release/bin
 part "faults" "$bin/thermocomp_faults" --seeds "$first_life:$((first_life + 2560))" --hours 4 \
   --complete
