@@ -371,7 +371,11 @@ MeasuredTests measured_tests(const std::vector<RunFile>& given, const TestOption
   if (options.signals) {
     tests.signals = usable(
         runs, [](const auto& name) { return is_operating(name) && name != "time_s"; }, tests.notes);
-    std::erase_if(tests.signals, [&](const auto& name) { return !varies(runs, name); });
+    const auto constant =
+        std::stable_partition(tests.signals.begin(), tests.signals.end(),
+                              [&](const std::string& name) { return varies(runs, name); });
+    tests.constant.assign(constant, tests.signals.end());
+    tests.signals.erase(constant, tests.signals.end());
   }
   for (const RunFile& run : runs)
     tests.runs.push_back(

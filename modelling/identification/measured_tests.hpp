@@ -39,7 +39,8 @@ struct HotHalf {
 struct MeasuredTests {
   std::vector<std::string> places;
   std::vector<std::string> outputs;
-  std::vector<std::string> signals;  ///< common to all runs, and varying
+  std::vector<std::string> signals;   ///< common to all runs, and varying
+  std::vector<std::string> constant;  ///< signals with one value in all rows: not in the model
   /// Signals that stay at a level within each run, or change in one direction once in all runs:
   /// they get no gain.
   std::vector<std::string> unmoved;

@@ -15,4 +15,10 @@ std::string printed(const char* format, ...) {
   return text.data();
 }
 
+std::string joined(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
 }  // namespace thermocomp::identification

@@ -37,10 +37,19 @@ constexpr double l1_tolerance = 1e-6;
 /// Iteration limit in case of rounding; usually less than one join per column.
 constexpr Eigen::Index joins_a_column_max = 10;
 
-bool is_switch(const MeasuredTests& tests, Eigen::Index signal) {
+/// Two levels, such as on and off, show no curvature of the response. A deviation of up to a tenth
+/// of their distance is noise of a measured level.
+bool has_two_levels(const MeasuredTests& tests, Eigen::Index signal) {
+  double low = std::numeric_limits<double>::infinity();
+  double high = -low;
+  for (const TestRun& run : tests.runs) {
+    low = std::min(low, run.signals.col(signal).minCoeff());
+    high = std::max(high, run.signals.col(signal).maxCoeff());
+  }
+  const double noise = 0.1 * (high - low);
   return std::all_of(tests.runs.begin(), tests.runs.end(), [&](const TestRun& run) {
     const auto column = run.signals.col(signal).array();
-    return (column == 0.0 || column == 1.0).all();
+    return (column <= low + noise || column >= high - noise).all();
   });
 }
 
@@ -132,7 +141,7 @@ BankColumns bank_columns(const MeasuredTests& tests) {
   }
   for (std::size_t i = 0; i < tests.signals.size(); ++i)
     for (const double power : {1.0, 2.0}) {
-      if (power > 1.5 && is_switch(tests, static_cast<Eigen::Index>(i))) continue;
+      if (power > 1.5 && has_two_levels(tests, static_cast<Eigen::Index>(i))) continue;
       bank.subjects.push_back(tests.signals[i]);
       bank.powers.push_back(power);
     }

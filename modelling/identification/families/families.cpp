@@ -305,26 +305,35 @@ void choose(const std::vector<Judgement>& judgements, FamiliesFit& fit) {
                        worse;
 }
 
-/// Groups of places whose rises are too correlated to be separated.
+/// Groups of places, and of signals, whose courses are too correlated to be separated.
 std::vector<std::vector<std::string>> moved_together(const MeasuredTests& tests) {
-  const auto places = static_cast<Eigen::Index>(tests.places.size());
-  Eigen::MatrixXd squares = Eigen::MatrixXd::Zero(places, places);
+  std::vector<std::string> names = tests.places;
+  std::vector<Eigen::Index> moved;
+  for (std::size_t i = 0; i < tests.signals.size(); ++i) {
+    if (!tests.moved(tests.signals[i])) continue;
+    names.push_back(tests.signals[i]);
+    moved.push_back(static_cast<Eigen::Index>(i));
+  }
+  const auto count = std::ssize(names);
+  Eigen::MatrixXd squares = Eigen::MatrixXd::Zero(count, count);
   for (const TestRun& run : tests.runs) {
-    const Eigen::MatrixXd rows = run.places_K.bottomRows(run.places_K.rows() - run.begin);
-    const Eigen::MatrixXd centred = rows.rowwise() - rows.colwise().mean();
-    squares.noalias() += centred.transpose() * centred;
+    const Eigen::Index rows = run.places_K.rows() - run.begin;
+    Eigen::MatrixXd courses(rows, count);
+    courses << run.places_K.bottomRows(rows), run.signals(Eigen::all, moved).bottomRows(rows);
+    courses.rowwise() -= courses.colwise().mean().eval();
+    squares.noalias() += courses.transpose() * courses;
   }
   std::vector<std::vector<std::string>> groups;
-  std::vector<bool> taken(tests.places.size(), false);
-  for (Eigen::Index a = 0; a < places; ++a) {
+  std::vector<bool> taken(names.size(), false);
+  for (Eigen::Index a = 0; a < count; ++a) {
     if (taken[static_cast<std::size_t>(a)]) continue;
-    std::vector<std::string> group{tests.places[static_cast<std::size_t>(a)]};
-    for (Eigen::Index b = a + 1; b < places; ++b) {
+    std::vector<std::string> group{names[static_cast<std::size_t>(a)]};
+    for (Eigen::Index b = a + 1; b < count; ++b) {
       const double correlation = squares(a, b) / std::sqrt(squares(a, a) * squares(b, b));
       if (taken[static_cast<std::size_t>(b)] || !(std::abs(correlation) > correlation_of_one))
         continue;
       taken[static_cast<std::size_t>(b)] = true;
-      group.push_back(tests.places[static_cast<std::size_t>(b)]);
+      group.push_back(names[static_cast<std::size_t>(b)]);
     }
     if (group.size() > 1) groups.push_back(std::move(group));
   }
@@ -461,6 +470,10 @@ void add_warnings(const MeasuredTests& tests, FamiliesFit& fit) {
                            " gets no gain: it stayed at a level within each run or went one way "
                            "once, so its effect cannot be separated from that of time. Next: a run "
                            "in which it goes up and down");
+  if (!tests.constant.empty())
+    fit.warnings.push_back(joined(tests.constant) +
+                           ": the same value in all rows, so the model does not have it and does "
+                           "not notice when it changes. Next: a run in which it goes up and down");
   for (const std::string& signal : tests.gradual)
     if (tests.moved(signal) && fit.chosen == Family::lag_bank)
       fit.warnings.push_back(signal +
@@ -483,10 +496,8 @@ void add_warnings(const MeasuredTests& tests, FamiliesFit& fit) {
                                      "for use leaves less than half. Next: thermocomp diagnose",
                                      100.0 * chosen.left_out_rms_um[o] / none.left_out_rms_um[o]));
   for (const auto& group : fit.together) {
-    std::string names;
-    for (const std::string& name : group) names += (names.empty() ? "" : ", ") + name;
     fit.warnings.push_back(
-        names +
+        joined(group) +
         " always moved together, so their gains cannot be separated. Next: a run "
         "in which they move apart, if they can");
   }

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "modelling/identification/families/families.hpp"
+#include "modelling/identification/printed.hpp"
 
 namespace thermocomp::identification {
 namespace {
@@ -22,12 +23,6 @@ Names without(const Names& all, const Names& those) {
   for (const std::string& name : all)
     if (std::find(those.begin(), those.end(), name) == those.end()) rest.push_back(name);
   return rest;
-}
-
-std::string joined(const Names& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
 }
 
 std::size_t place_of(const Names& names, const std::string& name) {

@@ -10,57 +10,13 @@
 
 #include "config/model/model_file.hpp"
 #include "estimator/model/displacement_model.hpp"
+#include "machine_runs.hpp"
 #include "modelling/identification/families/bank_fit.hpp"
-#include "synthetic_places.hpp"
 
 using namespace thermocomp;
 using namespace thermocomp::identification;
 
 namespace {
-
-constexpr std::size_t hours = 6;
-
-/// Two temperatures and a speed; the displacement is `moved` of them, with noise.
-template <class Moved>
-RunFile machine_run(const std::string& name, std::uint64_t seed, Moved moved) {
-  std::mt19937_64 engine(seed);
-  RunFile run;
-  run.name = name;
-  run.columns = {"time_s", "t1_degC", "t2_degC", "spindle_rpm", "z_um"};
-  run.values.resize(5);
-  double quick = 0.0;
-  double slow = 0.0;
-  double late = 0.0;
-  for (std::size_t minute = 0; minute < 60 * hours; ++minute) {
-    const double rpm = (minute + 37 * seed) % 110 < 70 ? 2000.0 + 500.0 * double(seed % 4) : 0.0;
-    quick += (rpm / 400.0 - quick) / 15.0;
-    slow += (0.5 * quick - slow) / 60.0;
-    late += (quick - late) / 40.0;
-    run.values[0].push_back(60.0 * double(minute));
-    run.values[1].push_back(21.0 + quick + 0.02 * gaussian(engine));
-    run.values[2].push_back(20.0 + slow + 0.02 * gaussian(engine));
-    run.values[3].push_back(rpm);
-    run.values[4].push_back(moved(quick, slow, late, rpm) + 0.2 * gaussian(engine));
-  }
-  run.selected_end = run.values[0].size();
-  return run;
-}
-
-template <class Moved>
-MeasuredTests machine_tests(std::size_t runs, Moved moved) {
-  std::vector<RunFile> files;
-  for (std::size_t i = 0; i < runs; ++i)
-    files.push_back(machine_run(std::string("run").append(std::to_string(i)), i + 1, moved));
-  TestOptions options;
-  options.outputs = {"z_um"};
-  options.folds_of_one_run = 8;
-  options.signals = true;
-  return measured_tests(files, options);
-}
-
-FamiliesFit fitted(const MeasuredTests& tests, std::optional<Family> forced = std::nullopt) {
-  return fit_families(tests, {}, forced, [](double) {});
-}
 
 const FamilyResult& result_of(const FamiliesFit& fit, Family family) {
   return fit.results[static_cast<std::size_t>(family)];
@@ -285,8 +241,7 @@ TEST_CASE("the bank's columns are the low passes of the recorded columns, from 0
   const MeasuredTests tests =
       machine_tests(1, [](double quick, double, double, double) { return quick; });
   const BankColumns columns = bank_columns(tests);
-  CHECK(columns.subjects ==
-        std::vector<std::string>{"t1_degC", "t2_degC", "spindle_rpm", "spindle_rpm"});
+  CHECK(columns.subjects == std::vector<std::string>{"t1_degC", "t2_degC", "spindle_rpm"});
   CHECK(columns.taus_s == std::vector<double>{0.0, 300.0, 900.0, 2700.0, 8100.0});
   const Eigen::MatrixXd bank = bank_of(tests.runs[0], tests, columns);
   CHECK(bank.row(0).norm() == 0.0);
@@ -404,87 +359,6 @@ TEST_CASE("blunders of a probe are left out with a note, including the first row
   RunFile steps = machine_run("steps", 3, moved);  // a step of the machine is not a blunder
   for (std::size_t row = 100; row < steps.rows(); ++row) steps.values[4][row] += 60.0;
   CHECK(measured_tests({steps}, options).notes.empty());
-}
-
-TEST_CASE("a signal at a constant level within each run is not requested from the controller",
-          "[families]") {
-  std::vector<RunFile> files;
-  std::mt19937_64 engine(3);
-  for (std::size_t i = 0; i < 3; ++i) {
-    RunFile run = machine_run(std::string("run").append(std::to_string(i)), i + 1,
-                              [](double quick, double, double, double) { return 5.0 * quick; });
-    run.columns[3] = "load_A";
-    for (double& load_A : run.values[3])
-      load_A = -2.0 * static_cast<double>(i + 1) + 0.02 * gaussian(engine);
-    files.push_back(std::move(run));
-  }
-  TestOptions options;
-  options.outputs = {"z_um"};
-  options.signals = true;
-  const MeasuredTests tests = measured_tests(files, options);
-  const FamiliesFit fit = fitted(tests, Family::lag_bank);
-  CHECK(tests.unmoved == std::vector<std::string>{"load_A"});
-  CHECK(fit.model.signal_columns().empty());  // and no hinges
-  CHECK_NOTHROW(parse_model(write_model(fit.model), "written"));
-}
-
-TEST_CASE("a position and a place that vary by rounding alone are constant", "[families]") {
-  RunFile run = machine_run("run", 1, [](double quick, double, double, double) { return quick; });
-  run.columns[2] = "still_degC";
-  run.columns[3] = "z_mm";
-  for (std::size_t row = 0; row < run.rows(); ++row) {
-    run.values[2][row] = 20.0 + (row % 2 == 0 ? 1e-13 : 0.0);
-    run.values[3][row] = -150.0 + (row % 3 == 0 ? 3e-14 : 0.0);
-  }
-  TestOptions options;
-  options.outputs = {"z_um"};
-  options.signals = true;
-  const MeasuredTests tests = measured_tests({run}, options);
-  CHECK(tests.signals.empty());
-  CHECK(tests.places == std::vector<std::string>{"t1_degC"});
-}
-
-TEST_CASE("a signal that changes in one direction once in all runs gets no gain", "[families]") {
-  const auto unmoved = [](std::initializer_list<double> levels) {
-    RunFile run = machine_run("run", 1, [](double quick, double, double, double) { return quick; });
-    run.columns[3] = "heater";
-    const std::size_t rows = run.rows() / levels.size() + 1;
-    for (std::size_t row = 0; row < run.rows(); ++row)
-      run.values[3][row] = std::data(levels)[row / rows];
-    TestOptions options;
-    options.outputs = {"z_um"};
-    options.signals = true;
-    return !measured_tests({run}, options).moved("heater");
-  };
-  CHECK(unmoved({0.0, 60.0}));
-  CHECK(unmoved({60.0, 30.0, 0.0}));
-  CHECK(unmoved({0.0, 60.0, 57.0}));  // back by less than a tenth of its range
-  CHECK_FALSE(unmoved({0.0, 60.0, 50.0}));
-  CHECK_FALSE(unmoved({0.0, 60.0, 0.0, 60.0}));
-}
-
-TEST_CASE("a signal that goes one way gradually gets gains if all that is left out needs them",
-          "[families]") {
-  const auto unmoved = [](double um_per_Ah, bool gradual) {
-    RunFile run =
-        machine_run("run", 1, [](double quick, double, double, double) { return 2.0 * quick; });
-    run.columns[3] = "charge_Ah";
-    for (std::size_t row = 0; row < run.rows(); ++row) {
-      const double hour = static_cast<double>(row) / 60.0;
-      run.values[3][row] = gradual ? hour + 0.4 * std::sin(2.0 * hour) : (hour > 4.0 ? 6.0 : 0.0);
-      run.values[4][row] += um_per_Ah * run.values[3][row];
-    }
-    TestOptions options;
-    options.outputs = {"z_um"};
-    options.folds_of_one_run = 8;
-    options.signals = true;
-    const FamiliesFit fit = fitted(measured_tests({run}, options));
-    CHECK(fit.model.signal_columns().empty() == !fit.unmoved.empty());
-    return fit.unmoved;
-  };
-  CHECK(unmoved(10.0, true).empty());
-  CHECK(unmoved(0.0, true) == std::vector<std::string>{"charge_Ah"});
-  CHECK(unmoved(10.0, false) == std::vector<std::string>{"charge_Ah"});
 }
 
 TEST_CASE("a family that is worse than no model on a run left out is not chosen", "[families]") {
