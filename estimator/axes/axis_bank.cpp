@@ -288,7 +288,7 @@ void AxisChannel::compare(const AxisInput& input) noexcept {
     // Away for longer than the largest lag, the controller no longer shows a value on the way.
     if (input.taken_at - before > lag_max) check_.restart(input.now, limiter_.offset_um());
     start_on_link(input, fresh);
-  } else if (check_.agrees(input.applied_um)) {
+  } else if (check_.agrees(input.applied_um) && !stands_still(input.applied_um)) {
     note_explained(input, fresh);
   } else {
     note_unexplained(input, fresh);
@@ -314,6 +314,13 @@ void AxisChannel::start_on_link(const AxisInput& input, bool fresh) noexcept {
   if (!state_.driven_once && std::abs(input.applied_um) <= same_read_back_um)
     state_.pairs.note(0.0, input.applied_um);
   start_from(input.now, std::clamp(input.applied_um, -state_.trusted_um, state_.trusted_um));
+}
+
+/// An offset sent while the read-back was the same is far from all offsets sent lately: no delay
+/// within mismatch_after_s explains that.
+bool AxisChannel::stands_still(double applied_um) const noexcept {
+  const Standing found = state_.pairs.standing(limiter_.offset_um(), applied_um);
+  return check_.is_far(found.low_um) || check_.is_far(found.high_um);
 }
 
 void AxisChannel::note_explained(const AxisInput& input, bool fresh) noexcept {
@@ -342,8 +349,12 @@ void AxisChannel::note_unexplained(const AxisInput& input, bool fresh) noexcept 
   state_.latched = true;
   state_.releasing = false;
   state_.starting = false;
-  state_.latched_mismatch = state_.pairs.judge(limiter_.offset_um(), input.applied_um);
-  state_.pairs.note(limiter_.offset_um(), input.applied_um);
+  // On a link that pauses, offsets newer than the last explained read-back have not been written.
+  const double sent_um = state_.read_backs_awaited > 0
+                             ? state_.pairs.last_sent_um(limiter_.offset_um())
+                             : limiter_.offset_um();
+  state_.latched_mismatch = state_.pairs.judge(sent_um, input.applied_um);
+  state_.pairs.note(sent_um, input.applied_um);
 }
 
 void AxisChannel::begin_at_zero() noexcept {
@@ -383,6 +394,7 @@ void AxisChannel::check_release(const AxisInput& input) noexcept {
   const double could_go_um = limiter_.rate_um_per_s() * to_seconds(input.now - state_.driven_at);
   if (first || std::abs(input.applied_um - sent_um) > could_go_um) return;
   end_latch();
+  state_.pairs.note(input.applied_um, not_a_number);
   state_.unwritten_for = read_backs_until_written;
   start_from(input.now, std::clamp(input.applied_um, -state_.trusted_um, state_.trusted_um));
 }
@@ -492,6 +504,10 @@ bool AppliedCheck::is_between(double applied_um, double low_um, double high_um) 
 
 bool AppliedCheck::agrees(double applied_um) const noexcept {
   return is_between(applied_um, lowest_um(), highest_um());
+}
+
+bool AppliedCheck::is_far(double offset_um) const noexcept {
+  return !is_between(offset_um, lowest_um() - tolerance_um_ / 2, highest_um() + tolerance_um_ / 2);
 }
 
 bool AppliedCheck::agrees_after_absence(double applied_um) const noexcept {

@@ -26,6 +26,9 @@ class AppliedCheck {
   void restart(nanoseconds now, double offset_um) noexcept;
   void sent(nanoseconds now, double offset_um) noexcept;
   [[nodiscard]] bool agrees(double applied_um) const noexcept;
+  /// More than one and a half tolerances from all of them: no rounding of the controller to steps
+  /// of 0.0001 inch makes both the same, with the default tolerance.
+  [[nodiscard]] bool is_far(double offset_um) const noexcept;
   /// True if a controller that was away may apply this by itself: an offset sent to it, 0, or a
   /// value between on its way back.
   [[nodiscard]] bool agrees_after_absence(double applied_um) const noexcept;
@@ -104,7 +107,8 @@ struct SentBefore {
 /// on a new link whose read-back is zero, or between zero and the offsets sent lately; and when an
 /// operator releases a mismatch. Otherwise it continues from the value sent.
 ///
-/// An unexplained read-back pauses the axis; a second one within the next sixteen good ones latches
+/// Unexplained is a read-back far from all offsets sent lately, and one that stands still while the
+/// offset sent moves. It pauses the axis; a second one within the next sixteen good ones latches
 /// the mismatch: the axis is not driven until release().
 ///
 /// Without read-back the offset continues, on each new link, from the one sent last. Its sources,
@@ -254,6 +258,7 @@ class AxisChannel {
   void widen_corridor() noexcept;
   void begin_corridor(StartEvidence by) noexcept;
   void start_on_link(const AxisInput& input, bool fresh) noexcept;
+  [[nodiscard]] bool stands_still(double applied_um) const noexcept;
   void note_explained(const AxisInput& input, bool fresh) noexcept;
   void note_unexplained(const AxisInput& input, bool fresh) noexcept;
   void check_release(const AxisInput& input) noexcept;

@@ -9,7 +9,7 @@ namespace {
 
 /// Rounding of registers and delay of a moving offset.
 constexpr double noise_um = 0.3;
-/// Closer pairs count as one.
+/// Closer pairs count as one, closer read-backs as the same.
 constexpr double apart_um = 0.2;
 /// Largest deviation of the older pairs from the cause of the newest, as a share of the mismatch;
 /// and the limit for a sure cause, which prevents a release while it still explains the read-backs.
@@ -73,7 +73,7 @@ std::string likely_text(const Mismatch& mismatch) {
     case MismatchCause::stands_still:
       if (std::abs(mismatch.read_um) <= noise_um)
         return "reads back nothing of what is sent: not taken, or check scale";
-      return "does not follow the offset sent (rejected, or stopped)";
+      return "does not follow the offset sent: not taken (rejected, or stopped)";
     case MismatchCause::changes_alone:
       return "changes by itself: another writer?";
     case MismatchCause::constant:
@@ -87,15 +87,27 @@ std::string likely_text(const Mismatch& mismatch) {
 }
 
 void SentAndRead::note(double sent_um, double read_um) noexcept {
-  if (count_ != 0) {
-    const std::size_t last = (count_ - 1) % length;
-    if (std::abs(sent_um - sent_um_[last]) < apart_um &&
-        std::abs(read_um - read_um_[last]) < apart_um)
-      return;
-  }
+  if (adds_nothing(sent_um, read_um)) --count_;
   sent_um_[count_ % length] = sent_um;
   read_um_[count_ % length] = read_um;
   ++count_;
+}
+
+/// The newest pair lies between others, or beside an older one.
+bool SentAndRead::adds_nothing(double next_sent_um, double next_read_um) const noexcept {
+  if (count_ < 2) return false;
+  const double sent_um = sent_um_[index_of(0)];
+  const auto is_same = [read_um = read_um_[index_of(0)]](double other_um) {
+    return std::abs(other_um - read_um) < apart_um;
+  };
+  bool lower = is_same(next_read_um) && next_sent_um <= sent_um;
+  bool higher = is_same(next_read_um) && next_sent_um >= sent_um;
+  std::size_t age = 1;
+  for (; age < kept() && is_same(read_um_[index_of(age)]); ++age) {
+    lower = lower || sent_um_[index_of(age)] < sent_um + apart_um;
+    higher = higher || sent_um_[index_of(age)] > sent_um - apart_um;
+  }
+  return age > 1 && lower && higher;
 }
 
 std::size_t SentAndRead::disagreeing() const noexcept {
@@ -110,8 +122,11 @@ std::size_t SentAndRead::disagreeing() const noexcept {
 double SentAndRead::worst_um(std::size_t pairs, double factor, double constant_um) const noexcept {
   double worst = 0.0;
   for (std::size_t age = 0; age < pairs; ++age) {
-    const std::size_t i = index_of(age);
-    worst = std::max(worst, std::abs(read_um_[i] - (factor * sent_um_[i] + constant_um)));
+    const double read_um = read_um_[index_of(age)] - constant_um;
+    const double before_um = sent_um_[index_of(age + 1 < kept() ? age + 1 : age)];
+    const auto [low_um, high_um] =
+        std::minmax({factor * sent_um_[index_of(age)], factor * before_um});
+    worst = std::max(worst, std::abs(read_um - std::clamp(read_um, low_um, high_um)));
   }
   return worst;
 }
@@ -126,12 +141,22 @@ double SentAndRead::spread_um(std::size_t pairs, double sent_um) const noexcept 
   return high - low;
 }
 
-bool SentAndRead::stands_still(double sent_um, double read_um) const noexcept {
-  double apart = 0.0;
-  for (std::size_t i = 0; i < kept(); ++i) {
-    apart = std::max(apart, std::abs(read_um_[i] - read_um));
+Standing SentAndRead::standing(double sent_um, double read_um) const noexcept {
+  Standing found{0, sent_um, sent_um};
+  for (; found.pairs < kept(); ++found.pairs) {
+    const std::size_t i = index_of(found.pairs);
+    if (!(std::abs(read_um_[i] - read_um) < apart_um)) break;
+    found.low_um = std::min(found.low_um, sent_um_[i]);
+    found.high_um = std::max(found.high_um, sent_um_[i]);
   }
-  return apart <= noise_um && spread_um(kept(), sent_um) > 3.0 * noise_um;
+  return found;
+}
+
+/// In all pairs, or since the read-back was an offset sent.
+bool SentAndRead::stands_still(double sent_um, double read_um) const noexcept {
+  const Standing found = standing(sent_um, read_um);
+  const bool was_sent = read_um >= found.low_um - noise_um && read_um <= found.high_um + noise_um;
+  return (was_sent || found.pairs == kept()) && found.high_um - found.low_um > 3.0 * noise_um;
 }
 
 Mismatch SentAndRead::judge(double sent_um, double read_um) const noexcept {

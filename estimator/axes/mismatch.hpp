@@ -42,16 +42,32 @@ struct Mismatch {
 /// there is no likely cause. Allocates.
 [[nodiscard]] std::string likely_text(const Mismatch& mismatch);
 
-/// The last pairs of offset sent and read-back, only distinct ones, so that a slow offset does not
-/// fill the memory with one pair.
+/// Read-back that stays the same while the offset sent changes.
+struct Standing {
+  std::size_t pairs{0};
+  double low_um{not_a_number};  ///< offsets sent meanwhile
+  double high_um{not_a_number};
+};
+
+/// The last pairs of offset sent and read-back. A pair between others with the same read-back is
+/// replaced by the next one, so that a slow offset does not fill the memory; the newest pair is
+/// always that of the last read-back.
 class SentAndRead {
  public:
+  /// @param read_um  NaN: the read-back begins anew, and earlier pairs do not show it standing still
   void note(double sent_um, double read_um) noexcept;
   /// The likeliest cause of a pair that disagrees. A factor or constant is taken from that pair and
-  /// must hold for the older ones too, allowing for the lag of a moving offset. A constant or an
-  /// opposite sign may be recent: then it must hold for the pairs since the last agreement, at
-  /// least two; an exact negative is shown by this pair alone.
+  /// must hold for the older ones too, each of which may show the offset sent one pair before. A
+  /// constant or an opposite sign may be recent: then it must hold for the pairs since the last
+  /// agreement, at least two; an exact negative is shown by this pair alone. A read-back may stand
+  /// still since it last agreed.
   [[nodiscard]] Mismatch judge(double sent_um, double read_um) const noexcept;
+  /// The newest pairs have this read-back; range of their offsets sent and `sent_um`.
+  [[nodiscard]] Standing standing(double sent_um, double read_um) const noexcept;
+  /// Offset sent at the last read-back; without one `otherwise_um`.
+  [[nodiscard]] double last_sent_um(double otherwise_um) const noexcept {
+    return count_ == 0 ? otherwise_um : sent_um_[index_of(0)];
+  }
 
   void visit_state(StateArchive& archive) { archive(sent_um_, read_um_, count_); }
 
@@ -66,8 +82,9 @@ class SentAndRead {
   [[nodiscard]] std::size_t disagreeing() const noexcept;
   [[nodiscard]] Mismatch judge_newest(std::size_t pairs, double sent_um,
                                       double read_um) const noexcept;
+  [[nodiscard]] bool adds_nothing(double next_sent_um, double next_read_um) const noexcept;
   // Over the newest `pairs`:
-  /// largest |read - (factor sent + constant)|
+  /// largest |read - (factor sent + constant)|, where `sent` is that of the pair or the one before
   [[nodiscard]] double worst_um(std::size_t pairs, double factor,
                                 double constant_um) const noexcept;
   [[nodiscard]] bool stands_still(double sent_um, double read_um) const noexcept;

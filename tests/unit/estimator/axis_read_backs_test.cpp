@@ -1,5 +1,6 @@
 // An axis and its read-backs, on one link and on the next.
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <catch2/catch.hpp>
@@ -196,6 +197,45 @@ TEST_CASE("a controller that ignores offsets becomes a mismatch", "[axis]") {
   bench.steps(60, 50.0);
   CHECK(bench.axis().latched());
   CHECK(bench.axis().offset_um() < 50.0);
+}
+
+namespace {
+
+/// An offset that swings by +-1.9 um within 40 s; the controller shows `answer(offset of 1 s ago)`.
+template <class Answer>
+Bench swinging(const Answer& answer) {
+  Bench bench;
+  bench.obeys = false;
+  std::array<double, 10> late_um{};
+  for (std::size_t i = 0; i < 1200; ++i) {
+    bench.input.applied_um = answer(late_um[i % 10]);
+    bench.step(1.9 * std::sin(0.0157 * static_cast<double>(i)));
+    late_um[i % 10] = bench.axis().offset_um();
+  }
+  return bench;
+}
+
+}  // namespace
+
+TEST_CASE("a controller that ignores offsets below the tolerance becomes a mismatch", "[axis]") {
+  Bench bench = swinging([](double) { return 0.0; });
+  REQUIRE(bench.axis().latched());
+  CHECK(bench.axis().latched_mismatch().likely == MismatchCause::stands_still);
+  bench.release();  // mended
+  bench.obeys = true;
+  bench.steps(100, -1.9);
+  CHECK_FALSE(bench.axis().mismatch());
+  CHECK(bench.axis().offset_um() == -1.9);
+}
+
+TEST_CASE("a read-back that is late and rounded follows", "[axis]") {
+  for (const double step_um : {0.01, 1.0, 2.54}) {
+    CAPTURE(step_um);
+    const Bench bench =
+        swinging([step_um](double um) { return step_um * std::round(um / step_um); });
+    CHECK_FALSE(bench.axis().mismatch());
+    CHECK_FALSE(bench.axis().latched());
+  }
 }
 
 TEST_CASE("a first read-back beyond the bound is not driven until it is back", "[axis]") {

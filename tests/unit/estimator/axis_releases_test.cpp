@@ -177,13 +177,41 @@ TEST_CASE("the usual mistakes of commissioning are reported by name", "[axis]") 
   CHECK(cause_text(wrong_read_back(-30.0, [](double um) { return um + 3.0; })) ==
         "constant +3.0 um: check the offset's zero");
   CHECK(cause_text(wrong_read_back(30.0, [](double) { return 1.0; })) ==
-        "does not follow the offset sent (rejected, or stopped)");
+        "does not follow the offset sent: not taken (rejected, or stopped)");
   Bench bench;
   bench.steps(100, 10.0);
   bench.obeys = false;
   bench.input.applied_um = 31.0;
   bench.steps(3, 10.0);
   CHECK(cause_text(bench) == "changes by itself: another writer?");
+}
+
+TEST_CASE("a controller that stops taking offsets is no other writer", "[axis]") {
+  Bench bench(true, axis_of(50, 0.2));
+  bench.steps(270, -30.0);
+  bench.obeys = false;
+  bench.steps(200, -30.0);
+  REQUIRE(bench.axis().latched());
+  CHECK(cause_text(bench) == "does not follow the offset sent: not taken (rejected, or stopped)");
+}
+
+TEST_CASE("an offset that a pausing link did not write is not judged", "[axis]") {
+  Bench bench;
+  bench.obeys = false;
+  bench.steps(5, 0.0);
+  bench.step(-0.4);
+  bench.input.applied_um = 10 * bench.axis().offset_um();  // within the tolerance of the link
+  bench.input.now += 10ms;  // the offset moves on, and the command is written
+  bench.input.taken_at = bench.input.now;
+  bench.look();
+  const double written_um = bench.axis().offset_um();
+  bench.step(-3.0);
+  bench.input.applied_um = 10 * written_um;
+  bench.input.link_epoch += epochs_of_a_link;
+  bench.steps(2, -3.0);
+  REQUIRE(bench.axis().latched());
+  CHECK(bench.axis().latched_mismatch().sent_um == Approx(written_um));
+  CHECK(cause_text(bench) == "reads back 10 times what is sent: check scale");
 }
 
 TEST_CASE("a sign that flips while running is reported by name", "[axis]") {
