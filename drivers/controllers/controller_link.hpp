@@ -126,6 +126,7 @@ class WriteGate {
   void sent(nanoseconds now) noexcept;
   /// The command has reached the controller.
   void confirmed(nanoseconds now) noexcept { confirmed_at_ = now; }
+  void unconfirmed() noexcept { confirmed_at_.reset(); }
   /// True if a write was confirmed on this link within patience().
   [[nodiscard]] bool written(nanoseconds now) const noexcept {
     return confirmed_at_ && now - *confirmed_at_ <= patience();

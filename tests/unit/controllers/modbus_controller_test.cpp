@@ -185,6 +185,37 @@ TEST_CASE("registers that do not hold the values written give no start", "[contr
   link.stop();
 }
 
+TEST_CASE("a write that is answered and not done is not confirmed", "[controllers]") {
+  ModbusMachine machine;
+  ModbusControllerConfig config = three_axes(machine.port());
+  for (ModbusAxis& axis : config.axes) axis.applied.reset();
+  ModbusController link(config);
+  Cycle cycle(link);
+  cycle.want(1, -5.46);
+  REQUIRE(eventually([&] { return cycle.state().written && int32_of(machine, 2) == -546; }));
+  machine.keep_offsets = true;
+  cycle.want(1, -9.0);
+  std::this_thread::sleep_for(2500ms);
+  CHECK(cycle.state().written);  // the value before the newest may still be shown
+  cycle.want(1, -17.3);
+  REQUIRE(eventually([&] { return !cycle.state().written; }));
+  CHECK(cycle.state().online);
+  CHECK(link.health().last_error ==
+        "the controller answers writes and keeps another value (register 2): -17.30 was written, "
+        "-5.46 is read");
+  machine.keep_offsets = false;
+  REQUIRE(eventually([&] { return cycle.state().written; }));
+  CHECK(link.health().last_error.empty());
+  machine.keep_offsets = true;
+  machine.shows = ModbusMachine::Shows::exception;  // no longer readable: nothing to compare
+  cycle.want(1, 1.0);
+  std::this_thread::sleep_for(100ms);
+  cycle.want(1, 2.0);
+  std::this_thread::sleep_for(2500ms);
+  CHECK(cycle.state().written);
+  link.stop();
+}
+
 TEST_CASE("a controller that applies something else is detected", "[controllers]") {
   ModbusMachine machine;
   machine.mirrored = 6;

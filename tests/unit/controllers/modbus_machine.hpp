@@ -77,6 +77,8 @@ class ModbusMachine {
   std::atomic<bool> refuse_writes{false};
   /// Writes are received and neither done nor answered.
   std::atomic<bool> ignore_writes{false};
+  /// Writes below register 10 are answered and not done.
+  std::atomic<bool> keep_offsets{false};
   /// Duration of a read.
   std::atomic<std::chrono::milliseconds> read_takes{std::chrono::milliseconds{0}};
   /// The next write is lost in a restart: not answered, and reads give 0 from then on.
@@ -157,7 +159,9 @@ class ModbusMachine {
       std::copy(kept.begin(), kept.end(), mapping_->tab_registers);
       return shown;
     }
+    const std::vector<std::uint16_t> kept(mapping_->tab_registers, mapping_->tab_registers + 10);
     const bool answered = modbus_reply(context_.get(), query, size, mapping_.get()) >= 0;
+    if (keep_offsets) std::copy(kept.begin(), kept.end(), mapping_->tab_registers);
     for (int i = 0; i < mirrored; ++i) {
       mapping_->tab_input_registers[i] = mapping_->tab_registers[i];
     }

@@ -284,9 +284,11 @@ bool ModbusDialogue::read_written() {
 }
 
 void ModbusDialogue::compare_written() {
+  const bool is_due = connection_.now() >= compare_at_;
+  if (is_due) compare_at_ = connection_.now() + gate_.patience();
   bool held = true;
   for (std::optional<WrittenOffsets>& written : written_) {
-    if (!written || !written->is_to_be_compared()) continue;
+    if (!written || !written->is_to_be_compared(is_due)) continue;
     const ReadRequest& request = written->request();
     std::vector<std::uint16_t> words(request.count);
     const Exchange exchange = connection_.read(config_.unit, request.table, request.address, words);
@@ -361,7 +363,10 @@ void ModbusDialogue::add_axis(std::size_t axis, const OffsetCommand& command,
                               std::vector<WriteField>& fields, double& valid_bits) {
   const ModbusAxis& place = config_.axes[axis];
   for (std::size_t i = 0; i < place.offsets(); ++i)
-    if (!drivable(command, first_[axis] + i)) return;
+    if (!drivable(command, first_[axis] + i)) {
+      if (written_[axis]) written_[axis]->left_out();
+      return;
+    }
   const auto offset_um = std::span(command.offset_um).subspan(first_[axis], place.offsets());
   if (place.travel) {
     set_numbers_[axis] = (set_numbers_[axis] + 1) % travel_numbers(*place.travel);
@@ -387,8 +392,17 @@ bool ModbusDialogue::write_command() {
   const nanoseconds now = connection_.now();
   gate_.sent(now);
   if (requests.empty()) return true;  // no axis is driven, and nothing else is to be written
-  gate_.confirmed(now);
-  note_confirmed(now);
+  const auto untaken = std::find_if(written_.begin(), written_.end(), [](const auto& written) {
+    return written && !written->untaken().empty();
+  });
+  if (untaken == written_.end()) {
+    gate_.confirmed(now);
+    note_confirmed(now);
+  } else {
+    gate_.unconfirmed();
+    const std::scoped_lock lock(health_mutex_);
+    health_.last_error = health_.write.error = untaken_error(config_, **untaken);
+  }
   publish(true);
   return true;
 }

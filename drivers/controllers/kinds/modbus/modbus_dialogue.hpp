@@ -32,8 +32,9 @@ namespace thermocomp {
 /// number in `end` whenever everything is read anew, so that an incomplete set of an earlier writer
 /// is never taken for a complete one.
 ///
-/// For an axis without read-back, a new link reads the written registers instead, once
-/// (WrittenOffsets): applied_um is their content then, NaN if they cannot be read.
+/// For an axis without read-back, a new link reads the written registers instead (WrittenOffsets):
+/// applied_um is their content then, NaN if they cannot be read. While they keep another value than
+/// those written, no write counts as confirmed.
 ///
 /// The register of an axis whose command is not valid is not written; its valid bit is 0. The
 /// heartbeat is incremented with every command written and wraps around. Valid bits and heartbeat
@@ -66,7 +67,8 @@ class ModbusDialogue final : public LineUser {
   bool read_set_numbers();
   /// Reads the written registers of axes without read-back. @return false to try again
   bool read_written();
-  /// Checks that registers without read-back hold the values just written.
+  /// Checks that registers without read-back hold the values just written: of the first command,
+  /// then once in WriteGate::patience().
   void compare_written();
   void exchange();
   /// Reads all; begins a new epoch if the read-back is unexplained. @return false if reading failed
@@ -105,6 +107,7 @@ class ModbusDialogue final : public LineUser {
   std::vector<std::optional<PiezoDrive>> piezos_;       ///< one per axis
   std::vector<std::optional<WrittenOffsets>> written_;  ///< one per axis; none: it is read back
   int written_asked_{0};                                ///< consecutive failed attempts
+  nanoseconds compare_at_{};                            ///< next compare_written() of all
   std::array<double, axes_max> shown_V_{};       ///< voltages of the amplifiers, one per axis
   std::vector<std::vector<double>> shown_sets_;  ///< one per axis: ModbusTravel::applied
   std::vector<std::uint64_t> set_numbers_;       ///< one per axis: of the set written last

@@ -1,7 +1,10 @@
 #include "drivers/controllers/kinds/modbus/modbus_layout.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cstdio>
 #include <numeric>
+#include <utility>
 
 #include "drivers/controllers/travel_values.hpp"
 #include "drivers/modbus/modbus_codec.hpp"
@@ -188,15 +191,54 @@ std::vector<double> WrittenOffsets::decode(std::span<const std::uint16_t> words)
   return offsets;
 }
 
-bool WrittenOffsets::is_to_be_compared() const noexcept {
-  // Registers that hold nothing also show zeros.
-  return held_ == Held::not_known &&
-         std::any_of(words_.begin(), words_.end(), [](std::uint16_t word) { return word != 0; });
+void WrittenOffsets::wrote(const WriteField& field) {
+  if (field.words == words_) return;
+  words_before_ = std::exchange(words_, field.words);
 }
 
-void WrittenOffsets::compare(std::span<const std::uint16_t> words) noexcept {
-  held_ =
-      std::equal(words.begin(), words.end(), words_.begin(), words_.end()) ? Held::yes : Held::no;
+void WrittenOffsets::left_out() {
+  words_.clear();
+  words_before_.clear();
+  differed_ = false;
+  untaken_.clear();
+}
+
+bool WrittenOffsets::is_to_be_compared(bool is_due) const noexcept {
+  if (words_.empty() || held_ == Held::no) return false;
+  if (held_ == Held::yes) return is_due;
+  // Registers that hold nothing also show zeros.
+  return std::any_of(words_.begin(), words_.end(), [](std::uint16_t word) { return word != 0; });
+}
+
+void WrittenOffsets::compare(std::span<const std::uint16_t> words) {
+  const auto holds = [words](const std::vector<std::uint16_t>& written) {
+    return std::equal(words.begin(), words.end(), written.begin(), written.end());
+  };
+  if (held_ == Held::not_known) {
+    held_ = holds(words_) ? Held::yes : Held::no;
+    return;
+  }
+  untaken_.clear();
+  const bool differs = !holds(words_) && !holds(words_before_);
+  if (std::exchange(differed_, differs) && differs) {
+    const std::vector<double> written = decode(words_);
+    const std::vector<double> read = decode(words);
+    const auto [mine, other] = std::mismatch(written.begin(), written.end(), read.begin());
+    const auto i = mine == written.end() ? 0 : mine - written.begin();
+    std::array<char, 64> text{};
+    std::snprintf(text.data(), text.size(), "%.2f was written, %.2f is read",
+                  written[static_cast<std::size_t>(i)], read[static_cast<std::size_t>(i)]);
+    untaken_ = text.data();
+  }
+}
+
+std::string untaken_error(const ModbusControllerConfig& config, const WrittenOffsets& written) {
+  const ReadRequest& request = written.request();
+  const S7Block* s7 = s7_of(config.line);
+  return "the controller answers writes and keeps another value (" +
+         (s7 != nullptr ? s7_place(*s7, request.address, request.count)
+                        : "register " + std::to_string(request.address)) +
+         "): " + written.untaken();
 }
 
 }  // namespace thermocomp

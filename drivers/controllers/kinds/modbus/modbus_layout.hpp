@@ -79,7 +79,8 @@ void check_travel(const ModbusTravel& travel);
 [[nodiscard]] double shown_resolution_um(const ModbusTravel& travel, std::size_t node);
 
 /// Written registers need not keep their values: a device may answer 0 or anything. They are
-/// compared once with the values written, and not used if they differ.
+/// compared once with the values written, and not used if they differ. If they held them, they are
+/// compared now and then: if they differ twice in succession, the controller does not take writes.
 class WrittenOffsets {
  public:
   explicit WrittenOffsets(const ModbusAxis& axis);
@@ -92,10 +93,14 @@ class WrittenOffsets {
   /// @return one per node of the axis, as sent: [um], of a piezo [V]; NaN: unknown
   [[nodiscard]] std::vector<double> decode(std::span<const std::uint16_t> words) const;
 
-  void wrote(const WriteField& field) { words_ = field.words; }
+  void wrote(const WriteField& field);
+  void left_out();  ///< not written: the axis is not driven
   /// True if a read now would show whether the registers hold the values written.
-  [[nodiscard]] bool is_to_be_compared() const noexcept;
-  void compare(std::span<const std::uint16_t> words) noexcept;
+  /// @param is_due  the last read is some time ago
+  [[nodiscard]] bool is_to_be_compared(bool is_due) const noexcept;
+  void compare(std::span<const std::uint16_t> words);
+  /// "-17.30 was written, -5.46 is read"; empty: writes are taken, as far as known.
+  [[nodiscard]] const std::string& untaken() const noexcept { return untaken_; }
 
  private:
   enum class Held : std::uint8_t { not_known, yes, no };
@@ -103,7 +108,14 @@ class WrittenOffsets {
   const ModbusAxis axis_;
   ReadRequest request_;
   Held held_{Held::not_known};
-  std::vector<std::uint16_t> words_;  ///< written last
+  std::vector<std::uint16_t> words_;         ///< written last
+  std::vector<std::uint16_t> words_before_;  ///< the newest others, which may still be shown
+  bool differed_{false};                     ///< at the last comparison
+  std::string untaken_;
 };
+
+/// "the controller answers writes and keeps another value (register 0): ..."
+[[nodiscard]] std::string untaken_error(const ModbusControllerConfig& config,
+                                        const WrittenOffsets& written);
 
 }  // namespace thermocomp
