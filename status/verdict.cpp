@@ -105,6 +105,11 @@ class Causes {
     }
   }
 
+  /// Empty in the first second, before any error.
+  static std::string in_brackets(const std::string& error) {
+    return error.empty() ? "" : " (" + error + ")";
+  }
+
   /// ": 4 sensors, inputs bed, table": the losses explained by these sensors.
   std::string lost_with(const std::vector<std::string>& sensors,
                         const std::vector<std::string>& blocks) {
@@ -138,7 +143,7 @@ class Causes {
         sensors.insert(sensors.end(), unit.sensors.begin(), unit.sensors.end());
         blocks.insert(blocks.end(), unit.blocks.begin(), unit.blocks.end());
       }
-      add("bus " + bus.name + " is not connected (" + bus.last_error + ")" +
+      add("bus " + bus.name + " is not connected" + in_brackets(bus.last_error) +
               lost_with(sensors, blocks),
           bus_remedy(bus.kind), bus.kind == "can" ? "ip -details link show" : "", subject);
     }
@@ -163,9 +168,9 @@ class Causes {
     const bool is_silent = unit.timeouts >= unit.bad_frames;
     const bool has_answered = unit.silent_s >= 0.0;
     add(unit.name +
-            (!is_silent     ? " answers wrongly (" + unit.last_error + ")"
+            (!is_silent     ? " answers wrongly" + in_brackets(unit.last_error)
              : has_answered ? " silent for " + duration_text(unit.silent_s)
-                            : " does not answer (" + unit.last_error + ")") +
+                            : " does not answer" + in_brackets(unit.last_error)) +
             lost_with(unit.sensors, unit.blocks),
         is_on_network && !is_silent
             ? "see the received bytes and suggested settings"

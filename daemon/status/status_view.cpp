@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <fmt/format.h>
 #include <iterator>
 #include <utility>
 
@@ -218,6 +219,16 @@ WriteStatus write_of(const StatusView& view) {
   return status;
 }
 
+/// Empty if each report of the controller arrives before the last one is too old.
+std::string slow_link_text(const StatusView& view) {
+  const double aged_s = to_seconds(view.controller_health.report_aged);
+  const double stale_after_s = view.config.estimator.compensation.controller_stale_after_s;
+  if (!(aged_s > stale_after_s)) return {};
+  return fmt::format(
+      "a round of reads and writes takes {:.1f} s, more than controller_stale_after_s = {}", aged_s,
+      stale_after_s);
+}
+
 ControllerStatus controller_of(const StatusView& view) {
   const ControllerHealth& health = view.controller_health;
   ControllerStatus status{.name = health.name,
@@ -231,6 +242,8 @@ ControllerStatus controller_of(const StatusView& view) {
                           .read_errors = health.read_errors,
                           .last_error = health.last_error,
                           .write = write_of(view)};
+  // While it is online, the text is one of Status::warnings.
+  if (!status.online && status.last_error.empty()) status.last_error = slow_link_text(view);
   for (std::size_t i = 0; i < view.config.estimator.signals.size(); ++i)
     status.signals[view.config.estimator.signals[i]] = view.controller.signals[i];
   if (health.shown_um) {
@@ -426,6 +439,8 @@ Status status_of(const StatusView& view) {
       .socket = socket_of(view.socket),
       .ended = view.ended,
       .warnings = view.warnings};
+  if (const std::string slow = slow_link_text(view); status.controller.online && !slow.empty())
+    status.warnings.push_back("controller " + status.controller.name + ": " + slow);
   for (std::size_t i = 0; i < view.report.sensors.size(); ++i) {
     const std::string& name = view.config.estimator.sensors[i].name;
     const SensorReport& sensor = view.report.sensors[i];

@@ -37,6 +37,7 @@ struct ControllerHealth {
   std::uint64_t write_errors{0};
   std::uint64_t reads{0};
   std::uint64_t read_errors{0};
+  nanoseconds report_aged{};  ///< Modbus: age of the last report when the next one arrived
   WriteHealth write;
   std::string last_error;  ///< empty if the last exchange and the last write were good
   /// CAN: "down", "active", "warning", "passive" or "bus_off"; else empty

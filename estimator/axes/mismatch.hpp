@@ -54,7 +54,8 @@ struct Standing {
 /// always that of the last read-back.
 class SentAndRead {
  public:
-  /// @param read_um  NaN: the read-back begins anew, and earlier pairs do not show it standing still
+  /// @param read_um  NaN: the read-back begins anew, and earlier pairs do not show it standing
+  /// still
   void note(double sent_um, double read_um) noexcept;
   /// The likeliest cause of a pair that disagrees. A factor or constant is taken from that pair and
   /// must hold for the older ones too, each of which may show the offset sent one pair before. A

@@ -187,6 +187,12 @@ TEST_CASE("a silent module is one trouble that lists the inputs lost with it", "
   list = troubles(status, &answer);
   REQUIRE(list.size() == 2);
   CHECK(list[1].what == "sensor head: sensor wire broken");
+  UnitStatus& unit = status.buses[0].units[0];
+  unit.silent_s = not_a_number;  // the first second: nothing has failed yet
+  unit.timeouts = 0;
+  unit.last_error.clear();
+  CHECK(troubles(status, &answer)[0].what ==
+        "bed_module does not answer: 3 sensors, inputs bed, table");
   status.sensors_bad = {"head"};                 // the module's sensors are still good
   CHECK(troubles(status, &answer).size() == 2);  // an unexplained lost input, and head
   CHECK_THAT(troubles(status, &answer)[0].what, !Contains("silent"));

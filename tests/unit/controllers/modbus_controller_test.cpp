@@ -201,7 +201,7 @@ TEST_CASE("a write that is answered and not done is not confirmed", "[controller
   REQUIRE(eventually([&] { return !cycle.state().written; }));
   CHECK(cycle.state().online);
   CHECK(link.health().last_error ==
-        "the controller answers writes and keeps another value (register 2): -17.30 was written, "
+        "writes are answered, but register 2 keeps another value: -17.30 was written, "
         "-5.46 is read");
   machine.keep_offsets = false;
   REQUIRE(eventually([&] { return cycle.state().written; }));

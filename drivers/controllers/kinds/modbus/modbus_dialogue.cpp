@@ -482,8 +482,9 @@ bool ModbusDialogue::read_all() {
     if (answers.size() == 1) taken_at = exchange.sent_at;
   }
   take(answers);
-  state_.taken_at = taken_at;
   const std::scoped_lock lock(health_mutex_);
+  if (gate_.in_sync()) health_.report_aged = connection_.now() - state_.taken_at;
+  state_.taken_at = taken_at;
   ++health_.reads;
   health_.last_error = health_.write.error;
   return true;

@@ -235,10 +235,10 @@ void WrittenOffsets::compare(std::span<const std::uint16_t> words) {
 std::string untaken_error(const ModbusControllerConfig& config, const WrittenOffsets& written) {
   const ReadRequest& request = written.request();
   const S7Block* s7 = s7_of(config.line);
-  return "the controller answers writes and keeps another value (" +
+  return "writes are answered, but " +
          (s7 != nullptr ? s7_place(*s7, request.address, request.count)
                         : "register " + std::to_string(request.address)) +
-         "): " + written.untaken();
+         " keeps another value: " + written.untaken();
 }
 
 }  // namespace thermocomp

@@ -114,7 +114,7 @@ class WrittenOffsets {
   std::string untaken_;
 };
 
-/// "the controller answers writes and keeps another value (register 0): ..."
+/// "writes are answered, but register 0 keeps another value: ..."
 [[nodiscard]] std::string untaken_error(const ModbusControllerConfig& config,
                                         const WrittenOffsets& written);
 
