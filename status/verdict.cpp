@@ -257,6 +257,20 @@ class Causes {
   std::vector<Trouble> list_;
 };
 
+/// The axis with the longest way to its target: "z has 35.1 um still to go to -48.6 um". Empty:
+/// every axis is nearer than a lost input may leave it. An axis at its bound is a trouble.
+std::string way_text(const std::vector<AxisStatus>& axes) {
+  const AxisStatus* farthest = nullptr;
+  const auto way = [](const AxisStatus& axis) { return std::abs(axis.target - axis.offset); };
+  for (const AxisStatus& axis : axes)
+    if (!axis.at_bound && way(axis) > axis.offset_sd_max &&
+        (farthest == nullptr || way(axis) > way(*farthest)))
+      farthest = &axis;
+  if (farthest == nullptr) return {};
+  return farthest->name + " has " + fixed(way(*farthest), 1) + " " + farthest->unit +
+         " still to go to " + fixed_signed(farthest->target, 1) + " " + farthest->unit;
+}
+
 /// Adds degradations that do not stop the compensation.
 void add_degradations(const Status& status, std::vector<std::string>& why) {
   for (const AxisStatus& axis : status.axes) {
@@ -290,7 +304,8 @@ Verdict verdict(const Status& status) {
                 std::string(computes ? "all is read and computed" : mode.meaning),
             status.mode_since_s};
   }
-  if (is_compensating(status)) return {true, true, "yes", "", status.compensating_s};
+  if (is_compensating(status))
+    return {true, true, "yes", "", status.compensating_s, way_text(status.axes)};
   if (status.mode == Mode::compensating) {
     const auto idle = axes_not_driven(status);
     return {false, false, "no",

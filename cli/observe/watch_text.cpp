@@ -162,6 +162,8 @@ std::string reasons_text(const Status& status) {
   std::string result;
   for (const Reason reason : by_severity(status.reasons))
     result += (result.empty() ? "" : "; ") + std::string(code_text(reason).meaning);
+  const std::string way = is_compensating(status) ? verdict(status).advice : "";
+  if (!way.empty()) result += (result.empty() ? "" : "; ") + way;
   if (status.sensors_bad.empty()) return result;
   result += result.empty() ? "bad sensors:" : "; bad sensors:";
   for (const std::string& sensor : status.sensors_bad) result += ' ' + sensor;

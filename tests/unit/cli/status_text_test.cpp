@@ -305,6 +305,23 @@ TEST_CASE("a settling value is not reported as a fault", "[cli][status]") {
   CHECK_THAT(status_text(status, false), Contains("repair the sensor"));
 }
 
+TEST_CASE("an offset far from its target is on its way, which is no problem", "[cli][status]") {
+  Status status = good_status();
+  status.axes[0].target = -48.6;
+  status.axes[0].offset = -13.5;
+  status.axes[0].offset_sd_max = 5.0;
+  const std::string way = "z has 35.1 um still to go to -48.6 um";
+  CHECK_THAT(status_text(status, false),
+             Contains("yes, for 1 h 2 min: " + way) && Contains("Problems        : none"));
+  CHECK_THAT(watch_line(status, nullptr), Contains(way));
+  CHECK(why_not(status, true).empty());
+  status.axes[0].offset = -44.0;
+  CHECK_THAT(status_text(status, false), !Contains("still to go"));
+  status.axes[0].offset = -13.5;
+  status.axes[0].at_bound = true;
+  CHECK_THAT(status_text(status, false), !Contains("still to go"));
+}
+
 TEST_CASE("a model of zeros compensates nothing", "[cli][status]") {
   Status status = good_status();
   CHECK(why_not(status, false).empty());
