@@ -69,7 +69,7 @@ class Causes {
     switch (reason) {
       case Reason::block_lost:
       case Reason::block_estimated:
-        return !named_inputs_.empty() || only_settles();
+        return !named_inputs_.empty() || only_settles() || is_confirming();
       case Reason::signal_lost:  // signals come from the controller
         return has_reason(status_.reasons, Reason::controller_offline);
       case Reason::sensor_suspected:
@@ -90,6 +90,11 @@ class Causes {
   /// At start, no value has lasted long enough to count.
   [[nodiscard]] bool only_settles() const {
     return status_.mode == Mode::starting && status_.sensors_bad.empty();
+  }
+
+  [[nodiscard]] bool is_confirming() const {
+    const auto says_so = [](const std::string& text) { return text.starts_with(confirming); };
+    return std::any_of(status_.warnings.begin(), status_.warnings.end(), says_so);
   }
 
   void add_reasons(Severity severity) {

@@ -14,6 +14,9 @@ namespace thermocomp {
 /// axis driven, a model with non-zero coefficients.
 [[nodiscard]] bool is_compensating(const Status& status);
 
+/// Begins the daemon's warning that an input has no value yet because values are being confirmed.
+inline constexpr std::string_view confirming = "new values are being confirmed: ";
+
 struct Verdict {
   bool compensating{false};
   bool intended{false};  ///< not compensating on purpose: switched off, dry run

@@ -11,6 +11,8 @@
 
 #include "daemon/status/reference_rules.hpp"
 #include "status/codes.hpp"
+#include "status/figures.hpp"
+#include "status/verdict.hpp"
 
 namespace thermocomp {
 namespace {
@@ -381,6 +383,30 @@ std::optional<ProbeDueStatus> probe_due_of(const StatusView& view) {
   return due.axes.empty() ? std::nullopt : std::optional(due);
 }
 
+/// Says of each module which new values do not count yet, and until when.
+void add_confirmations(const StatusView& view, std::vector<std::string>& warnings) {
+  const std::vector<SensorReport>& reports = view.report.sensors;
+  std::map<std::string, std::vector<std::size_t>> modules;
+  for (std::size_t i = 0; i < reports.size(); ++i)
+    if (reports[i].settles()) modules[view.config.estimator.sensors[i].module].push_back(i);
+  for (const auto& [module, sensors] : modules) {
+    std::vector<std::string> names;
+    double settle_s = 0.0;
+    bool is_one_value = sensors.size() > 1 && !module.empty();
+    for (const std::size_t i : sensors) {
+      const SensorConfig& sensor = view.config.estimator.sensors[i];
+      names.push_back(sensor.name);
+      settle_s = std::max(settle_s, sensor.screening.settle_s);
+      is_one_value = is_one_value && reports[i].raw_degC == reports[sensors.front()].raw_degC;
+    }
+    warnings.push_back(std::string(confirming) + joined(names) +
+                       " count after settle_s = " + duration_text(settle_s) +
+                       (is_one_value ? ", and not while all channels of " + module +
+                                           " show one value, as a module that is not ready"
+                                     : ""));
+  }
+}
+
 }  // namespace
 
 void add_status_methods(StatusServer& server, const std::function<StatusView()>& view) {
@@ -451,6 +477,8 @@ Status status_of(const StatusView& view) {
       status.sensors_suspected.push_back({name, *suspicion});
   }
   for (const BusHealth& bus : view.buses) status.buses.push_back(bus_of(view, bus));
+  if (has_reason(view.report.reasons, Reason::block_lost) && view.report.mode != Mode::starting)
+    add_confirmations(view, status.warnings);
   return status;
 }
 

@@ -322,6 +322,16 @@ TEST_CASE("an offset far from its target is on its way, which is no problem", "[
   CHECK_THAT(status_text(status, false), !Contains("still to go"));
 }
 
+TEST_CASE("values that are being confirmed are the reason, not a lost sensor", "[cli][status]") {
+  Status status = good_status();
+  status.mode = Mode::holding;
+  status.reasons = only(Reason::block_lost);
+  CHECK_THAT(status_text(status, false), Contains("no good sensor left"));
+  status.warnings = {std::string(confirming) + "bed count after settle_s = 2 s"};
+  CHECK_THAT(status_text(status, false),
+             Contains("new values are being confirmed: bed") && !Contains("no good sensor left"));
+}
+
 TEST_CASE("a model of zeros compensates nothing", "[cli][status]") {
   Status status = good_status();
   CHECK(why_not(status, false).empty());
