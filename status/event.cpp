@@ -99,12 +99,20 @@ std::string lasted(double seconds) {
   return seconds < 60.0 ? fixed(seconds, 1) + " s" : duration_text(seconds);
 }
 
+/// A sensor's fault lasts until the value after it is confirmed: " with confirmation, -4.3 K
+/// since".
+std::string end_text(const Event& event) {
+  if (event.subject.kind != SubjectKind::sensor) return {};
+  return " with confirmation" +
+         (std::isnan(event.value) ? "" : ", " + fixed_signed(event.value, 1) + " K since");
+}
+
 std::string text_of_kind(const Event& event) {
   switch (event.kind) {
     case EventKind::fault:
       return fault_text(event);
     case EventKind::recovery:
-      return fault_text(event) + ": over, lasted " + lasted(event.duration_s);
+      return fault_text(event) + ": over, lasted " + lasted(event.duration_s) + end_text(event);
     case EventKind::mode:
       if (event.subject.name.empty()) return event.code;
       return event.subject.name + " -> " + event.code + ", after " + lasted(event.duration_s);

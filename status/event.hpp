@@ -81,11 +81,12 @@ struct Event {
   EventKind kind{EventKind::daemon};
   Subject subject{};
   /// Name of the reason, fault, mode, command or CAN state, or a fixed word: "suspected",
-  /// "mismatch_latched", "not_connected", "not_written", "estimated", "lost", "uncertain",
-  /// "not_taken"; of the daemon "started", "stopping", "history".
+  /// "mismatch_latched", "not_connected", "not_written", "estimated", "lost",
+  /// "uncertain", "not_taken"; of the daemon "started", "stopping", "history".
   std::string code{};
   std::string detail{};  ///< text of a device, driver or signal; may be empty
-  /// suspected: error of the sensor [K]; commands `measured` and `prove`: [um]; NaN: none
+  /// suspected: error of the sensor [K]; recovery of a sensor: change over the fault where it is
+  /// more than rate_allowance_K [K]; commands `measured` and `prove`: [um]; NaN: none
   double value{std::numeric_limits<double>::quiet_NaN()};
   /// recovery: duration of the fault [s]; mode: duration of the previous one [s]; "started", from a
   /// history: time without a daemon before it [s]; else NaN

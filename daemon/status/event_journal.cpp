@@ -55,12 +55,13 @@ bool EventJournal::fault(Event fault) {
   return true;
 }
 
-double EventJournal::recovery(const Subject& subject, std::chrono::nanoseconds hold) {
+double EventJournal::recovery(const Subject& subject, std::chrono::nanoseconds hold, double value) {
   const auto found = outages_.find(subject);
   if (found == outages_.end() || found->second.away_since)
     return std::numeric_limits<double>::quiet_NaN();
   Outage& outage = found->second;
   outage.away_since = now_().monotonic;
+  if (!std::isnan(value)) outage.newest.value = value;
   outage.hold = hold;
   if (outage.comes_and_goes) outage.hold = std::max<std::chrono::nanoseconds>(hold, returns_within);
   return outage.hold > std::chrono::nanoseconds{} ? std::numeric_limits<double>::quiet_NaN()

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -40,8 +41,10 @@ class EventJournal {
   bool fault(Event fault);
   /// The subject has no fault; no effect if it had none.
   /// @param hold  time without a fault after which the outage ends
+  /// @param value  of the end's event; NaN: that of the fault
   /// @return how long the outage lasted [s] if its end became an event, else NaN
-  double recovery(const Subject& subject, std::chrono::nanoseconds hold = {});
+  double recovery(const Subject& subject, std::chrono::nanoseconds hold = {},
+                  double value = std::numeric_limits<double>::quiet_NaN());
   /// Ends outages whose faults have stayed away long enough; to be called often.
   /// @return the events
   std::vector<Event> settle();

@@ -1,5 +1,6 @@
 #include "daemon/status/event_log.hpp"
 
+#include <cmath>
 #include <utility>
 
 #include <spdlog/spdlog.h>
@@ -126,6 +127,7 @@ void EventLog::note_reason(Reason reason, bool is_given) {
 
 void EventLog::note_sensors(const Report& report, const EstimatorConfig& config) {
   faults_.resize(report.sensors.size(), Fault::none);
+  good_degC_.resize(report.sensors.size(), not_a_number);
   clipping_.resize(report.sensors.size(), false);
   suspected_.resize(report.sensors.size(), false);
   for (std::size_t i = 0; i < report.sensors.size(); ++i) {
@@ -135,11 +137,17 @@ void EventLog::note_sensors(const Report& report, const EstimatorConfig& config)
       const Subject subject{SubjectKind::sensor, config.sensors[i].name};
       if (sensor.fault != Fault::none) {
         note_fault({.subject = subject, .code = std::string(to_string(sensor.fault))});
-      } else if (const double lasted_s = journal_.recovery(subject); lasted_s >= 0.0) {
-        spdlog::info("sensor {}: good again after {:.1f} s", subject.name, lasted_s);
+      } else {
+        // A change within the noise of a step is no news.
+        const double change_K = sensor.raw_degC - good_degC_[i];
+        const bool is_news = std::abs(change_K) > config.sensors[i].screening.rate_allowance_K;
+        const double lasted_s = journal_.recovery(subject, {}, is_news ? change_K : not_a_number);
+        if (lasted_s >= 0.0)
+          spdlog::info("sensor {}: good again after {:.1f} s", subject.name, lasted_s);
       }
       faults_[i] = sensor.fault;
     }
+    if (sensor.fault == Fault::none) good_degC_[i] = sensor.raw_degC;
     note_suspicion(i, sensor, config.sensors[i].name);
     const bool clipping = sensor.clipped_in_a_row >= clipped_in_a_row_news;
     if (clipping && !clipping_[i])

@@ -61,6 +61,7 @@ class EventLog {
   std::uint32_t reasons_{0};  ///< reported and not over
   std::vector<bool> suspected_;
   std::vector<Fault> faults_;
+  std::vector<double> good_degC_;  ///< value of the last report without a fault
   std::vector<bool> clipping_;
   std::vector<std::string> input_states_;
   std::vector<bool> latched_;

@@ -2,6 +2,7 @@
 #include "daemon/status/event_log.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <sstream>
 
 #include <catch2/catch.hpp>
@@ -64,6 +65,30 @@ TEST_CASE("a suspected sensor is a fault with its size, and recovers", "[daemon]
   const auto reason = bench.about("reason sensor_suspected");
   REQUIRE(reason.size() == 2);
   CHECK(reason[1].duration_s == Approx(60.0));
+}
+
+TEST_CASE("the end of a sensor's outage has the change over it where that is more than noise",
+          "[daemon][events]") {
+  const auto [after_degC, change_K] =
+      GENERATE(std::pair(23.7, -4.3), std::pair(28.9, not_a_number));
+  Bench bench;
+  bench.report.sensors[0] = {.raw_degC = 28.0, .fault = Fault::none};
+  bench.pass(1s);
+  bench.pass(20s);
+  bench.report.sensors[0] = {.fault = Fault::no_answer};
+  bench.pass(6s);
+  bench.report.sensors[0] = {.raw_degC = after_degC, .fault = Fault::unconfirmed, .waiting = true};
+  bench.pass(2s);
+  bench.report.sensors[0] = {.raw_degC = after_degC, .fault = Fault::none};
+  bench.pass(1s);
+  const Event end = bench.about("sensor bed").back();
+  CHECK(end.kind == EventKind::recovery);
+  CHECK(end.code == "no_answer");
+  CHECK(end.duration_s == Approx(3.0));
+  if (std::isnan(change_K))
+    CHECK(std::isnan(end.value));
+  else
+    CHECK(end.value == Approx(change_K));
 }
 
 TEST_CASE("a target that oscillates about its bound is one outage", "[daemon][events]") {

@@ -24,7 +24,12 @@ TEST_CASE("each kind of event has its text", "[status][events]") {
   CHECK(event_text(fault) == "sensor bed: the unit does not answer");
   fault.kind = EventKind::recovery;
   fault.duration_s = 28.04;
-  CHECK(event_text(fault) == "sensor bed: the unit does not answer: over, lasted 28.0 s");
+  CHECK(event_text(fault) ==
+        "sensor bed: the unit does not answer: over, lasted 28.0 s with confirmation");
+  fault.value = -4.31;
+  CHECK(
+      event_text(fault) ==
+      "sensor bed: the unit does not answer: over, lasted 28.0 s with confirmation, -4.3 K since");
   const Event mode{.kind = EventKind::mode,
                    .subject = {SubjectKind::nothing, "compensating"},
                    .code = "holding",
