@@ -20,6 +20,7 @@
 
 #include "daemon/cycle/real_time_thread.hpp"
 #include "daemon/system/log_setup.hpp"
+#include "status/figures.hpp"
 
 namespace thermocomp {
 
@@ -147,6 +148,8 @@ void Supervisor::note_report() {
   if (report.mode != Mode::compensating || !all_driven) idle_until_ = Clock::now();
   if (trend_.is_due(report.now))
     trend_.note(report.now, parts_.config.model.temperature_columns(), report.inputs);
+  frozen_modules_.note(report, parts_.config.estimator);
+  events_.note_frozen(frozen_modules_.frozen_s());
   since_probing_.note(report.axes, parts_.config.model_checksum);
   if (!warm_up_.is_due(report.now)) return;
   std::vector<double> displacement_um;
@@ -239,6 +242,10 @@ StatusView Supervisor::view() {
   const HistoryStatistics statistics =
       parts_.history != nullptr ? parts_.history->statistics() : HistoryStatistics{};
   if (!statistics.last_error.empty()) all.push_back(statistics.last_error);
+  for (const auto& [module, same_s] : frozen_modules_.frozen_s())
+    all.push_back("device " + module + ": the same values for " + duration_text(same_s) +
+                  ", up and down before: frozen? compare with a hand-held thermometer, switch "
+                  "the device off and on");
   StatusView view{
       parts_.config,
       parts_.cycle.report(),

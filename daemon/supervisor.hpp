@@ -11,6 +11,7 @@
 #include "daemon/operations.hpp"
 #include "daemon/socket/status_server.hpp"
 #include "daemon/status/event_log.hpp"
+#include "daemon/status/frozen_modules.hpp"
 #include "daemon/status/status_view.hpp"
 #include "daemon/status/warm_up.hpp"
 #include "daemon/system/service_manager.hpp"
@@ -92,6 +93,7 @@ class Supervisor {
   TemperatureTrend trend_;
   WarmUp warm_up_;
   SinceProbing since_probing_;
+  FrozenModules frozen_modules_;
   std::vector<std::string> warnings_;
   bool real_time_{false};
   Clock::time_point started_{Clock::now()};

@@ -81,7 +81,7 @@ struct Event {
   EventKind kind{EventKind::daemon};
   Subject subject{};
   /// Name of the reason, fault, mode, command or CAN state, or a fixed word: "suspected",
-  /// "mismatch_latched", "not_connected", "not_written", "estimated", "lost",
+  /// "mismatch_latched", "not_connected", "frozen", "not_written", "estimated", "lost",
   /// "uncertain", "not_taken"; of the daemon "started", "stopping", "history".
   std::string code{};
   std::string detail{};  ///< text of a device, driver or signal; may be empty

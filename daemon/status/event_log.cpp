@@ -220,6 +220,20 @@ void EventLog::note_state(const Subject& subject, bool connected, const std::str
     spdlog::info("{}: none again after {:.1f} s", subject_text(subject), lasted_s);
 }
 
+void EventLog::note_frozen(const std::map<std::string, double>& frozen_s) {
+  std::erase_if(frozen_, [&](const std::string& module) {
+    if (frozen_s.contains(module)) return false;
+    if (const double lasted_s = journal_.recovery({SubjectKind::device, module}); lasted_s >= 0.0)
+      spdlog::info("device {}: its values change again after {:.1f} s", module, lasted_s);
+    return true;
+  });
+  for (const auto& [module, same_s] : frozen_s)
+    if (frozen_.insert(module).second)
+      note_fault({.subject = {SubjectKind::device, module},
+                  .code = "frozen",
+                  .detail = "the same values, up and down before: frozen?"});
+}
+
 void EventLog::note_bus(const BusHealth& bus) {
   note_link({SubjectKind::bus, bus.name}, bus.connected, bus.last_error);
   note_state({SubjectKind::bus_errors, bus.name}, bus.connected, bus.state);

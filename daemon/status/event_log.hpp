@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <map>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -29,6 +30,8 @@ class EventLog {
   /// @param columns  names of the report's inputs
   void note_estimates(const Report& report, const EstimatorConfig& config,
                       const std::vector<std::string>& columns);
+  /// @param frozen_s  by module, see FrozenModules
+  void note_frozen(const std::map<std::string, double>& frozen_s);
   void note_bus(const BusHealth& bus);
   void note_controller(const ControllerHealth& controller);
   /// @param messages  HistoryWriter::take_messages()
@@ -66,6 +69,7 @@ class EventLog {
   std::vector<std::string> input_states_;
   std::vector<bool> latched_;
   bool uncertain_{false};
+  std::set<std::string> frozen_;  ///< modules
   std::map<Subject, bool> connected_;
   std::map<Subject, std::string> states_;  ///< of CAN interfaces
   std::uint64_t lost_{0};                  ///< records of the history

@@ -91,6 +91,18 @@ TEST_CASE("the end of a sensor's outage has the change over it where that is mor
     CHECK(end.value == Approx(change_K));
 }
 
+TEST_CASE("a frozen module is a fault of its device, and recovers", "[daemon][events]") {
+  Bench bench;
+  bench.log.note_frozen({{"m1", 60.0}});
+  bench.log.note_frozen({{"m1", 75.0}});
+  bench.pass(30s);
+  bench.log.note_frozen({});
+  const auto reported = bench.about("device m1");
+  REQUIRE(reported.size() == 2);
+  CHECK(reported[0].code == "frozen");
+  CHECK(reported[1].duration_s == Approx(30.0));
+}
+
 TEST_CASE("a target that oscillates about its bound is one outage", "[daemon][events]") {
   Bench bench;
   for (int i = 0; i < 100; ++i) {
