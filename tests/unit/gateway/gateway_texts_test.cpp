@@ -181,6 +181,13 @@ TEST_CASE("the page uses the texts of thermocomp status", "[gateway][page]") {
   CHECK(state["verdict"]["answer"] == "yes");
   CHECK(state["verdict"]["since_s"].is_null());
   CHECK(state["verdict"]["level"] == "good");
+  CHECK(state["verdict"]["advice"] == "");
+  AxisStatus& axis = snapshot.status.axes[0];
+  axis.offset_sd_max = 5.0;
+  axis.target = axis.offset + 35.0;
+  state = page_state(snapshot, "mill");
+  CHECK_THAT(state["verdict"]["advice"].get<std::string>(), Catch::Contains("35.0 um still to go"));
+  CHECK(state["verdict"]["level"] == "good");
   snapshot.status.mode = Mode::holding;
   snapshot.status.reasons = static_cast<std::uint32_t>(Reason::block_lost);
   state = page_state(snapshot, "mill");
