@@ -17,8 +17,9 @@ constexpr std::size_t header_rows_max = 10;
 constexpr std::size_t columns_max = 1024;  // as in our own form
 constexpr double values_share_min = 0.2;
 
-/// Splits a line; a quoted field may contain the separator and doubled quotes.
-/// @return false for an unclosed quote or text after a closing one
+/// Splits a line; a quoted field may contain the separator and doubled quotes. A quote with text
+/// behind it is a part of its field: "AI".Bed.
+/// @return false for an unclosed quote
 bool split(std::string_view line, char separator, std::vector<std::string_view>& fields) {
   fields.clear();
   if (separator == ' ') {
@@ -32,24 +33,24 @@ bool split(std::string_view line, char separator, std::vector<std::string_view>&
   for (bool more = true; more;) {
     std::string_view start = line;
     while (!start.empty() && start.front() == ' ') start.remove_prefix(1);
-    if (start.empty() || start.front() != '"') {
+    auto end = start.starts_with('"') ? start.find('"', 1) : 0;
+    while (end > 0 && end != std::string_view::npos && start.substr(end).starts_with("\"\""))
+      end = start.find('"', end + 2);
+    if (end == std::string_view::npos) {
+      fields.push_back(start);
+      return false;
+    }
+    std::string_view behind = start.substr(std::min(end + 1, start.size()));
+    while (!behind.empty() && behind.front() == ' ') behind.remove_prefix(1);
+    if (end == 0 || (!behind.empty() && behind.front() != separator)) {
       std::string_view field;
       more = line.find(separator) != std::string_view::npos;
       static_cast<void>(take(line, separator, field));
       fields.push_back(trimmed(field));
       continue;
     }
-    auto end = start.find('"', 1);
-    while (end != std::string_view::npos && start.substr(end).starts_with("\"\""))
-      end = start.find('"', end + 2);
-    if (end == std::string_view::npos) {
-      fields.push_back(start);
-      return false;
-    }
     fields.push_back(trimmed(start.substr(1, end - 1)));
-    line = start.substr(end + 1);
-    while (!line.empty() && line.front() == ' ') line.remove_prefix(1);
-    if (!line.empty() && line.front() != separator) return false;
+    line = behind;
     more = !line.empty();
     if (more) line.remove_prefix(1);
   }
@@ -274,20 +275,17 @@ class TableReader {
       fields.resize(cut_.fields);
   }
 
-  /// Allows most rows to omit the header's last columns, such as a serial number in the first row.
+  /// Allows most rows to omit the last column, a serial number that is only in the first row.
   void widen_to_header() {
-    constexpr std::size_t left_out_max = 3;
-    const std::size_t usual = cut_.fields;
-    for (std::size_t i = 0; i < cut_.begin; ++i) {
-      const std::size_t names = fields_of(i).size();
-      if (names <= usual || names > usual + left_out_max || !is_all_words(i)) continue;
-      const bool has_full_row = fields_of(i + 1).size() == names && i + 1 < cut_.begin;
-      if (!has_full_row || is_all_words(i + 1)) continue;
-      narrowest_ = usual;
-      cut_.fields = names;
-      cut_.begin = i;
+    if (cut_.separator == ' ' || cut_.begin < 2) return;
+    const std::size_t line = cut_.begin - 2;
+    const Fields names = fields_of(line);
+    if (names.size() != cut_.fields + 1 || !names.back().starts_with("Serial") ||
+        !is_all_words(line) || fields_of(line + 1).size() != names.size())
       return;
-    }
+    narrowest_ = cut_.fields;
+    cut_.fields = names.size();
+    cut_.begin = line;
   }
 
   bool is_all_words(std::size_t line) {
@@ -395,14 +393,16 @@ class TableReader {
         break;
       }
     }
-    if (!names && row_begin_ > 0 && fits_another_count(row_begin_ - 1)) names = row_begin_ - 1;
+    const bool has_given = map_ != nullptr && !map_->names.empty();
+    if (!names && row_begin_ > 0 && !has_given && is_all_words(row_begin_ - 1))
+      names = row_begin_ - 1;
     if (cut_.fields > columns_max) {
       problems_.add(lines_[row_begin_ < lines_.size() ? row_begin_ : 0].number, "columns",
                     std::to_string(cut_.fields), "must be at most " + std::to_string(columns_max));
       return false;
     }
     if (names) {
-      take_names(*names);
+      if (!take_names(*names)) return false;
     } else if (!take_commented_names() && !take_given_names()) {
       return false;
     } else if (row_begin_ > 0 && !is_all_words(row_begin_ - 1)) {
@@ -414,10 +414,18 @@ class TableReader {
     return names_are_clear();
   }
 
-  /// Names for additional columns at the end, or for all columns but the first.
-  bool fits_another_count(std::size_t line) {
-    const std::size_t count = fields_of(line).size();
-    return count >= 2 && count + 1 >= cut_.fields && is_all_words(line);
+  /// Whether the first column of the rows is a time, or counts them.
+  bool begins_with_count_or_time() {
+    std::optional<double> last;
+    for (std::size_t i = row_begin_; i < judged(); ++i) {
+      const Fields fields = fields_of(i);
+      if (fields.size() != cut_.fields) continue;
+      if (shown_by(fields[0]) == Shows::time) return true;
+      const auto number = finite_number(fields[0]);
+      if (!number || (last ? *number != *last + 1 : *number != 0 && *number != 1)) return false;
+      last = number;
+    }
+    return true;
   }
 
   static std::string more_lines(std::size_t count) {
@@ -425,18 +433,29 @@ class TableReader {
     return " and " + std::to_string(count) + (count == 1 ? " more line" : " more lines");
   }
 
-  void take_names(std::size_t line) {
+  bool take_names(std::size_t line) {
     Fields fields = fields_of(line);
-    table_.has_header = true;
-    table_.header_line = lines_[line].number;
+    while (fields.size() > cut_.fields && fields.back().empty()) fields.pop_back();
     if (fields.size() + 1 == cut_.fields) {
       const Fields row = fields_of(row_begin_);
       if (row.size() == cut_.fields && row.back().empty())
         fields.emplace_back();  // a separator at the end of each row
-      else
+      else if (begins_with_count_or_time())
         fields.insert(fields.begin(), std::string_view());
     }
-    fields.resize(cut_.fields);
+    if (fields.empty()) {
+      problems_.add(lines_[line].number, "", lines_[line].text, "has a quote that is not closed");
+      return false;
+    }
+    if (fields.size() != cut_.fields) {
+      problems_.add(lines_[line].number, "", std::to_string(fields.size()) + " names",
+                    "must be one for each of the " + std::to_string(cut_.fields) +
+                        " fields of the rows below: write names = [\"time_s\", \"t1_degC\", ...] "
+                        "in the file of --columns");
+      return false;
+    }
+    table_.has_header = true;
+    table_.header_line = lines_[line].number;
     for (const std::string_view field : fields) table_.header.push_back(unquoted(field));
     header_text_ = lines_[line].text;
     if (line > 0)
@@ -448,6 +467,7 @@ class TableReader {
       table_.notes.push_back("between the header and the first row left out: '" +
                              shortened(lines_[row_begin_ - 1].text) + "'" +
                              more_lines(between - 1));
+    return true;
   }
 
   /// "# time t1 z": names in the last comment before rows without a header.

@@ -1,21 +1,30 @@
-#include <cctype>
+#include <algorithm>
+#include <map>
 
 #include "config/run_forms/field_text.hpp"
 #include "config/run_forms/log_form.hpp"
-#include "config/run_forms/number_form.hpp"
+#include "config/run_forms/spelled_unit.hpp"
 #include "config/run_forms/time_stamp.hpp"
+#include "config/text/printable_text.hpp"
 
 namespace thermocomp::forms {
 namespace {
 
 struct Labelled {
   std::string time;
-  std::vector<std::pair<std::string, std::string>> values;  ///< name and number, maybe with unit
+  std::vector<std::pair<std::string, std::string>> values;  ///< name and its number or word
+  [[nodiscard]] bool has_number() const {
+    return std::any_of(values.begin(), values.end(),
+                       [](const auto& value) { return looks_like_number(value.second); });
+  }
 };
 
-bool is_name(char c) {
-  return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '@' || c == '.';
-}
+/// One time of the log with its values, which may stand in several lines.
+struct LabelledRow {
+  std::string time;
+  int line{0};
+  std::vector<std::string> values;
+};
 
 /// Takes the leading time off a line: in brackets, or the longest prefix that is a time.
 std::string take_time(std::string_view& line) {
@@ -43,25 +52,44 @@ std::string take_time(std::string_view& line) {
   return found;
 }
 
-/// Parses "T:25.00 /0.00", "T1: 10.0 degC", "temp=22.1".
+/// The number or word at the start of `text`: "-0.5um", "20,5", "- 0.6"; of "25.00/0.00" the first.
+std::string_view first_word(std::string_view text) {
+  std::size_t end = std::min(text.find_first_not_of("+- "), text.size());
+  if (end == text.size() || !is_digit(text[end])) end = 0;
+  for (; end < text.size(); ++end) {
+    const char next = end + 1 < text.size() ? text[end + 1] : ' ';
+    if (std::string_view(" \t;)]}|").find(text[end]) != std::string_view::npos) break;
+    if (text[end] == ',' && !is_digit(next)) break;
+    if (text[end] == '/' && (is_digit(next) || next == ' ')) break;
+  }
+  return text.substr(0, end);
+}
+
+/// The unit after a number, unless it is the name of the next value: "20.5 A = 3".
+std::string_view unit_after(std::string_view rest) {
+  if (!rest.starts_with(' ')) return {};
+  rest = trimmed(rest);
+  const std::string_view unit = rest.substr(0, rest.find_first_of(" ,;)\t"));
+  rest = trimmed(rest.substr(unit.size()));
+  return rest.starts_with('=') || rest.starts_with(':') ? std::string_view() : unit;
+}
+
+/// Parses "T:25.00 /0.00", "T1: 10.0 degC", "temp = 22,1".
 Labelled labelled_of(std::string_view line) {
   Labelled found;
   found.time = take_time(line);
   for (std::size_t i = 0; i < line.size(); ++i) {
-    if ((line[i] != ':' && line[i] != '=') || i == 0 || !is_name(line[i - 1])) continue;
-    std::size_t begin = i;
-    while (begin > 0 && is_name(line[begin - 1])) --begin;
-    const std::string name(line.substr(begin, i - begin));
-    std::string_view rest = trimmed(line.substr(i + 1));
-    const std::string_view word = rest.substr(0, rest.find_first_of(" ,;)/\t"));
-    if (!finite_number(word) || finite_number(name)) continue;
-    rest = rest.substr(word.size());
-    const bool has_unit = rest.starts_with(' ');
-    const std::string_view unit =
-        has_unit ? trimmed(rest).substr(0, trimmed(rest).find_first_of(" ,;)\t")) : "";
-    const std::string both = std::string(word) + " " + std::string(unit);
-    found.values.emplace_back(name,
-                              number_text_of(both).unit != nullptr ? both : std::string(word));
+    if (line[i] != ':' && line[i] != '=') continue;
+    std::string_view name = trimmed(line.substr(0, i));
+    if (name.ends_with('"')) name.remove_suffix(1);
+    name.remove_prefix(name.find_last_of(" \t,;:=()[]{}|/\"") + 1);
+    const std::string_view word = first_word(trimmed(line.substr(i + 1)));
+    if (name.empty() || word.empty() || finite_number(name)) continue;
+    std::string value(word);
+    const auto end = static_cast<std::size_t>(word.data() + word.size() - line.data());
+    const std::string with_unit = value + " " + std::string(unit_after(line.substr(end)));
+    if (number_text_of(with_unit).unit != nullptr) value = with_unit;
+    found.values.emplace_back(name, std::move(value));
   }
   return found;
 }
@@ -77,46 +105,61 @@ bool is_labelled(std::string_view text) {
     if (trimmed(line).empty()) continue;
     ++lines;
     const Labelled found = labelled_of(line);
-    if (!found.time.empty() && !found.values.empty()) ++labelled;
+    if (!found.time.empty() && found.has_number()) ++labelled;
   }
   return labelled > 0 && 2 * labelled >= lines;
 }
 
 PlainTable plain_labelled(const Log& log) {
+  std::map<std::string, bool> has_number;
+  for (std::string_view rest = log.text; !rest.empty();)
+    for (const auto& [name, value] : labelled_of(take_line(rest)).values)
+      has_number[name] |= looks_like_number(value);
   std::vector<std::string> names;
-  std::vector<std::pair<std::string, std::vector<std::string>>> rows;
-  std::string_view rest = log.text;
+  std::vector<LabelledRow> rows;
   std::size_t left_out = 0;
-  while (!rest.empty()) {
-    const Labelled found = labelled_of(take_line(rest));
+  std::string_view rest = log.text;
+  for (int line = 1; !rest.empty(); ++line) {
+    Labelled found = labelled_of(take_line(rest));
+    std::erase_if(found.values, [&](const auto& value) { return !has_number.at(value.first); });
     if (found.time.empty() || found.values.empty()) {
       ++left_out;
       continue;
     }
     // Lines of equal time form one row.
-    if (rows.empty() || rows.back().first != found.time)
-      rows.emplace_back(found.time, std::vector<std::string>(names.size()));
-    std::vector<std::string>& row = rows.back().second;
+    if (rows.empty() || rows.back().time != found.time) rows.push_back({found.time, line, {}});
+    std::vector<std::string>& row = rows.back().values;
     for (const auto& [name, value] : found.values) {
-      std::size_t i = 0;
-      while (i < names.size() && names[i] != name) ++i;
+      const auto i =
+          static_cast<std::size_t>(std::find(names.begin(), names.end(), name) - names.begin());
       if (i == names.size()) names.push_back(name);
       row.resize(names.size());
+      if (!row[i].empty() && row[i] != value)
+        log.refuse(line, name, value,
+                   "must be there once at a time, under a name of one word; an earlier value of "
+                   "that time is " +
+                       shortened(row[i]));
       row[i] = value;
     }
   }
   PlainTable table;
+  table.lines_above = -1;
   table.text = "time";
   for (const std::string& name : names) table.text.append(",").append(in_quotes(name));
-  for (auto& [time, row] : rows) {
-    row.resize(names.size());
-    table.text.append("\n").append(in_quotes(time));
-    for (const std::string& value : row) table.text.append(",").append(in_quotes(value));
+  int line = 0;
+  for (LabelledRow& row : rows) {
+    row.values.resize(names.size());
+    // Empty lines keep the log's line numbers.
+    table.text.append(static_cast<std::size_t>(row.line - line), '\n').append(in_quotes(row.time));
+    for (const std::string& value : row.values) table.text.append(",").append(in_quotes(value));
+    line = row.line;
   }
   table.text += '\n';
   table.notes.emplace_back("lines of a time and named values");
   if (left_out > 0)
     table.notes.push_back(std::to_string(left_out) + " lines without these left out");
+  for (const auto& [name, is_number] : has_number)
+    if (!is_number) table.notes.push_back("'" + name + "' left out: no value of it is a number");
   return table;
 }
 

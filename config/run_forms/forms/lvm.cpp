@@ -43,6 +43,8 @@ PlainTable plain_lvm(const Log& log) {
   }
   if (rows.empty()) log.refuse(line, "X_Value", "(missing)", "must head the rows of an LVM file");
   PlainTable table;
+  const bool has_comments = names.back() == "Comment";  // most rows omit it
+  if (has_comments) names.pop_back();
   const auto key = [&](const char* name, std::size_t i) {
     const auto found = keys.find(name);
     return found == keys.end() || i >= found->second.size() ? std::string() : found->second[i];
@@ -55,7 +57,14 @@ PlainTable plain_lvm(const Log& log) {
     table.text += with_unit(names[i], i == 0 ? "s" : key("Y_Unit_Label", i));
   }
   table.lines_above = names_line - 1 - (zero_s ? 1 : 0);
-  table.text.append("\n").append(rows);
+  while (!rows.empty()) {
+    const std::string_view row = take_line(rows);
+    std::size_t end = has_comments ? 0 : std::string_view::npos;
+    for (std::size_t i = 0; i < names.size() && end != std::string_view::npos; ++i)
+      end = row.find(separator, i == 0 ? 0 : end + 1);
+    table.text.append("\n").append(row.substr(0, end));
+  }
+  if (has_comments) table.notes.emplace_back("'Comment' left out");
   table.notes.emplace_back("LVM of LabVIEW: names in line " + std::to_string(names_line));
   return table;
 }
