@@ -16,7 +16,7 @@ void read_column(const TomlTable& table, const std::string& key, ColumnMap& map)
     if (!entry) return;
     column.name = entry.text("name");
     column.unit = entry.text("unit", "");
-    if (!column.unit.empty() && spelled_unit(column.unit) == nullptr)
+    if (!column.unit.empty() && !unit_with_factor(column.unit))
       entry.problem("unit", "is not a known unit; docs/run_files.md lists them");
   }
   if (!is_column_name(column.name)) table.problem(key, column.name, column_name_rule);
@@ -58,9 +58,9 @@ ColumnMap parse_column_map(const std::string& text, const std::string& name) {
   if (root.has("period_s")) map.period_s = root.number("period_s", Range::above(0));
   if (root.has("scan_s")) map.scan_s = root.number("scan_s", Range::above(0));
   map.missing = root.texts("missing", {});
-  const Names<std::string> units{{"ns", "ns"},   {"us", "us"},       {"ms", "ms"},
-                                 {"s", "s"},     {"min", "min"},     {"h", "h"},
-                                 {"day", "day"}, {"hh:mm", "hh:mm"}, {"mm:ss", "mm:ss"}};
+  const Names<std::string> units{
+      {"ns", "ns"}, {"us", "us"},   {"ms", "ms"},       {"s", "s"},         {"min", "min"},
+      {"h", "h"},   {"day", "day"}, {"hh:mm", "hh:mm"}, {"mm:ss", "mm:ss"}, {"hhmmss", "hhmmss"}};
   map.time_unit = root.choice<std::string>("time_unit", units, "");
   map.ignored = root.texts("ignore", {}, true);  // "": without a name
   const TomlTable columns = root.table_or_empty("columns");

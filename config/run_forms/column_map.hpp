@@ -12,7 +12,8 @@ namespace thermocomp {
 
 struct MappedColumn {
   std::string name;  ///< our name, with our unit: "z_um"
-  std::string unit;  ///< the file's unit, "mm"; empty: as in the header, or as in `name`
+  std::string
+      unit;  ///< the file's unit, "mm", "0.1 degC"; empty: as in the header, or as in `name`
 };
 
 enum class DateOrder { unknown, day_month_year, month_day_year, year_month_day };
@@ -25,7 +26,8 @@ struct ColumnMap {
   int header_line{0};             ///< counted from 1; 0: the first line that is not a comment
   DateOrder date_order{DateOrder::unknown};
   std::vector<std::string> time;  ///< column, or columns of date and time; empty: detected
-  std::string time_unit;  ///< "s", "ms", "us", "ns", "min", "h", "day", "hh:mm", "mm:ss" or empty
+  std::string
+      time_unit;  ///< "s", "ms", "us", "ns", "min", "h", "day", "hh:mm", "mm:ss", "hhmmss" or empty
   std::vector<std::string> names;  ///< column names of a table without a header
   std::optional<double> period_s;  ///< row period of a table without time
   std::vector<std::string> pivot;  ///< columns with a series' name and, optionally, its value

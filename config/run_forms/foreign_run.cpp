@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <set>
+#include <tuple>
 
 #include "config/run_forms/log_form.hpp"
 #include "config/run_forms/long_table.hpp"
@@ -14,7 +14,6 @@
 #include "config/run_forms/spelled_unit.hpp"
 #include "config/run_forms/text_table.hpp"
 #include "config/run_forms/time_column.hpp"
-#include "config/run_forms/time_stamp.hpp"
 #include "config/text/printable_text.hpp"
 #include "config/text/units.hpp"
 #include "config/toml/toml_reader.hpp"
@@ -30,6 +29,10 @@ constexpr auto missing_words = std::to_array<std::string_view>(
      "burnout",  "unavailable", "unknown", "error", "no data",      "bad",      "invalid",
      "#div/0!",  "#value!",     "undef",   "n.a.",  "disconnected", "over",     "under",
      "no value", "nodata",      "logged",  "nan"});
+
+/// Outside, a temperature is a sign of a fault, such as -9999.
+constexpr double degC_min = -273.15;
+constexpr double degC_max = 2500.0;
 
 /// The target of a column of the file.
 struct Meaning {
@@ -50,6 +53,15 @@ std::string example_name(std::string_view base) {
 
 std::string own_name(const SpelledName& spelled) {
   return plain_name(spelled.base).append(spelled.known->suffix);
+}
+
+/// "ΔT", "dT bed-head", "Temp diff", "rise above ambient".
+bool names_difference(std::string name) {
+  if (name.starts_with("dT")) return true;
+  for (char& c : name) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  for (const std::string_view word : {"Δ", "∆", "delta", "diff", "rise"})
+    if (name.find(word) != std::string::npos) return true;
+  return false;
 }
 
 std::optional<double> switch_word(std::string_view field) {
@@ -134,18 +146,28 @@ class ForeignReader {
     for (std::size_t i = 0; i < table_.columns(); ++i) {
       units_.push_back(spelled_name(table_.header[i]).unit);
       if (units_[i].empty() && !table_.units.empty()) units_[i] = table_.units[i];
-      for (std::size_t row = 0; row < table_.rows() && units_[i].empty(); ++row) {
-        const SpelledUnit* unit = number_text_of(table_.field(row, i)).unit;
-        if (unit != nullptr) units_[i] = unit->spelling;
-      }
+      if (units_[i].empty()) units_[i] = unit_of_cells(i);
     }
+  }
+
+  /// The first unit of a column's cells, if each number has one: in "80.6 A" below 20.5 the A may
+  /// be a flag.
+  [[nodiscard]] std::string_view unit_of_cells(std::size_t column) const {
+    std::string_view first;
+    for (std::size_t row = 0; row < table_.rows(); ++row) {
+      const std::string_view field = table_.field(row, column);
+      const SpelledUnit* unit = number_text_of(field).unit;
+      if (unit == nullptr && looks_like_number(field)) return {};
+      if (first.empty() && unit != nullptr) first = unit->spelling;
+    }
+    return first;
   }
 
   /// Pivots a long table; reverses rows in descending order.
   void order_rows(TimeColumns& time, std::vector<double>& time_s) {
     if (const auto form = long_form(table_, time, time_s, map_, problems_)) {
       const double scan_s = map_ == nullptr ? 0.0 : map_->scan_s;
-      run_.understood.push_back(pivot(table_, time_s, *form, scan_s, problems_));
+      run_.understood.push_back(pivot(table_, time, time_s, *form, scan_s, problems_));
       if (!problems_.empty()) return;
       const double first = time_s.front();  // the earliest, which is 0
       if (first < 0)
@@ -342,10 +364,16 @@ class ForeignReader {
       spelled.unit = units_[i];
       spelled.known = spelled_unit(units_[i]);
     }
-    if (map_ != nullptr) {
-      const auto mapped = map_->columns.find(header);
-      if (mapped != map_->columns.end()) return mapped_meaning(i, mapped->second, spelled);
+    const bool is_mapped_with_unit = is_mapped(header) && !map_->columns.at(header).unit.empty();
+    if (spelled.known != nullptr && spelled.known->offset != 0.0 && !is_mapped_with_unit &&
+        spelled.known->suffix == "_degC" && names_difference(spelled.base)) {
+      refuse(i, "may be a difference of temperatures: write " + toml_text(header) +
+                    " = { name = " + toml_text(plain_name(spelled.base) + "_K") +
+                    ", unit = \"delta_degF\" }, or unit = \"degF\" with a name in _degC, under "
+                    "[columns] in the file of --columns");
+      return std::nullopt;
     }
+    if (is_mapped(header)) return mapped_meaning(i, map_->columns.at(header), spelled);
     if (spelled.unit.empty() && !unit_of(header).suffix.empty() && is_column_name(header))
       return Meaning{i, header, {}};
     const bool is_named = map_ != nullptr && std::find(map_->names.begin(), map_->names.end(),
@@ -358,12 +386,14 @@ class ForeignReader {
       const std::string example = spelled.unit.empty()
                                       ? example_name(spelled.base)
                                       : plain_name(spelled.base + "_" + spelled.unit);
-      refuse(i,
-             (spelled.unit.empty() ? std::string("has no unit")
-                                   : "has an unknown unit, " + spelled.unit) +
-                 ": write " + toml_text(header) + " = " + toml_text(example) +
-                 " (or what it is; without a unit it is a signal) under [columns], or ignore = [" +
-                 toml_text(header) + "], in the file of --columns");
+      refuse(i, (spelled.unit.empty() ? std::string("has no unit")
+                                      : "has an unknown unit, " + spelled.unit) +
+                    ": write " + toml_text(header) + " = " + toml_text(example) +
+                    (spelled.unit.empty()
+                         ? " (or what it is; without a unit it is a signal)"
+                         : ", a signal, or { name = \"its name\", unit = \"a known unit\" }") +
+                    " under [columns], or ignore = [" + toml_text(header) +
+                    "], in the file of --columns");
       return std::nullopt;
     }
     Meaning meaning{i, own_name(spelled), {}};
@@ -385,12 +415,22 @@ class ForeignReader {
   std::optional<Meaning> mapped_meaning(std::size_t i, const MappedColumn& mapped,
                                         const SpelledName& spelled) {
     Meaning meaning{i, mapped.name, {}};
-    const SpelledUnit* unit = mapped.unit.empty() ? spelled.known : spelled_unit(mapped.unit);
+    const auto unit =
+        mapped.unit.empty()
+            ? (spelled.known == nullptr ? std::nullopt : std::optional(*spelled.known))
+            : unit_with_factor(mapped.unit);
     if (!is_plain(mapped.name)) {
       problems_.add({map_->file, 0, "columns", mapped.name, std::string(column_name_rule)});
       return std::nullopt;
     }
-    if (unit == nullptr) return meaning;
+    if (!unit && !spelled.unit.empty() && !unit_of(mapped.name).suffix.empty()) {
+      problems_.add({map_->file, 0, "columns", mapped.name,
+                     "may not be the unit of '" + table_.header[i] +
+                         "': write { name = " + toml_text(mapped.name) +
+                         ", unit = \"that of the file\" }, such as degC, 0.1 degC or mil"});
+      return std::nullopt;
+    }
+    if (!unit) return meaning;
     const auto converted = conversion(*unit, mapped.name);
     if (!converted) {
       problems_.add({map_->file, 0, "columns", mapped.name,
@@ -425,24 +465,27 @@ class ForeignReader {
 
   void read_values(const Meaning& meaning) {
     const bool is_switch = unit_of(meaning.name).suffix == "_on";
+    const bool is_degC = unit_of(meaning.name).suffix == "_degC";
     std::vector<double> values;
     values.reserve(table_.rows());
     for (std::size_t row = 0; row < table_.rows(); ++row) {
       const std::string_view field = table_.field(row, meaning.source);
       const NumberText parts = number_text_of(field);
       std::optional<double> number = number_of(parts.digits, form_);
+      const bool missing = takes_as_missing(field, number);
+      if (missing) number.reset();
       if (number && parts.unit != nullptr)
         number = in_unit_of_column(meaning, *number, *parts.unit);
       if (!number && is_switch) number = switch_word(field);
-      if (!number && !takes_as_missing(field)) {
-        const std::string& header = table_.header[meaning.source];
-        if (words_.empty()) word_at_ = {table_.lines[row], header};
-        words_.insert(std::string(field));
-      }
+      if (!number && !missing) ask_for_word(row, meaning);
       double value = number.value_or(std::numeric_limits<double>::quiet_NaN());
       if (!meaning.conversion.is_identity())
         value = meaning.conversion.factor * value + meaning.conversion.offset;
       if (std::isinf(value)) value = std::numeric_limits<double>::quiet_NaN();
+      if (is_degC && (value < degC_min || value > degC_max)) {
+        is_impossible_ = is_impossible_ || words_.empty();
+        ask_for_word(row, meaning);
+      }
       values.push_back(value);
     }
     run_.values.push_back(std::move(values));
@@ -457,7 +500,13 @@ class ForeignReader {
     return (unit.factor * number + unit.offset - of_column->offset) / of_column->factor;
   }
 
-  /// One problem for all words that are not numbers.
+  void ask_for_word(std::size_t row, const Meaning& meaning) {
+    const std::string word(table_.field(row, meaning.source));
+    if (words_.empty()) word_at_ = {table_.lines[row], table_.header[meaning.source], word};
+    words_.insert(word);
+  }
+
+  /// One problem for all words that are not numbers, and for impossible temperatures.
   void ask_for_words() {
     if (words_.empty()) return;
     constexpr std::size_t words_max = 5;
@@ -465,15 +514,19 @@ class ForeignReader {
     std::size_t count = 0;
     for (const std::string& word : words_)
       if (count++ < words_max) list += (list.empty() ? "" : ", ") + toml_text(shortened(word));
-    problems_.add(word_at_.first, word_at_.second, *words_.begin(),
-                  "must be a number with a decimal " +
-                      std::string(form_.decimal == ',' ? "comma" : "point") +
+    const auto& [line, header, first] = word_at_;
+    problems_.add(line, header, first,
+                  (is_impossible_ ? "must be between -273.15 and 2500 degC"
+                                  : "must be a number with a decimal " +
+                                        std::string(form_.decimal == ',' ? "comma" : "point")) +
                       ", or empty: if it means a missing value, write missing = [" + list +
                       (count > words_max ? ", ..." : "") + "], to leave the column out ignore = [" +
-                      toml_text(word_at_.second) + "] in the file of --columns");
+                      toml_text(header) + "] in the file of --columns");
   }
 
-  bool takes_as_missing(std::string_view field) {
+  /// Words, what the map lists, and the infinity of SCPI instruments, 9.9E37.
+  bool takes_as_missing(std::string_view field, const std::optional<double>& number) {
+    constexpr double overload_min = 1e37;
     if (is_missing(field)) return true;
     std::string small(field.substr(0, 20));
     for (char& c : small) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
@@ -481,7 +534,8 @@ class ForeignReader {
         std::find(missing_words.begin(), missing_words.end(), small) != missing_words.end();
     const bool is_listed = map_ != nullptr && std::find(map_->missing.begin(), map_->missing.end(),
                                                         field) != map_->missing.end();
-    if (!is_word && !is_listed) return false;
+    const bool is_overload = number && std::abs(*number) >= overload_min;
+    if (!is_word && !is_listed && !is_overload) return false;
     if (missing_++ == 0) missing_as_ = field;
     return true;
   }
@@ -500,7 +554,8 @@ class ForeignReader {
   bool from_latin1_{false};
   bool has_own_names_{false};
   std::set<std::string> words_;  ///< neither numbers nor known words for missing values
-  std::pair<int, std::string> word_at_;
+  std::tuple<int, std::string, std::string> word_at_;  ///< line, column and word of the first
+  bool is_impossible_{false};  ///< the first of them is a number, but no temperature
   NumberForm form_;
   std::vector<Meaning> meanings_;
   std::size_t missing_{0};
@@ -522,27 +577,6 @@ bool is_own_form(std::string_view header) {
 
 RunFile read_foreign_run(std::string_view text, const std::string& name, const ColumnMap* map) {
   return ForeignReader(text, name, map).read();
-}
-
-std::optional<WallZero> stated_wall_zero(std::string_view text) {
-  const std::size_t at = text.find(wall_zero_mark);
-  if (at == std::string_view::npos || (at > 0 && text[at - 1] != '\n')) return std::nullopt;
-  std::string_view stated = text.substr(at + wall_zero_mark.size());
-  stated = stated.substr(0, stated.find_first_of("\r\n"));
-  const auto stamp = parse_time_stamp(stated);
-  const auto seconds = stamp ? seconds_of(*stamp, DateOrder::unknown, false) : std::nullopt;
-  if (!seconds) return std::nullopt;
-  return WallZero{*seconds, stamp->zone_s.has_value()};
-}
-
-std::string wall_zero_comment(const WallZero& zero) {
-  const double whole = std::floor(zero.seconds);
-  char thousandths[8];
-  std::snprintf(thousandths, sizeof thousandths, "%.3f", std::min(zero.seconds - whole, 0.999));
-  std::string stamp = date_text(whole);
-  stamp[10] = 'T';
-  return std::string(wall_zero_mark) + stamp + std::string(thousandths + 1) +
-         (zero.is_utc ? "Z\n" : "\n");
 }
 
 }  // namespace thermocomp

@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 
+#include "config/run_forms/field_text.hpp"
 #include "config/run_forms/spelled_unit.hpp"
 #include "config/text/units.hpp"
 
@@ -110,6 +111,35 @@ void keep_needed_names(const TextTable& table, const std::vector<double>& time_s
   }
 }
 
+/// The columns that a pivot leaves out.
+std::vector<std::size_t> other_columns(const TextTable& table, const TimeColumns& time,
+                                       const LongForm& form) {
+  std::vector<std::size_t> others;
+  for (std::size_t i = 0; i < table.columns(); ++i)
+    if (!time.has(i) && i != form.value && form.unit != i &&
+        std::find(form.names.begin(), form.names.end(), i) == form.names.end())
+      others.push_back(i);
+  return others;
+}
+
+/// Rows that a column of good and bad qualities, in words or as OPC's numbers, calls bad.
+std::vector<bool> bad_rows(const TextTable& table, const std::vector<std::size_t>& columns) {
+  constexpr std::array<std::string_view, 2> good{"good", "192"};
+  constexpr double least_uncertain = 64;
+  std::vector<bool> bad(table.rows());
+  for (const std::size_t column : columns) {
+    bool has_good = false;
+    for (std::size_t row = 0; row < table.rows() && !has_good; ++row)
+      has_good = is_one_of(good, table.field(row, column));
+    for (std::size_t row = 0; row < table.rows() && has_good; ++row) {
+      const std::string_view quality = table.field(row, column);
+      bad[row] = bad[row] || is_one_of(std::array<std::string_view, 1>{"bad"}, quality) ||
+                 finite_number(quality).value_or(least_uncertain) < least_uncertain;
+    }
+  }
+  return bad;
+}
+
 }  // namespace
 
 std::optional<LongForm> long_form(const TextTable& table, const TimeColumns& time,
@@ -169,8 +199,10 @@ std::optional<LongForm> long_form(const TextTable& table, const TimeColumns& tim
   return form;
 }
 
-std::string pivot(TextTable& table, std::vector<double>& time_s, const LongForm& form,
-                  double scan_s, ProblemList& problems) {
+std::string pivot(TextTable& table, const TimeColumns& time, std::vector<double>& time_s,
+                  const LongForm& form, double scan_s, ProblemList& problems) {
+  const std::vector<std::size_t> others = other_columns(table, time, form);
+  const std::vector<bool> bad = bad_rows(table, others);
   std::map<double, std::size_t> row_of;
   for (const double at : time_s) row_of.emplace(at, 0);
   std::vector<double> times;
@@ -189,11 +221,11 @@ std::string pivot(TextTable& table, std::vector<double>& time_s, const LongForm&
   for (std::size_t row = 0; row < table.rows(); ++row) {
     const std::string series = series_of(table, row, form);
     const auto [found, is_new] = column_of.emplace(series, columns.size());
+    const std::string_view unit = form.unit ? table.field(row, *form.unit) : value_unit;
     if (is_new && columns.size() < series_max) {
       columns.emplace_back(times.size());
       wide.header.push_back(series);
-      wide.units.emplace_back(form.unit ? table.field(row, *form.unit)
-                                        : std::string_view(value_unit));
+      wide.units.emplace_back(unit);
     } else if (is_new) {
       problems.add(table.lines[row], table.header[form.names[0]], series,
                    "must be one of at most " + std::to_string(series_max) + " series");
@@ -201,7 +233,11 @@ std::string pivot(TextTable& table, std::vector<double>& time_s, const LongForm&
     }
     const std::size_t at = row_of.at(time_s[row]);
     std::string_view& cell = columns[found->second][at];
-    const std::string_view value = table.field(row, form.value);
+    std::string_view value = bad[row] ? std::string_view() : table.field(row, form.value);
+    std::string& of_series = wide.units[found->second];
+    if (of_series.empty()) of_series = unit;
+    if (unit != of_series && !unit.empty() && looks_like_number(value))
+      value = table.joined.emplace_back(std::string(value) + " " + std::string(unit));
     if (!cell.empty() && cell != value)
       problems.add(table.lines[row], series, value,
                    (scan_s > 0 ? "must be there once within scan_s; an earlier row has "
@@ -215,6 +251,9 @@ std::string pivot(TextTable& table, std::vector<double>& time_s, const LongForm&
     note += " and '" + table.header[form.names[i]] + "'";
   note += " names the series, '" + table.header[form.value] + "' is the value; " +
           std::to_string(columns.size()) + " columns";
+  for (const std::size_t column : others) note += ", '" + table.header[column] + "' left out";
+  if (const auto count = std::count(bad.begin(), bad.end(), true); count > 0)
+    note += "; bad quality, hence missing: " + std::to_string(count) + " values";
   const auto is_complete = [&](std::size_t row) {
     return std::none_of(columns.begin(), columns.end(),
                         [row](const auto& column) { return column[row].empty(); });

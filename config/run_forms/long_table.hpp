@@ -32,10 +32,11 @@ struct LongForm {
                                                 const std::vector<double>& time_s,
                                                 const ColumnMap* map, ProblemList& problems);
 
-/// Makes one column per series and one row per time; missing values are empty.
+/// Makes one column per series and one row per time; missing values and those of bad quality are
+/// empty.
 /// @param scan_s  times within it of a row's first time belong to that row
 /// @return a note on the change
-std::string pivot(TextTable& table, std::vector<double>& time_s, const LongForm& form,
-                  double scan_s, ProblemList& problems);
+std::string pivot(TextTable& table, const TimeColumns& time, std::vector<double>& time_s,
+                  const LongForm& form, double scan_s, ProblemList& problems);
 
 }  // namespace thermocomp

@@ -21,6 +21,7 @@ constexpr auto units = std::to_array<SpelledUnit>({
     {"Kelvin", "temperature", 1, -kelvin_of_0_degC, "_K"},
     {"degF", "temperature", fahrenheit_step, -32 * fahrenheit_step, "_degC"},
     {"F", "temperature", fahrenheit_step, -32 * fahrenheit_step, "_degC", true},
+    {"delta_degF", "temperature", fahrenheit_step, -kelvin_of_0_degC, "_K"},  // a difference
     {"um", "length", 1, 0, "_um"},
     {"µm", "length", 1, 0, "_um"},
     {"μm", "length", 1, 0, "_um"},
@@ -32,6 +33,19 @@ constexpr auto units = std::to_array<SpelledUnit>({
     {"m", "length", 1e6, 0, "_mm", true},
     {"in", "length", 25400, 0, "_mm", true},
     {"inch", "length", 25400, 0, "_mm"},
+    {"inches", "length", 25400, 0, "_mm"},
+    {"mil", "length", 25.4, 0, "_um", true},
+    {"mils", "length", 25.4, 0, "_um", true},
+    {"thou", "length", 25.4, 0, "_um", true},
+    {"uin", "length", 0.0254, 0, "_um"},
+    {"µin", "length", 0.0254, 0, "_um"},
+    {"μin", "length", 0.0254, 0, "_um"},
+    {"microinch", "length", 0.0254, 0, "_um"},
+    {"micrometer", "length", 1, 0, "_um"},
+    {"micrometers", "length", 1, 0, "_um"},
+    {"millimeter", "length", 1e3, 0, "_mm"},
+    {"millimeters", "length", 1e3, 0, "_mm"},
+    {"Millimeters", "length", 1e3, 0, "_mm"},
     {"urad", "angle", 1, 0, "_urad"},
     {"µrad", "angle", 1, 0, "_urad"},
     {"μrad", "angle", 1, 0, "_urad"},
@@ -46,6 +60,7 @@ constexpr auto units = std::to_array<SpelledUnit>({
     {"min-1", "speed", 1, 0, "_rpm"},
     {"min^-1", "speed", 1, 0, "_rpm"},
     {"U/min", "speed", 1, 0, "_rpm"},
+    {"tr/min", "speed", 1, 0, "_rpm"},
     {"r/min", "speed", 1, 0, "_rpm"},
     {"rev/min", "speed", 1, 0, "_rpm"},
     {"mm/min", "feed", 1, 0, "_mm_per_min"},
@@ -70,14 +85,19 @@ constexpr auto units = std::to_array<SpelledUnit>({
     {"us", "time", 1e-6, 0, "_s", true},
     {"µs", "time", 1e-6, 0, "_s", true},
     {"ms", "time", 1e-3, 0, "_s", true},
+    {"msec", "time", 1e-3, 0, "_s", true},
+    {"milliseconds", "time", 1e-3, 0, "_s", true},
     {"s", "time", 1, 0, "_s", true},
     {"sec", "time", 1, 0, "_s", true},
     {"sec.", "time", 1, 0, "_s", true},
     {"seconds", "time", 1, 0, "_s", true},
+    {"Seconds", "time", 1, 0, "_s", true},
     {"min", "time", 60, 0, "_s", true},
     {"minutes", "time", 60, 0, "_s", true},
+    {"Minutes", "time", 60, 0, "_s", true},
     {"h", "time", 3600, 0, "_s", true},
     {"hours", "time", 3600, 0, "_s", true},
+    {"Hours", "time", 3600, 0, "_s", true},
     {"d", "time", 86400, 0, "_s", true},
     {"day", "time", 86400, 0, "_s", true},
     {"days", "time", 86400, 0, "_s", true},
@@ -237,8 +257,6 @@ std::string plain_name(std::string_view base) {
   return name;
 }
 
-namespace {}  // namespace
-
 bool is_grouped(std::string_view text, char sign) {
   std::string_view part;
   bool first = true;
@@ -263,6 +281,16 @@ NumberText number_text_of(std::string_view field) {
   const SpelledUnit* unit = spelled_unit(trimmed(field.substr(cut)));
   if (unit == nullptr) return {field};
   return {trimmed(field.substr(0, cut)), unit};
+}
+
+std::optional<SpelledUnit> unit_with_factor(std::string_view unit) {
+  if (const SpelledUnit* known = spelled_unit(unit)) return *known;
+  const NumberText parts = number_text_of(unit);
+  const auto factor = finite_number(parts.digits);
+  if (parts.unit == nullptr || !factor) return std::nullopt;
+  SpelledUnit scaled = *parts.unit;
+  scaled.factor *= *factor;
+  return scaled;
 }
 
 bool looks_like_number(std::string_view field) {

@@ -31,6 +31,9 @@ struct SpelledName {
 /// @return nullptr when it is not a unit
 [[nodiscard]] const SpelledUnit* spelled_unit(std::string_view unit);
 
+/// A unit, or a multiple of one: "0.1 degC".
+[[nodiscard]] std::optional<SpelledUnit> unit_with_factor(std::string_view unit);
+
 /// our value = factor * given value + offset.
 struct UnitConversion {
   double factor{1.0};

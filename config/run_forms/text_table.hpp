@@ -1,6 +1,7 @@
 /// A text table of another program, with its columns not yet interpreted.
 #pragma once
 
+#include <deque>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -20,6 +21,7 @@ struct TextTable {
   std::vector<int> lines;                ///< line number of each row, counted from 1
   char separator{','};
   std::vector<std::string> notes;  ///< text skipped around the table
+  std::deque<std::string> joined;  ///< storage of fields made of a value and its unit
 
   [[nodiscard]] std::size_t columns() const noexcept { return header.size(); }
   [[nodiscard]] std::size_t rows() const noexcept { return lines.size(); }

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "config/run_forms/number_epoch.hpp"
 #include "config/run_forms/spelled_unit.hpp"
 #include "config/run_forms/time_stamp.hpp"
 #include "config/text/printable_text.hpp"
@@ -23,27 +24,6 @@ constexpr auto time_names = std::to_array<std::string_view>(
 constexpr auto date_names =
     std::to_array<std::string_view>({"date", "datum", "datetime", "date time", "date/time",
                                      "datum/uhrzeit", "time", "zeit", "timestamp", "zeitstempel"});
-
-/// Numbers whose size shows their epoch; the ranges are the years 2001 to about 2050.
-struct Epoch {
-  const char* name;
-  double low;
-  double high;
-  double per_second;
-  double zero_s;    ///< since 1970
-  bool only_named;  ///< small, hence ambiguous: the column must be called date or time
-  bool is_utc;
-};
-constexpr std::array<Epoch, 8> epochs{{
-    {"s since 1970", 1e9, 2.5e9, 1, 0, false, true},
-    {"ms since 1970", 1e12, 2.5e12, 1e3, 0, false, true},
-    {"us since 1970", 1e15, 2.5e15, 1e6, 0, false, true},
-    {"ns since 1970", 1e18, 2.5e18, 1e9, 0, false, true},
-    {"s since 1904", 3.1e9, 4.6e9, 1, -2082844800.0, true, true},
-    {"100 ns since 1601", 1.25e17, 1.42e17, 1e7, -11644473600.0, false, true},
-    {"day", 20000, 80000, 1 / day_s, -25569 * day_s, true, false},
-    {"days since the year 0", 7.2e5, 7.6e5, 1 / day_s, -719529 * day_s, true, false},
-}};
 
 std::string small_letters(std::string_view text) {
   std::string small(text);
@@ -96,17 +76,6 @@ std::vector<double> first_numbers(const TextTable& table, std::size_t column,
   return numbers;
 }
 
-const Epoch* epoch_of(const std::vector<double>& numbers, std::string_view header) {
-  for (const Epoch& epoch : epochs) {
-    if (epoch.only_named && !is_one_of(date_names, header)) continue;
-    if (!numbers.empty() && std::all_of(numbers.begin(), numbers.end(), [&](double number) {
-          return number >= epoch.low && number < epoch.high;
-        }))
-      return &epoch;
-  }
-  return nullptr;
-}
-
 /// "Date Time, GMT+01:00": time zone of the column.
 std::optional<double> zone_of_header(std::string_view header) {
   for (const std::string_view name : {"GMT", "UTC"}) {
@@ -149,7 +118,7 @@ class TimeReader {
       read_period();
     else if (time_.columns.size() == 3)
       read_day_of_year();
-    else if (time_.columns.size() == 2 || parse_time_stamp(table_.field(0, time_.columns[0])))
+    else if (time_.columns.size() == 2 || stamp_of(table_.field(0, time_.columns[0])))
       read_stamps();
     else
       read_numbers(time_.columns[0]);
@@ -218,10 +187,14 @@ class TimeReader {
     std::string unit(asked_unit());
     if (unit.empty()) unit = header == "time_s" ? "s" : units_[column];
     if (unit.empty()) unit = unit_of_name(header);
+    if (number_text_of(units_[column]).unit != nullptr) {
+      problems_.add(table_.header_line, header, units_[column],
+                    "is a multiple of a unit: write the times in s, and s as their unit");
+      return;
+    }
     const SpelledUnit* known = spelled_unit(unit);
     const bool is_time = known != nullptr && known->dimension == "time";
-    const Epoch* epoch = epoch_of(run_.time_s, header);
-    if (epoch == nullptr && is_time) epoch = epoch_of(run_.time_s, "date");
+    const Epoch* epoch = epoch_of(run_.time_s, is_time || is_one_of(date_names, header), is_time);
     if (epoch != nullptr && is_time && std::abs(known->factor * epoch->per_second - 1) > 1e-9)
       epoch = nullptr;  // the unit implies another scale
     if (epoch != nullptr) {
@@ -234,7 +207,7 @@ class TimeReader {
     } else {
       problems_.add(table_.header_line, header, unit.empty() ? "(no unit)" : unit,
                     "has no unit of time: write time_unit = \"s\" (or \"ms\", \"min\", \"h\", "
-                    "\"day\") in the file of --columns");
+                    "\"day\", \"hhmmss\" for 95950, 100000) in the file of --columns");
     }
   }
 
@@ -251,11 +224,25 @@ class TimeReader {
   }
 
   // ---- dates and clock times
+  /// The stamp of a field; with time_unit = "hhmmss" of the number 95950.
+  [[nodiscard]] std::optional<TimeStamp> stamp_of(std::string_view field) const {
+    const auto number = asked_unit() == "hhmmss" ? finite_number(field) : std::nullopt;
+    if (!number || *number >= 1e6) return parse_time_stamp(field);
+    TimeStamp stamp;
+    stamp.has_clock = true;
+    stamp.clock_parts = 3;
+    stamp.clock_a = std::floor(*number / 1e4);
+    stamp.clock_b = std::fmod(std::floor(*number / 1e2), 1e2);
+    stamp.clock_c = std::fmod(*number, 1e2);
+    if (!(*number >= 0 && stamp.clock_b < 60 && stamp.clock_c < 60)) return std::nullopt;
+    return stamp;
+  }
+
   void read_stamps() {
     std::vector<TimeStamp> stamps;
     const auto zone = zone_of_header(table_.header[time_.columns[0]]);
     for (std::size_t row = 0; row < table_.rows() && !problems_.full(); ++row) {
-      std::optional<TimeStamp> stamp = parse_time_stamp(table_.field(row, time_.columns[0]));
+      std::optional<TimeStamp> stamp = stamp_of(table_.field(row, time_.columns[0]));
       if (stamp && time_.columns.size() == 2) stamp = joined(row, *stamp);
       if (stamp && stamp->has_date && !stamp->zone_s) stamp->zone_s = zone;
       if (stamp && !stamps.empty() && !alike(*stamp, stamps.front())) stamp.reset();
@@ -306,7 +293,7 @@ class TimeReader {
   }
 
   std::optional<TimeStamp> joined(std::size_t row, TimeStamp date) const {
-    const auto clock = parse_time_stamp(table_.field(row, time_.columns[1]));
+    const auto clock = stamp_of(table_.field(row, time_.columns[1]));
     if (!clock || clock->has_date || date.has_clock) return std::nullopt;
     TimeStamp both = *clock;
     both.has_date = true;
@@ -478,14 +465,15 @@ Candidates candidates(const TextTable& table, const ColumnMap* map,
       continue;
     const Holds here = content(table, i);
     const SpelledUnit* unit = spelled_unit(units[i]);
+    const bool is_time = unit != nullptr && unit->dimension == "time";
     if (here == Holds::date || here == Holds::both)
       found.dates.push_back(i);
     else if (here == Holds::clock)
       found.clocks.push_back(i);
-    else if (epoch_of(first_numbers(table, i, form), header) != nullptr)
+    else if (epoch_of(first_numbers(table, i, form), is_one_of(date_names, header), is_time) !=
+             nullptr)
       found.epochs.push_back(i);
-    else if (is_one_of(time_names, header) || !unit_of_name(header).empty() ||
-             (unit != nullptr && unit->dimension == "time"))
+    else if (is_one_of(time_names, header) || !unit_of_name(header).empty() || is_time)
       found.counting.push_back(i);
   }
   return found;

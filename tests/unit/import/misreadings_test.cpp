@@ -81,3 +81,68 @@ TEST_CASE("a header has a name for each field, or is refused", "[import]") {
        "log:2: 1 names: must be one for each of the 4 fields", ""},
   });
 }
+
+TEST_CASE("a unit that is not known, or changes, does not reach a column of another", "[import]") {
+  check_all({
+      {"a changing unit of a series",
+       "Time,Tag,Value,Unit\n2026-02-01 08:00:00,Bed,20,°C\n2026-02-01 08:01:00,Bed,69.8,°F\n",
+       "time_s,Bed_degC\n0,20\n60,21\n", ""},
+      {"thousandths of an inch", "Time [s],z (mil)\n0,1\n1,2\n", "time_s,z_um\n0,25.4\n1,50.8\n",
+       ""},
+      {"an unknown unit of a mapped name", "Time [s],T1 [0.1 °C]\n0,205\n1,206\n",
+       "may not be the unit of 'T1 [0.1 °C]'", "[columns]\n\"T1 [0.1 °C]\" = \"t1_degC\""},
+      {"the same with its unit", "Time [s],T1 [0.1 °C]\n0,205\n1,210\n",
+       "time_s,t1_degC\n0,20.5\n1,21\n",
+       "[columns]\n\"T1 [0.1 °C]\" = { name = \"t1_degC\", unit = \"0.1 degC\" }"},
+      {"a unit behind one number of several", "Time [s],T1\n0,20.5\n10,80.6 A\n",
+       "log:3: T1 = 80.6 A: must be a number", ""},
+      {"a difference in degF", "Time [s],dT (°F)\n0,1.8\n1,3.6\n",
+       "log:1: column 2 = dT (°F): may be a difference of temperatures", ""},
+      {"the same, said to be one", "Time [s],dT (°F)\n0,1.8\n1,3.6\n", "time_s,dT_K\n0,1\n1,2\n",
+       "[columns]\n\"dT (°F)\" = { name = \"dT_K\", unit = \"delta_degF\" }"},
+  });
+}
+
+TEST_CASE("numbers that may be another time are asked for", "[import]") {
+  check_all({
+      {"a multiple of a unit", "Time [0.1 s],T1 [C]\n0,20\n10,21\n",
+       "log:1: Time [0.1 s] = 0.1 s: is a multiple of a unit", "time_unit = \"s\""},
+      {"seconds of the day", "Time,T1 [C]\n28800,20\n28810,21\n", "log:1: Time = (no unit)", ""},
+      {"a counter of us", "timestamp,T1 [C]\n1500000000,20\n1500100000,21\n",
+       "log:1: timestamp = (no unit)", ""},
+      {"seconds since 1970, once a day", "timestamp,T1 [C]\n1500000000,20\n1500086400,21\n",
+       "time_s,T1_degC\n0,20\n86400,21\n", "time_unit = \"s\""},
+      {"a clock without colons", "Time,T1 [C]\n95950,20\n100000,21\n", "hhmmss", ""},
+      {"the same, said to be one", "Time,T1 [C]\n95950,20\n100000,21\n",
+       "time_s,T1_degC\n0,20\n10,21\n", "time_unit = \"hhmmss\""},
+      {"with its date", "Date;Time;T1 [C]\n20260201;235950;20\n20260202;5;21\n",
+       "time_s,T1_degC\n0,20\n15,21\n", "time = [\"Date\", \"Time\"]\ntime_unit = \"hhmmss\""},
+  });
+}
+
+TEST_CASE("values of a fault are missing, or asked for", "[import]") {
+  check_all({
+      {"the overload of an instrument", "Time [s],T1 [C],U [V]\n0,20,+9.9E+37\n1,-9.9E37,2\n",
+       "time_s,T1_degC,U_V\n0,20,\n1,,2\n", ""},
+      {"below absolute zero", "Time [s],T1 [C]\n0,20\n1,-9999\n",
+       "log:3: T1 [C] = -9999: must be between -273.15 and 2500 degC", ""},
+      {"the same, said to be missing", "Time [s],T1 [C]\n0,20\n1,-9999\n",
+       "time_s,T1_degC\n0,20\n1,\n", "missing = [\"-9999\"]"},
+      {"bad quality in words",
+       "Time,Tag,Value,Unit,Quality\n2026-02-01 08:00:00,Bed,20,°C,Good\n"
+       "2026-02-01 08:01:00,Bed,0,°C,Bad\n2026-02-01 08:02:00,Bed,21,°C,Good\n",
+       "time_s,Bed_degC\n0,20\n60,\n120,21\n", ""},
+      {"bad quality in OPC's numbers",
+       "Tag;Time;Value;Detail\nBed;13.02.2026 08:00:00;20,5;192\nHead;13.02.2026 08:00:00;21;192\n"
+       "Bed;13.02.2026 08:01:00;0;24\nHead;13.02.2026 08:01:00;22;64\n",
+       "time_s,Bed,Head\n0,20.5,21\n60,,22\n", ""},
+  });
+}
+
+TEST_CASE("the comments of an LVM are left out", "[import]") {
+  const std::string head =
+      "LabVIEW Measurement\t\nSeparator\tTab\n***End_of_Header***\t\n\nChannels\t1\n"
+      "Y_Unit_Label\tDeg C\n***End_of_Header***\t\nX_Value\tBed\tComment\n";
+  check_all({{"in one row", head + "0\t20\tstart\n1\t21\n2\t22\n",
+              "time_s,Bed_degC\n0,20\n1,21\n2,22\n", ""}});
+}

@@ -1,0 +1,32 @@
+#include "config/run_forms/run_data.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "config/run_forms/time_stamp.hpp"
+
+namespace thermocomp {
+
+std::optional<WallZero> stated_wall_zero(std::string_view text) {
+  const std::size_t at = text.find(wall_zero_mark);
+  if (at == std::string_view::npos || (at > 0 && text[at - 1] != '\n')) return std::nullopt;
+  std::string_view stated = text.substr(at + wall_zero_mark.size());
+  stated = stated.substr(0, stated.find_first_of("\r\n"));
+  const auto stamp = parse_time_stamp(stated);
+  const auto seconds = stamp ? seconds_of(*stamp, DateOrder::unknown, false) : std::nullopt;
+  if (!seconds) return std::nullopt;
+  return WallZero{*seconds, stamp->zone_s.has_value()};
+}
+
+std::string wall_zero_comment(const WallZero& zero) {
+  const double whole = std::floor(zero.seconds);
+  char thousandths[8];
+  std::snprintf(thousandths, sizeof thousandths, "%.3f", std::min(zero.seconds - whole, 0.999));
+  std::string stamp = date_text(whole);
+  stamp[10] = 'T';
+  return std::string(wall_zero_mark) + stamp + std::string(thousandths + 1) +
+         (zero.is_utc ? "Z\n" : "\n");
+}
+
+}  // namespace thermocomp
