@@ -259,7 +259,9 @@ def test_commands_are_offered_while_they_can_be_given(lab, machine):
         machine.warm_by(12.0)
         eventually(lambda: browser.execute_script(buttons) == [
             ["Switch on", False], ["Switch off", False], ["Take the reference", True]], "no reference now")
-        assert "Take the reference, not now: axis z has an offset of +" in text(browser, "command-why")
+        # Until the offset follows, the change of the temperature is the reason.
+        eventually(lambda: "Take the reference, not now: axis z has an offset of +" in
+                   text(browser, "command-why"), "the offset is the reason")
         picture(browser, "commands")
         assert browser.execute_script(
             "const jumped = structuredClone(state); jumped.sensors[0].jump = {size_K: 9, since: 0};"
