@@ -20,7 +20,7 @@ constexpr std::array<Epoch, 8> epochs{{
     {"days since the year 0", 7.2e5, 7.6e5, 1 / s_per_day, -719529 * s_per_day, true, false},
 }};
 
-/// Of numbers that are not all equal.
+/// True if two neighbours differ by at most `step_max`, or no two differ.
 bool has_steps_below(double step_max, const std::vector<double>& numbers) {
   double least = INFINITY;
   for (std::size_t i = 1; i < numbers.size(); ++i)

@@ -37,8 +37,8 @@ constexpr double l1_tolerance = 1e-6;
 /// Iteration limit in case of rounding; usually less than one join per column.
 constexpr Eigen::Index joins_a_column_max = 10;
 
-/// Two levels, such as on and off, show no curvature of the response. A deviation of up to a tenth
-/// of their distance is noise of a measured level.
+/// True if the signal has two levels, such as on and off, which show no curvature of the response.
+/// A measured level may scatter by a tenth of the distance between the two.
 bool has_two_levels(const MeasuredTests& tests, Eigen::Index signal) {
   double low = std::numeric_limits<double>::infinity();
   double high = -low;

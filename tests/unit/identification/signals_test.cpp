@@ -1,4 +1,4 @@
-/// What a recording can show of an operating signal.
+/// Tests of the gains that `fit` gives to operating signals, or refuses.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
