@@ -3,8 +3,8 @@
 # static checks.
 #   ./test.sh [--quick | --packages | --all | --build-only] [--preset PRESET] [-- CTEST_OPTION...]
 #   --quick: for daily work: only test programs, without processes, guests or campaigns
-#   --packages: also builds the Debian packages and tests them in booted systems, as .ci/run does
-#   --all: also the longest tests, and those that plant bugs in copies of the sources
+#   --packages: also the tests that take minutes each, and the Debian packages in booted systems, as .ci/run does
+#   --all: also the tests of the night, and those that plant bugs in copies of the sources
 #   --build-only: no tests
 #   --preset: debug, release (default), asan-ubsan, asan-ubsan-all (with the modelling), tsan, coverage
 set -euo pipefail
@@ -155,7 +155,7 @@ test_processes_while_building() {
   left_out=(--label-exclude "${labels%)\$}|${left_out_labels})\$")
 }
 
-targets=(all) left_out_labels='nightly|planted|service' together=ON
+targets=(all) left_out_labels='long|nightly|planted|service' together=ON
 case $extent in
   quick) targets=(quick_tests) ;;
   packages) left_out_labels='nightly|planted' ;;

@@ -79,7 +79,9 @@ class Rig:
         if offset_um is not None:
             self.machine.wants_um(offset_um)
             if not eventually(lambda: abs(self.axis.position_um - offset_um) < 0.5):
-                self.broke(f"never at {offset_um} um before the attack")
+                status = self.daemon.status()
+                self.broke(f"never at {offset_um} um before the attack: {status['mode']}, "
+                           f"{status['reasons']}, {status['axes'][0]}")
                 return False
         return True
 

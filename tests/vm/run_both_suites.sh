@@ -15,7 +15,7 @@ echo "run_both_suites.sh: drivers $SECONDS s" >&2
 began=$SECONDS
 # Fast builds only: the replayed spindle run, which would show the guest's slowness, and the simulated
 # nodes, which take many minutes here.
-"$here/daemon/run_tests.sh" "$bin" \
+"$here/daemon/run_tests.sh" "$bin" "$here/daemon" \
   -k "not model_of_every_row and not field_nodes and not can_presets" || status=1
 echo "run_both_suites.sh: daemon $((SECONDS - began)) s" >&2
 exit "$status"

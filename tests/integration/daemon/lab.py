@@ -112,8 +112,11 @@ class Daemon:
 
         nearest = beside()
         while nearest > tolerance_um:
-            eventually(lambda: beside() <= max(tolerance_um, nearest - 1.0),
-                       f"offset {offset_um} um from {nearest:.3f} um beside it")
+            try:
+                eventually(lambda: beside() <= max(tolerance_um, nearest - 1.0),
+                           f"offset {offset_um} um from {nearest:.3f} um beside it")
+            except AssertionError as failed:
+                raise AssertionError(f"{failed}\n{self.cli('status')[1]}") from None
             nearest = beside()
 
     def cli(self, *arguments):

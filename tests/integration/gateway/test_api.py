@@ -102,7 +102,12 @@ def test_a_restart_keeps_what_happened_and_names_the_time_without_a_daemon(machi
     assert began_s - 10.0 < entry["from_s"] <= ended_s <= entry["wall_s"]
     assert any("lasted" in event["text"] for event in gateway.wait_for(lambda s: s["here"], "a state")["events"])
     machine.daemon.committed()  # the new run's first rows: only they end the time without a daemon
-    result = gateway.json("/api/history?from=-600")
+
+    def with_absence():
+        result = gateway.json("/api/history?from=-600")
+        return any(mode["mode"] == "no_daemon" for mode in result["modes"]) and result
+
+    result = eventually(with_absence, "the time without a daemon is in the history")
     absent, = [mode for mode in result["modes"] if mode["mode"] == "no_daemon"]
     assert (absent["from_s"], absent["to_s"]) == pytest.approx((entry["from_s"], entry["wall_s"]), abs=0.01)
     assert result["recorded_since_s"] == result["from_s"]
