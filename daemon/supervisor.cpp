@@ -242,10 +242,8 @@ StatusView Supervisor::view() {
   const HistoryStatistics statistics =
       parts_.history != nullptr ? parts_.history->statistics() : HistoryStatistics{};
   if (!statistics.last_error.empty()) all.push_back(statistics.last_error);
-  for (const auto& [module, same_s] : frozen_modules_.frozen_s())
-    all.push_back("device " + module + ": the same values for " + duration_text(same_s) +
-                  ", up and down before: frozen? compare with a hand-held thermometer, switch "
-                  "the device off and on");
+  std::vector<FrozenModule> frozen;
+  for (const auto& [module, same_s] : frozen_modules_.frozen_s()) frozen.push_back({module, same_s});
   StatusView view{
       parts_.config,
       parts_.cycle.report(),
@@ -255,6 +253,7 @@ StatusView Supervisor::view() {
       controller_health_,
       statistics,
       std::move(all),
+      std::move(frozen),
       std::chrono::duration<double>(Clock::now() - started_).count(),
       real_time_,
       parts_.server.statistics(),

@@ -200,6 +200,32 @@ struct JumpedSensor {
   }
 };
 
+/// Sensors whose new values do not count yet.
+struct Confirmation {
+  std::vector<std::string> sensors{};
+  double settle_s{not_a_number};
+  std::string one_value_of{};  ///< all channels of this module show one value; empty: they do not
+
+  template <class Self, class Visitor>
+  static void fields(Self& self, Visitor& visit) {
+    visit("sensors", self.sensors);
+    visit("settle_s", self.settle_s);
+    visit("one_value_of", self.one_value_of);
+  }
+};
+
+/// A module that repeats its values, which were noisy before.
+struct FrozenModule {
+  std::string name{};
+  double same_s{not_a_number};
+
+  template <class Self, class Visitor>
+  static void fields(Self& self, Visitor& visit) {
+    visit("name", self.name);
+    visit("same_s", self.same_s);
+  }
+};
+
 struct SensorStatus {
   std::string name{};
   std::vector<std::string> blocks{};
@@ -526,6 +552,8 @@ struct Status {
   std::vector<std::string> sensors_bad{};
   std::vector<JumpedSensor> sensors_jumped{};
   std::vector<SuspectedSensor> sensors_suspected{};
+  std::vector<Confirmation> confirming{};  ///< an input has no value until they count
+  std::vector<FrozenModule> modules_frozen{};
   std::vector<BusStatus> buses{};
   ControllerStatus controller{};
   HistoryStatus history{};
@@ -556,6 +584,8 @@ struct Status {
     visit("sensors_bad", self.sensors_bad);
     visit("sensors_jumped", self.sensors_jumped);
     visit("sensors_suspected", self.sensors_suspected);
+    visit("confirming", self.confirming);
+    visit("modules_frozen", self.modules_frozen);
     visit("buses", self.buses);
     visit("controller", self.controller);
     visit("history", self.history);

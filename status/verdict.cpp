@@ -30,6 +30,14 @@ std::vector<std::string> axes_not_driven(const Status& status) {
   return names;
 }
 
+std::string confirmation_text(const Confirmation& values) {
+  return "new values are being confirmed: " + joined(values.sensors) +
+         " count after settle_s = " + duration_text(values.settle_s) +
+         (values.one_value_of.empty() ? ""
+                                      : ", and not while all channels of " + values.one_value_of +
+                                            " show one value, as a module that is not ready");
+}
+
 /// Collects faults, one entry per cause.
 class Causes {
  public:
@@ -51,6 +59,10 @@ class Causes {
       add_reasons(severity);
     if (status_.mode == Mode::compensating && !status_.model.moves)
       add(std::string(moves_nothing), "fit one to measured runs", "thermocomp fit");
+    for (const Confirmation& each : status_.confirming) add(confirmation_text(each));
+    for (const FrozenModule& module : status_.modules_frozen)
+      add("device " + module.name + ": " + frozen_text(module), frozen_remedy, "",
+          {SubjectKind::device, module.name});
     for (const std::string& warning : status_.warnings) add(warning);
     return std::move(list_);
   }
@@ -69,7 +81,7 @@ class Causes {
     switch (reason) {
       case Reason::block_lost:
       case Reason::block_estimated:
-        return !named_inputs_.empty() || only_settles() || is_confirming();
+        return !named_inputs_.empty() || only_settles() || !status_.confirming.empty();
       case Reason::signal_lost:  // signals come from the controller
         return has_reason(status_.reasons, Reason::controller_offline);
       case Reason::sensor_suspected:
@@ -90,11 +102,6 @@ class Causes {
   /// At start, no value has lasted long enough to count.
   [[nodiscard]] bool only_settles() const {
     return status_.mode == Mode::starting && status_.sensors_bad.empty();
-  }
-
-  [[nodiscard]] bool is_confirming() const {
-    const auto says_so = [](const std::string& text) { return text.starts_with(confirming); };
-    return std::any_of(status_.warnings.begin(), status_.warnings.end(), says_so);
   }
 
   void add_reasons(Severity severity) {
@@ -289,6 +296,8 @@ void add_degradations(const Status& status, std::vector<std::string>& why) {
     for (const UnitStatus& unit : bus.units)
       if (!unit.answering) why.push_back("bus " + bus.name + ": " + unit.name + " is silent");
   }
+  for (const FrozenModule& module : status.modules_frozen)
+    why.push_back("device " + module.name + ": " + frozen_text(module));
   if (status.history.enabled && !status.history.working)
     why.emplace_back("the history is not written");
 }
@@ -381,6 +390,10 @@ std::vector<std::string> estimate_lines(const std::vector<InputStatus>& inputs,
                            : ""));
   lines.push_back("this makes the offsets uncertain by (1 sd): " + joined(offsets));
   return lines;
+}
+
+std::string frozen_text(const FrozenModule& module) {
+  return "the same values for " + duration_text(module.same_s) + ", up and down before: frozen?";
 }
 
 bool settles(const SensorStatus& sensor) {

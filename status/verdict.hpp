@@ -14,9 +14,6 @@ namespace thermocomp {
 /// axis driven, a model with non-zero coefficients.
 [[nodiscard]] bool is_compensating(const Status& status);
 
-/// Begins the daemon's warning that an input has no value yet because values are being confirmed.
-inline constexpr std::string_view confirming = "new values are being confirmed: ";
-
 struct Verdict {
   bool compensating{false};
   bool intended{false};  ///< not compensating on purpose: switched off, dry run
@@ -56,6 +53,10 @@ struct Trouble {
 [[nodiscard]] CodeText fault_text(const SensorStatus& sensor);
 /// The newest value is valid but has not lasted long enough to count.
 [[nodiscard]] bool settles(const SensorStatus& sensor);
+/// "the same values for 1 min 15 s, up and down before: frozen?"
+[[nodiscard]] std::string frozen_text(const FrozenModule& module);
+inline constexpr std::string_view frozen_remedy =
+    "compare with a hand-held thermometer, switch the device off and on";
 /// "off by +2.0 K against its neighbours since 2026-03-01 08:30:11.1, used all the same"
 [[nodiscard]] std::string suspicion_text(const SensorError& suspected);
 /// The newest failed write, empty if there is none: "writes refused, function 16, address 100,

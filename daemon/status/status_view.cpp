@@ -384,27 +384,25 @@ std::optional<ProbeDueStatus> probe_due_of(const StatusView& view) {
 }
 
 /// Says of each module which new values do not count yet, and until when.
-void add_confirmations(const StatusView& view, std::vector<std::string>& warnings) {
+std::vector<Confirmation> confirmations_of(const StatusView& view) {
   const std::vector<SensorReport>& reports = view.report.sensors;
   std::map<std::string, std::vector<std::size_t>> modules;
   for (std::size_t i = 0; i < reports.size(); ++i)
     if (reports[i].settles()) modules[view.config.estimator.sensors[i].module].push_back(i);
+  std::vector<Confirmation> all;
   for (const auto& [module, sensors] : modules) {
-    std::vector<std::string> names;
-    double settle_s = 0.0;
+    Confirmation values{.settle_s = 0.0};
     bool is_one_value = sensors.size() > 1 && !module.empty();
     for (const std::size_t i : sensors) {
       const SensorConfig& sensor = view.config.estimator.sensors[i];
-      names.push_back(sensor.name);
-      settle_s = std::max(settle_s, sensor.screening.settle_s);
+      values.sensors.push_back(sensor.name);
+      values.settle_s = std::max(values.settle_s, sensor.screening.settle_s);
       is_one_value = is_one_value && reports[i].raw_degC == reports[sensors.front()].raw_degC;
     }
-    warnings.push_back(std::string(confirming) + joined(names) +
-                       " count after settle_s = " + duration_text(settle_s) +
-                       (is_one_value ? ", and not while all channels of " + module +
-                                           " show one value, as a module that is not ready"
-                                     : ""));
+    if (is_one_value) values.one_value_of = module;
+    all.push_back(std::move(values));
   }
+  return all;
 }
 
 }  // namespace
@@ -460,6 +458,7 @@ Status status_of(const StatusView& view) {
       .warm = warm_of(view),
       .inputs = inputs_of(view),
       .reference = reference_of(view),
+      .modules_frozen = view.modules_frozen,
       .controller = controller_of(view),
       .history = history_of(view),
       .socket = socket_of(view.socket),
@@ -478,7 +477,7 @@ Status status_of(const StatusView& view) {
   }
   for (const BusHealth& bus : view.buses) status.buses.push_back(bus_of(view, bus));
   if (has_reason(view.report.reasons, Reason::block_lost) && view.report.mode != Mode::starting)
-    add_confirmations(view, status.warnings);
+    status.confirming = confirmations_of(view);
   return status;
 }
 

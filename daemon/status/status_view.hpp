@@ -32,6 +32,7 @@ struct StatusView {
   ControllerHealth controller_health;
   HistoryStatistics history;
   std::vector<std::string> warnings;
+  std::vector<FrozenModule> modules_frozen;
   double uptime_s{0.0};
   bool real_time{false};
   SocketStatistics socket;

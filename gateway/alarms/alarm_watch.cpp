@@ -74,6 +74,10 @@ std::vector<AlarmCondition> active_conditions(const Snapshot& snapshot) {
   add_compensation(status, wrong);
   const std::set<std::string> away = add_buses(status, wrong);
   add_sensors(snapshot.sensors, away, wrong);
+  for (const FrozenModule& module : status.modules_frozen)
+    wrong.push_back({"frozen/" + module.name,
+                     "device " + module.name + " repeats its values, which were noisy: frozen?",
+                     std::string(frozen_remedy)});
   for (const AxisStatus& axis : status.axes)
     if (axis.at_bound)
       wrong.push_back({"bound/" + axis.name, "axis " + axis.name + " is at its bound",

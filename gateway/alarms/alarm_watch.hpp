@@ -13,7 +13,7 @@ namespace thermocomp::gateway {
 
 struct AlarmCondition {
   std::string name;  ///< "compensation", "sensor/bed_front", "suspected/bed_front", "bound/z",
-                     ///< "domain", "bus/cabinet", "unit/bed", "daemon"
+                     ///< "domain", "bus/cabinet", "unit/bed", "frozen/bed", "daemon"
   std::string text;
   std::string remedy;  ///< what to do; empty: unknown
 };

@@ -327,9 +327,19 @@ TEST_CASE("values that are being confirmed are the reason, not a lost sensor", "
   status.mode = Mode::holding;
   status.reasons = only(Reason::block_lost);
   CHECK_THAT(status_text(status, false), Contains("no good sensor left"));
-  status.warnings = {std::string(confirming) + "bed count after settle_s = 2 s"};
+  status.confirming = {{.sensors = {"bed"}, .settle_s = 2.0}};
   CHECK_THAT(status_text(status, false),
-             Contains("new values are being confirmed: bed") && !Contains("no good sensor left"));
+             Contains("new values are being confirmed: bed count after settle_s = 2 s") && !Contains("no good sensor left"));
+}
+
+TEST_CASE("a module that may be frozen is a degradation", "[cli][status]") {
+  Status status = good_status();
+  status.modules_frozen = {{"m1", 75.0}};
+  CHECK_THAT(status_text(status, false),
+             Contains("yes, ") && Contains("device m1: the same values for 1 min 15 s") &&
+                 Contains("switch the device off and on"));
+  CHECK(why_not(status, false).empty());
+  CHECK(why_not(status, true).size() == 1);
 }
 
 TEST_CASE("a model of zeros compensates nothing", "[cli][status]") {

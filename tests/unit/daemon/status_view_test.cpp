@@ -5,7 +5,7 @@
 namespace thermocomp {
 namespace {
 
-TEST_CASE("values that are being confirmed after an outage are a warning, with the time it takes",
+TEST_CASE("values that are being confirmed after an outage are named, with the time it takes",
           "[status_view]") {
   DaemonConfig config;
   Report report;
@@ -22,20 +22,23 @@ TEST_CASE("values that are being confirmed after an outage are a warning, with t
   }
   const ControllerState controller;
   const CycleTiming timing;
-  const auto warnings = [&] {
-    return status_of(StatusView{config, report, controller, timing, {}, {}, {}, {}, 0.0, false, {}})
-        .warnings;
+  const auto confirming = [&] {
+    return status_of(
+               StatusView{config, report, controller, timing, {}, {}, {}, {}, {}, 0.0, false, {}})
+        .confirming;
   };
-  const std::string text = "new values are being confirmed: bed, head count after settle_s = 2 s";
-  CHECK(warnings() == std::vector{text});
+  REQUIRE(confirming().size() == 1);
+  CHECK(confirming()[0].sensors == std::vector<std::string>{"bed", "head"});
+  CHECK(confirming()[0].settle_s == 2.0);
+  CHECK(confirming()[0].one_value_of.empty());
   report.sensors[1].raw_degC = 21.5;
-  CHECK(warnings() == std::vector{text + ", and not while all channels of m1 show one value, "
-                                         "as a module that is not ready"});
+  REQUIRE(confirming().size() == 1);
+  CHECK(confirming()[0].one_value_of == "m1");
   report.sensors[0].fault = report.sensors[1].fault = Fault::no_answer;
-  CHECK(warnings().empty());
+  CHECK(confirming().empty());
   report.sensors[0].fault = Fault::unconfirmed;
   report.mode = Mode::starting;  // normal there
-  CHECK(warnings().empty());
+  CHECK(confirming().empty());
 }
 
 }  // namespace

@@ -82,11 +82,12 @@ TEST_CASE("each condition raises its own alarm", "[gateway][alarm]") {
   snapshot.status.model.outside = true;
   snapshot.status.mode = Mode::holding;
   snapshot.status.reasons = static_cast<std::uint32_t>(Reason::block_lost);
+  snapshot.status.modules_frozen = {{"m1", 75.0}};
   snapshot.sensors.sensors[0].fault = Fault::open_circuit;
   snapshot.sensors.sensors[0].suspected = {.size_K = 2.0, .since = 1.0};
   const auto wrong = active_conditions(snapshot);
   CHECK(names(wrong) == std::vector<std::string>{"compensation", "bus/cabinet", "sensor/a",
-                                                 "suspected/a", "bound/z", "domain"});
+                                                 "suspected/a", "frozen/m1", "bound/z", "domain"});
   for (const AlarmCondition& condition : wrong) {
     CHECK_FALSE(condition.text.empty());
     CHECK_FALSE(condition.remedy.empty());
