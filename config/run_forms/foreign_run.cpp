@@ -56,9 +56,9 @@ std::string own_name(const SpelledName& spelled) {
 }
 
 /// "ΔT", "dT bed-head", "Temp diff", "rise above ambient".
-bool names_difference(std::string name) {
-  if (name.starts_with("dT")) return true;
-  for (char& c : name) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+bool names_difference(const std::string& base) {
+  if (base.starts_with("dT")) return true;
+  const std::string name = small_letters(base);
   for (const std::string_view word : {"Δ", "∆", "delta", "diff", "rise"})
     if (name.find(word) != std::string::npos) return true;
   return false;
@@ -528,10 +528,7 @@ class ForeignReader {
   bool takes_as_missing(std::string_view field, const std::optional<double>& number) {
     constexpr double overload_min = 1e37;
     if (is_missing(field)) return true;
-    std::string small(field.substr(0, 20));
-    for (char& c : small) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-    const bool is_word =
-        std::find(missing_words.begin(), missing_words.end(), small) != missing_words.end();
+    const bool is_word = is_one_of(missing_words, field);
     const bool is_listed = map_ != nullptr && std::find(map_->missing.begin(), map_->missing.end(),
                                                         field) != map_->missing.end();
     const bool is_overload = number && std::abs(*number) >= overload_min;

@@ -6,6 +6,7 @@
 
 #include "config/run_forms/number_epoch.hpp"
 #include "config/run_forms/spelled_unit.hpp"
+#include "config/run_forms/time_name.hpp"
 #include "config/run_forms/time_stamp.hpp"
 #include "config/text/printable_text.hpp"
 
@@ -14,38 +15,6 @@ namespace {
 
 constexpr double day_s = 86400.0;
 constexpr std::size_t rows_read = 100;
-
-constexpr auto time_names = std::to_array<std::string_view>(
-    {"time",          "zeit",      "timestamp", "zeitstempel",  "datetime",     "date",
-     "datum",         "uhrzeit",   "elapsed",   "elapsed time", "date time",    "date/time",
-     "datum/uhrzeit", "t_s",       "laufzeit",  "ts",           "_time",        "x_value",
-     "unixtime",      "unix_time", "epoch",     "seconds",      "last_changed", "elapsed_time",
-     "time stamp",    "scan time", "date_time", "sample time"});
-constexpr auto date_names =
-    std::to_array<std::string_view>({"date", "datum", "datetime", "date time", "date/time",
-                                     "datum/uhrzeit", "time", "zeit", "timestamp", "zeitstempel"});
-
-std::string small_letters(std::string_view text) {
-  std::string small(text);
-  for (char& c : small) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return small;
-}
-
-template <std::size_t N>
-bool is_one_of(const std::array<std::string_view, N>& names, std::string_view header) {
-  std::string base = small_letters(spelled_name(header).base);
-  base = base.substr(0, base.find(','));  // "Date Time, GMT+01:00"
-  return std::find(names.begin(), names.end(), base) != names.end();
-}
-
-/// The unit at the end of a time column's name, "time_ms"; empty: none.
-std::string unit_of_name(std::string_view header) {
-  const auto bar = header.rfind('_');
-  if (bar == std::string_view::npos || bar == 0 || !is_one_of(time_names, header.substr(0, bar)))
-    return {};
-  const SpelledUnit* unit = spelled_unit(header.substr(bar + 1));
-  return unit != nullptr && unit->dimension == "time" ? std::string(unit->spelling) : "";
-}
 
 enum class Holds { other, date, clock, both };
 
@@ -74,18 +43,6 @@ std::vector<double> first_numbers(const TextTable& table, std::size_t column,
     numbers.push_back(*number);
   }
   return numbers;
-}
-
-/// "Date Time, GMT+01:00": time zone of the column.
-std::optional<double> zone_of_header(std::string_view header) {
-  for (const std::string_view name : {"GMT", "UTC"}) {
-    const auto at = header.find(name);
-    if (at == std::string_view::npos) continue;
-    std::string_view zone = header.substr(at);
-    zone = zone.substr(0, zone.find_first_of(" )]"));
-    return parse_zone(zone);
-  }
-  return std::nullopt;
 }
 
 bool within(const std::vector<double>& numbers, double low, double high) {
@@ -186,7 +143,7 @@ class TimeReader {
     if (!take_numbers(column)) return;
     std::string unit(asked_unit());
     if (unit.empty()) unit = header == "time_s" ? "s" : units_[column];
-    if (unit.empty()) unit = unit_of_name(header);
+    if (unit.empty()) unit = unit_of_time_name(header);
     if (number_text_of(units_[column]).unit != nullptr) {
       problems_.add(table_.header_line, header, units_[column],
                     "is a multiple of a unit: write the times in s, and s as their unit");
@@ -194,7 +151,7 @@ class TimeReader {
     }
     const SpelledUnit* known = spelled_unit(unit);
     const bool is_time = known != nullptr && known->dimension == "time";
-    const Epoch* epoch = epoch_of(run_.time_s, is_time || is_one_of(date_names, header), is_time);
+    const Epoch* epoch = epoch_of(run_.time_s, is_time || names_date(header), is_time);
     if (epoch != nullptr && is_time && std::abs(known->factor * epoch->per_second - 1) > 1e-9)
       epoch = nullptr;  // the unit implies another scale
     if (epoch != nullptr) {
@@ -425,10 +382,10 @@ void keep_moving_dates(const TextTable& table, std::vector<std::size_t>& dates) 
   };
   if (!std::all_of(dates.begin(), dates.end(), is_constant)) std::erase_if(dates, is_constant);
   const auto named = std::find_if(dates.begin(), dates.end(), [&](std::size_t column) {
-    return is_one_of(time_names, table.header[column]);
+    return names_time(table.header[column]);
   });
   const auto named_count = std::count_if(dates.begin(), dates.end(), [&](std::size_t column) {
-    return is_one_of(time_names, table.header[column]);
+    return names_time(table.header[column]);
   });
   if (named_count == 1) dates = {*named};
 }
@@ -470,10 +427,9 @@ Candidates candidates(const TextTable& table, const ColumnMap* map,
       found.dates.push_back(i);
     else if (here == Holds::clock)
       found.clocks.push_back(i);
-    else if (epoch_of(first_numbers(table, i, form), is_one_of(date_names, header), is_time) !=
-             nullptr)
+    else if (epoch_of(first_numbers(table, i, form), names_date(header), is_time) != nullptr)
       found.epochs.push_back(i);
-    else if (is_one_of(time_names, header) || !unit_of_name(header).empty() || is_time)
+    else if (names_time(header) || !unit_of_time_name(header).empty() || is_time)
       found.counting.push_back(i);
   }
   return found;

@@ -82,6 +82,40 @@ TEST_CASE("a header has a name for each field, or is refused", "[import]") {
   });
 }
 
+TEST_CASE("the header is the lowest line above the rows that names the time, else of words",
+          "[import]") {
+  check_all({
+      {"statistics above it",
+       "\"testo\";\"Nr. 4\";\n\"Start:\";\"01.02.2026 08:00:00\";\n\"Mean:\";\"20,55\";\"21,05\"\n"
+       ";\"T1 [°C]\";\"T2 [°C]\"\n\"01.02.2026 08:00:00\";20,4;20,9\n\"01.02.2026 "
+       "08:05:00\";20,5;21,0\n",
+       "time_s,T1_degC,T2_degC\n0,20.4,20.9\n300,20.5,21\n", ""},
+      {"a title of words above it",
+       "Operator,MK,Shift 2\n,Bed [°C],Bed [°C]\n2026-02-13 08:00:00,20.1,20.9\n"
+       "2026-02-13 08:01:00,20.2,21.0\n",
+       "time_s,Bed_degC,Bed_2_degC\n0,20.1,20.9\n60,20.2,21\n", ""},
+      {"serial numbers above it", "Serial,A123,B345\nTime [s],T [°C],T [°C]\n0,20,21\n10,20,22\n",
+       "time_s,T_degC,T_2_degC\n0,20,21\n10,20,22\n", ""},
+      {"units and limits below it",
+       "Time,T1,T2\nUnit,°C,°F\nMax,100,212\nMin,0,32\n13.02.2026 08:00:00,20.5,69.8\n"
+       "13.02.2026 08:00:10,20.6,68\n",
+       "time_s,T1_degC,T2_degC\n0,20.5,21\n10,20.6,20\n", ""},
+      {"channel numbers below it", "Time [s],T1 [°C],T2 [°C]\n,1,2\n0,20.5,21\n10,20.6,22\n",
+       "time_s,T1_degC,T2_degC\n0,20.5,21\n", ""},
+      {"rows of missing values below it",
+       "Time [s],T1 [°C],T2 [°C]\n0,,\n10,OL,\n20,20.5,21\n30,20.6,22\n40,20.6,22\n",
+       "time_s,T1_degC,T2_degC\n0,,\n10,,\n20,20.5,21\n", ""},
+      {"a missing first column", "T1 [°C],z [µm]\n,0\n,0.5\n20.5,1\n20.6,1.5\n20.7,2\n",
+       "time_s,T1_degC,z_um\n0,,0\n10,,0.5\n20,20.5,1\n", "period_s = 10"},
+      {"clock times that are none", "Time,T1 [°C]\n-00:00:05,20\n00:00:00,21\n00:00:05,21\n",
+       "log:2: -00:00:05,20: is neither a row like those below", ""},
+      {"factors below the units", "Time,T1,T2\ns,°C,°C\n1,0.1,0.1\n10,205,210\n20,206,220\n",
+       "log:3: 1,0.1,0.1: is neither a row like those below", ""},
+      {"factors with a word", "Time,T1\ns,°C\nFactor,0.1\n10,205\n20,206\n",
+       "log:3: Factor,0.1: is neither a row like those below", ""},
+  });
+}
+
 TEST_CASE("a unit that is not known, or changes, does not reach a column of another", "[import]") {
   check_all({
       {"a changing unit of a series",
