@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <set>
 #include <tuple>
+#include <utility>
 
 #include "config/run_forms/log_form.hpp"
 #include "config/run_forms/long_table.hpp"
@@ -70,6 +72,17 @@ std::optional<double> switch_word(std::string_view field) {
   for (const std::string_view off : {"off", "OFF", "Off", "false", "FALSE", "False"})
     if (field == off) return 0.0;
   return std::nullopt;
+}
+
+/// Summer time begins and ends before 3 o'clock on a Sunday of March, April, September, October or
+/// November.
+bool may_be_clock_change(double wall_s) {
+  const auto hour = static_cast<int>(std::floor(wall_s / 3600.0));
+  const auto days = std::chrono::floor<std::chrono::days>(std::chrono::hours{hour});
+  const std::chrono::sys_days day{days};
+  const auto month = static_cast<unsigned>(std::chrono::year_month_day{day}.month());
+  return std::chrono::weekday{day} == std::chrono::Sunday && hour - 24 * days.count() < 3 &&
+         (month == 3 || month == 4 || (month >= 9 && month <= 11));
 }
 
 class ForeignReader {
@@ -176,27 +189,28 @@ class ForeignReader {
       time = {};
       read_units();
     }
-    const auto is_not_later = [](double a, double b) { return !(b > a); };
-    if (std::adjacent_find(time_s.begin(), time_s.end(), is_not_later) == time_s.end()) return;
-    const auto is_not_earlier = [](double a, double b) { return !(b < a); };
-    if (std::adjacent_find(time_s.begin(), time_s.end(), is_not_earlier) == time_s.end()) {
-      turn_rows(time_s);
-      return;
-    }
-    if (is_set_back_an_hour(time_s)) return;
-    const auto at = std::adjacent_find(time_s.begin(), time_s.end(), is_not_later);
+    std::ptrdiff_t falling = 0;
+    for (std::size_t row = 1; row < time_s.size(); ++row)
+      falling += (time_s[row] < time_s[row - 1] ? 1 : 0) - (time_s[row] > time_s[row - 1] ? 1 : 0);
+    if (falling > 0) turn_rows(time_s);
+    follow_summer_time(time_s);
+    const auto at = std::adjacent_find(time_s.begin(), time_s.end(),
+                                       [](double a, double b) { return !(b > a); });
+    if (at == time_s.end()) return;
     const auto row = static_cast<std::size_t>(at - time_s.begin()) + 1;
     const std::size_t column = time.columns.empty() ? 0 : time.columns.back();
-    std::string rule =
-        "must be later than in the row before (" + shortened(table_.field(row - 1, column)) + ")";
+    std::string rule = "must be later than in line " + std::to_string(table_.lines[row - 1]) +
+                       " (" + shortened(table_.field(row - 1, column)) + "): ";
     if (has_text(row, time))
       rule +=
-          "; for one row per value write pivot = \"the column that names the series\" in the "
+          "for one row per value write pivot = \"the column that names the series\" in the "
           "file of --columns";
-    else if (row == 1)
-      rule += ": delete line " + std::to_string(table_.lines[0]) + " if it belongs to the header";
+    else if (time_s[row] == time_s[row - 1])
+      rule += "write the time with its fraction of a second, or delete one of the two lines";
     else
-      rule += ": delete one of the two lines";
+      rule +=
+          "put the rows in the order of time; where the clock was set, delete the lines "
+          "before or after it";
     problems_.add(table_.lines[row], table_.header[column], table_.field(row, column), rule);
   }
 
@@ -207,24 +221,34 @@ class ForeignReader {
     return false;
   }
 
-  /// In autumn, local time is set back by an hour once, while the rows continue.
-  bool is_set_back_an_hour(std::vector<double>& time_s) {
+  /// A local clock is set forward by an hour in a night of spring, and back in one of autumn, while
+  /// the rows continue.
+  void follow_summer_time(std::vector<double>& time_s) {
     constexpr double hour_s = 3600.0;
     constexpr double steps_max = 3.0;
-    if (!run_.wall_zero || run_.wall_zero->is_utc) return false;
-    const auto is_not_later = [](double a, double b) { return !(b > a); };
-    const auto last = std::adjacent_find(time_s.begin(), time_s.end(), is_not_later);
-    if (last == time_s.begin() ||
-        std::adjacent_find(last + 1, time_s.end(), is_not_later) != time_s.end())
-      return false;
-    const double step_s = *(last + 1) + hour_s - *last;
-    if (!(step_s > 0.0 && step_s <= steps_max * (*last - *(last - 1)))) return false;
-    const auto row = static_cast<std::size_t>(last + 1 - time_s.begin());
-    for (std::size_t i = row; i < time_s.size(); ++i) time_s[i] += hour_s;
-    run_.understood.push_back("the clock was set back by an hour before line " +
-                              std::to_string(table_.lines[row]) +
-                              ": an hour is added from there on");
-    return true;
+    if (!run_.wall_zero || run_.wall_zero->is_utc) return;
+    double added_s = 0.0;
+    double step_s = 0.0;  // between the two rows before
+    double last = time_s.front();
+    for (std::size_t row = 1; row < time_s.size(); ++row) {
+      const double now = time_s[row];
+      const double before_s = std::exchange(step_s, now - last);
+      const double wall_s = run_.wall_zero->seconds + last;
+      const double hours = std::floor((wall_s + step_s) / hour_s) - std::floor(wall_s / hour_s);
+      const double change_s = step_s <= 0.0 ? hour_s : -hour_s;
+      const bool is_change = step_s <= 0.0 || (hours == 2.0 && steps_max * before_s <= hour_s);
+      if (is_change && step_s + change_s > 0.0 && step_s + change_s <= steps_max * before_s &&
+          may_be_clock_change(wall_s)) {
+        added_s += change_s;
+        step_s += change_s;
+        run_.understood.push_back(
+            std::string("summer time: the clock was set ") + (change_s > 0.0 ? "back" : "forward") +
+            " by an hour before line " + std::to_string(table_.lines[row]) +
+            (change_s > 0.0 ? ": an hour is added" : ": an hour is taken off") + " from there on");
+      }
+      last = now;
+      time_s[row] += added_s;
+    }
   }
 
   void turn_rows(std::vector<double>& time_s) {
@@ -233,11 +257,12 @@ class ForeignReader {
     for (double& at : time_s) at -= earliest;
     if (run_.wall_zero) run_.wall_zero->seconds += earliest;
     std::reverse(table_.lines.begin(), table_.lines.end());
-    std::vector<std::string_view> fields;
-    fields.reserve(table_.fields.size());
-    for (std::size_t row = table_.rows(); row-- > 0;)
-      for (std::size_t i = 0; i < table_.columns(); ++i) fields.push_back(table_.field(row, i));
-    table_.fields = std::move(fields);
+    std::reverse(table_.fields.begin(), table_.fields.end());
+    for (auto row = table_.fields.begin(); row != table_.fields.end();) {
+      const auto end = row + static_cast<std::ptrdiff_t>(table_.columns());
+      std::reverse(row, end);
+      row = end;
+    }
     run_.understood.emplace_back("the newest row is first: order reversed");
   }
 
@@ -373,6 +398,19 @@ class ForeignReader {
                     "[columns] in the file of --columns");
       return std::nullopt;
     }
+    const bool has_own = spelled_name(header).unit.empty() && has_own_unit(header);
+    if (has_own && spelled.known != nullptr && spelled.known->dimension != "none" &&
+        !is_mapped_with_unit) {
+      const bool is_same =
+          conversion(*spelled.known, header).value_or(UnitConversion{0}).is_identity();
+      if (is_same && !is_mapped(header)) return Meaning{i, header, {}};
+      if (!is_same)
+        refuse(i, "names one unit, and its column is in " + spelled.unit + ": write " +
+                      toml_text(header) + " = { name = " + toml_text(header) +
+                      ", unit = " + toml_text(spelled.unit) +
+                      " } under [columns] in the file of --columns, or the unit that is true");
+      if (!is_same) return std::nullopt;
+    }
     if (is_mapped(header)) return mapped_meaning(i, map_->columns.at(header), spelled);
     if (spelled.unit.empty() && !unit_of(header).suffix.empty() && is_column_name(header))
       return Meaning{i, header, {}};
@@ -423,13 +461,17 @@ class ForeignReader {
       problems_.add({map_->file, 0, "columns", mapped.name, std::string(column_name_rule)});
       return std::nullopt;
     }
-    if (!unit && !spelled.unit.empty() && !unit_of(mapped.name).suffix.empty()) {
+    const bool has_brackets = !unit && !spelled.unit.empty();
+    if (has_brackets && !unit_of(mapped.name).suffix.empty() && may_be_unit(spelled.unit)) {
       problems_.add({map_->file, 0, "columns", mapped.name,
                      "may not be the unit of '" + table_.header[i] +
                          "': write { name = " + toml_text(mapped.name) +
                          ", unit = \"that of the file\" }, such as degC, 0.1 degC or mil"});
       return std::nullopt;
     }
+    if (has_brackets)
+      run_.understood.push_back("in '" + table_.header[i] + "' '" + spelled.unit +
+                                "' is taken for a part of the name, not for a unit");
     if (!unit) return meaning;
     const auto converted = conversion(*unit, mapped.name);
     if (!converted) {
@@ -515,6 +557,13 @@ class ForeignReader {
     for (const std::string& word : words_)
       if (count++ < words_max) list += (list.empty() ? "" : ", ") + toml_text(shortened(word));
     const auto& [line, header, first] = word_at_;
+    if (switch_word(first)) {
+      problems_.add(line, header, first,
+                    "is a switch: write " + toml_text(header) + " = " +
+                        toml_text(plain_name(spelled_name(header).base) + "_on") +
+                        " under [columns] in the file of --columns");
+      return;
+    }
     problems_.add(line, header, first,
                   (is_impossible_ ? "must be between -273.15 and 2500 degC"
                                   : "must be a number with a decimal " +

@@ -283,6 +283,25 @@ NumberText number_text_of(std::string_view field) {
   return {trimmed(field.substr(0, cut)), unit};
 }
 
+bool may_be_unit(std::string_view text) {
+  const std::string small = small_letters(text);
+  if (small.find('%') != std::string::npos || small.find("deg") != std::string::npos) return true;
+  for (const DegreeSign& sign : degree_signs)
+    if (small.find(sign.bytes) != std::string::npos) return true;
+  std::string word;
+  for (const char c : small + ' ') {
+    const bool is_letter = (c >= 'a' && c <= 'z') || static_cast<unsigned char>(c) >= 0x80;
+    if (is_letter) word += c;
+    if (is_letter || word.empty()) continue;
+    const auto is_word = [&](const SpelledUnit& each) {
+      return small_letters(each.spelling) == word;
+    };
+    if (std::any_of(units.begin(), units.end(), is_word)) return true;
+    word.clear();
+  }
+  return false;
+}
+
 std::optional<SpelledUnit> unit_with_factor(std::string_view unit) {
   if (const SpelledUnit* known = spelled_unit(unit)) return *known;
   const NumberText parts = number_text_of(unit);

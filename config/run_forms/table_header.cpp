@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "config/run_forms/field_text.hpp"
 #include "config/run_forms/spelled_unit.hpp"
@@ -69,14 +70,14 @@ bool is_row_of_types(const TableFields& fields) {
 /// Channel numbers, 1 2 3, or the statistics of each column.
 bool is_known_row_of_numbers(const TableFields& fields) {
   if (is_one_of(statistic_words, fields[0].substr(0, fields[0].find_first_of(".:")))) return true;
-  std::optional<double> last;
+  std::vector<double> numbers;
   for (const std::string_view field : fields) {
-    const auto number = finite_number(field);
-    if (number && last && *number != *last + 1) return false;
-    if (kind_of_field(field) == FieldKind::time || (number && !last && *number > 1)) return false;
-    if (number) last = number;
+    if (kind_of_field(field) == FieldKind::time) return false;
+    if (looks_like_number(field)) numbers.push_back(finite_number(field).value_or(NAN));
   }
-  return last.has_value();
+  return numbers.size() > 1 && (numbers[0] == 0 || numbers[0] == 1) &&
+         std::adjacent_find(numbers.begin(), numbers.end(),
+                            [](double a, double b) { return !(b == a + 1); }) == numbers.end();
 }
 
 /// Whether the key column has its kind, or is missing in a line without any word.

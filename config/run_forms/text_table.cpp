@@ -207,7 +207,7 @@ class TableReader {
       table_.notes.push_back("above the header in line " + std::to_string(table_.header_line) +
                              " left out: '" + shortened(lines_[0].text) + "'" +
                              more_lines(line - 1));
-    const std::size_t between = row_begin_ - line - 1 - (header_.units ? 1 : 0);
+    const std::size_t between = row_begin_ - line - 1 - (header_.units > line ? 1 : 0);
     if (between > 0)
       table_.notes.push_back("between the header and the first row left out: '" +
                              shortened(lines_[row_begin_ - 1].text) + "'" +

@@ -18,10 +18,13 @@ constexpr std::size_t rows_read = 100;
 
 enum class Holds { other, date, clock, both };
 
-/// The kind of content of a column's first rows, if the same in all of them.
+/// The kind of content of a column's first rows, if the same in all of them. A date may be written
+/// only where it changes, and with midnight.
 Holds content(const TextTable& table, std::size_t column) {
   Holds holds = Holds::other;
+  bool all_midnight = true;
   for (std::size_t row = 0; row < std::min(table.rows(), rows_read); ++row) {
+    if (table.field(row, column).empty() && holds == Holds::date) continue;
     const auto stamp = parse_time_stamp(table.field(row, column));
     if (!stamp) return Holds::other;
     const Holds here = !stamp->has_date    ? Holds::clock
@@ -29,8 +32,9 @@ Holds content(const TextTable& table, std::size_t column) {
                                            : Holds::both;
     if (row > 0 && here != holds) return Holds::other;
     holds = here;
+    all_midnight = all_midnight && stamp->is_midnight();
   }
-  return holds;
+  return holds == Holds::both && all_midnight ? Holds::date : holds;
 }
 
 /// The numbers of a column's first rows; empty if one is not a number.
@@ -62,6 +66,31 @@ std::optional<TimeColumns> day_of_year(const TextTable& table, const NumberForm&
       return TimeColumns{{i, i + 1, i + 2}, {}};
   }
   return std::nullopt;
+}
+
+/// 95950, 100000, 100010: equal steps only as hours, minutes and seconds.
+bool are_clock_digits(const std::vector<double>& numbers) {
+  const auto steps_of = [&](auto seconds) {
+    double low = INFINITY;
+    double high = -INFINITY;
+    for (std::size_t i = 1; i < numbers.size(); ++i) {
+      const double step = seconds(numbers[i]) - seconds(numbers[i - 1]);
+      low = std::min(low, step);
+      high = std::max(high, step);
+    }
+    return std::pair(low, high);
+  };
+  const auto of_clock = [](double n) {
+    return 3600 * std::floor(n / 1e4) + 60 * std::fmod(std::floor(n / 100), 100) +
+           std::fmod(n, 100);
+  };
+  const bool may_be = std::all_of(numbers.begin(), numbers.end(), [](double n) {
+    return n >= 0 && n < 240000 && std::fmod(n, 100) < 60 && std::fmod(n / 100, 100) < 60;
+  });
+  if (!may_be || numbers.back() < 1e4) return false;
+  const auto [low, high] = steps_of(of_clock);
+  const auto [number_low, number_high] = steps_of([](double n) { return n; });
+  return low > 0 && high <= 2 * low && number_high > 2 * number_low && number_high >= 40 + high;
 }
 
 class TimeReader {
@@ -149,6 +178,13 @@ class TimeReader {
                     "is a multiple of a unit: write the times in s, and s as their unit");
       return;
     }
+    if (!unit.empty() && are_clock_digits(run_.time_s)) {
+      problems_.add(table_.lines[0], header, table_.field(0, column),
+                    "is a clock without colons, as the last digits of all rows show, and not a "
+                    "number of " +
+                        unit + ": write time_unit = \"hhmmss\" in the file of --columns");
+      return;
+    }
     const SpelledUnit* known = spelled_unit(unit);
     const bool is_time = known != nullptr && known->dimension == "time";
     const Epoch* epoch = epoch_of(run_.time_s, is_time || names_date(header), is_time);
@@ -197,10 +233,15 @@ class TimeReader {
 
   void read_stamps() {
     std::vector<TimeStamp> stamps;
+    std::optional<TimeStamp> date;  // the last one written
     const auto zone = zone_of_header(table_.header[time_.columns[0]]);
     for (std::size_t row = 0; row < table_.rows() && !problems_.full(); ++row) {
-      std::optional<TimeStamp> stamp = stamp_of(table_.field(row, time_.columns[0]));
-      if (stamp && time_.columns.size() == 2) stamp = joined(row, *stamp);
+      const bool has_clocks = time_.columns.size() == 2;
+      if (const std::string_view field = table_.field(row, time_.columns[0]);
+          !has_clocks || row == 0 || !field.empty())
+        date = stamp_of(field);
+      std::optional<TimeStamp> stamp = date;
+      if (stamp && has_clocks) stamp = joined(row, *stamp);
       if (stamp && stamp->has_date && !stamp->zone_s) stamp->zone_s = zone;
       if (stamp && !stamps.empty() && !alike(*stamp, stamps.front())) stamp.reset();
       if (!stamp && row == 0) {
@@ -218,6 +259,7 @@ class TimeReader {
     if (!problems_.empty()) return;
     const DateOrder taken = order.value_or(DateOrder::unknown);
     run_.time_s = seconds_by(stamps, taken);
+    add_fractions();
     const double first = run_.time_s.front();
     for (std::size_t row = 0; row < stamps.size(); ++row) {
       if (std::isnan(run_.time_s[row]))
@@ -249,9 +291,15 @@ class TimeReader {
     return seconds;
   }
 
+  void add_fractions() {
+    for (std::size_t row = 0; row < table_.rows() && time_.fraction; ++row)
+      run_.time_s[row] += time_.fraction_factor *
+                          number_of(table_.field(row, *time_.fraction), form_).value_or(NAN);
+  }
+
   std::optional<TimeStamp> joined(std::size_t row, TimeStamp date) const {
     const auto clock = stamp_of(table_.field(row, time_.columns[1]));
-    if (!clock || clock->has_date || date.has_clock) return std::nullopt;
+    if (!clock || clock->has_date || (date.has_clock && !date.is_midnight())) return std::nullopt;
     TimeStamp both = *clock;
     both.has_date = true;
     both.date = date.date;
@@ -322,6 +370,7 @@ class TimeReader {
   void note_stamps(const TimeStamp& first, std::optional<DateOrder> order, double first_s) {
     run_.note = "time_s: '" + table_.header[time_.columns[0]] + "'";
     if (time_.columns.size() == 2) run_.note += " and '" + table_.header[time_.columns[1]] + "'";
+    if (time_.fraction) run_.note += " and '" + table_.header[*time_.fraction] + "'";
     if (first.has_date && !order) {
       run_.note +=
           ", seconds after the first row; the date may begin with the day or the month, which "
@@ -411,15 +460,19 @@ bool increases(const TextTable& table, std::size_t column) {
   return true;
 }
 
+/// Whether the map makes another use of the column.
+bool is_used(const ColumnMap* map, const std::string& header) {
+  return map != nullptr &&
+         (map->columns.contains(header) ||
+          std::find(map->ignored.begin(), map->ignored.end(), header) != map->ignored.end());
+}
+
 Candidates candidates(const TextTable& table, const ColumnMap* map,
                       const std::vector<std::string>& units, const NumberForm& form) {
   Candidates found;
   for (std::size_t i = 0; i < table.columns(); ++i) {
     const std::string& header = table.header[i];
-    if (map != nullptr &&
-        (map->columns.contains(header) ||
-         std::find(map->ignored.begin(), map->ignored.end(), header) != map->ignored.end()))
-      continue;
+    if (is_used(map, header)) continue;
     const Holds here = content(table, i);
     const SpelledUnit* unit = spelled_unit(units[i]);
     const bool is_time = unit != nullptr && unit->dimension == "time";
@@ -435,15 +488,9 @@ Candidates candidates(const TextTable& table, const ColumnMap* map,
   return found;
 }
 
-}  // namespace
-
-bool TimeColumns::has(std::size_t column) const {
-  return std::find(columns.begin(), columns.end(), column) != columns.end();
-}
-
-std::optional<TimeColumns> find_time(const TextTable& table, const ColumnMap* map,
-                                     const std::vector<std::string>& units, const NumberForm& form,
-                                     ProblemList& problems) {
+std::optional<TimeColumns> find_clock(const TextTable& table, const ColumnMap* map,
+                                      const std::vector<std::string>& units, const NumberForm& form,
+                                      ProblemList& problems) {
   const auto column_of = [&](std::string_view name) {
     return static_cast<std::size_t>(std::find(table.header.begin(), table.header.end(), name) -
                                     table.header.begin());
@@ -474,10 +521,17 @@ std::optional<TimeColumns> find_time(const TextTable& table, const ColumnMap* ma
     if (kind->empty()) continue;
     const std::string first = toml_text(table.header[(*kind)[0]]);
     const std::string second = toml_text(table.header[(*kind)[1]]);
-    problems.add(
-        table.header_line, "column " + std::to_string((*kind)[0] + 1), table.header[(*kind)[0]],
-        "may be the time, and so may " + second + ": write time = " + first + " and ignore = [" +
-            second + "], or the other way round, in the file of --columns");
+    if (first == second)
+      problems.add(table.header_line, "column " + std::to_string((*kind)[1] + 1),
+                   table.header[(*kind)[1]],
+                   "is the name of column " + std::to_string((*kind)[0] + 1) +
+                       ", too, and both may be the time: give each a name of its own in this line, "
+                       "or a file of its own to the columns of each time");
+    else
+      problems.add(
+          table.header_line, "column " + std::to_string((*kind)[0] + 1), table.header[(*kind)[0]],
+          "may be the time, and so may " + second + ": write time = " + first + " and ignore = [" +
+              second + "], or the other way round, in the file of --columns");
     return std::nullopt;
   }
   if (const auto time = day_of_year(table, form)) return time;
@@ -496,6 +550,43 @@ std::optional<TimeColumns> find_time(const TextTable& table, const ColumnMap* ma
   return std::nullopt;
 }
 
+/// The column behind a clock of whole seconds that is called after a unit of time, if all its
+/// numbers are below a second.
+void find_fraction(const TextTable& table, const ColumnMap* map, const NumberForm& form,
+                   TimeColumns& time) {
+  if (time.columns.empty() || time.columns.size() > 2) return;
+  const std::size_t clock = time.columns.back();
+  const std::size_t next = clock + 1;
+  if (next >= table.columns() || time.has(next) || is_used(map, table.header[next])) return;
+  const std::string name = small_letters(table.header[next]);
+  const SpelledUnit* unit = spelled_unit(name == "millitm" || name == "millis" ? "ms" : name);
+  if (unit == nullptr || unit->dimension != "time") return;
+  bool is_moving = false;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const auto stamp = parse_time_stamp(table.field(row, clock));
+    const auto number = number_of(table.field(row, next), form);
+    if (!stamp || !stamp->has_clock || stamp->clock_c != std::floor(stamp->clock_c)) return;
+    if (!number || !(*number >= 0 && unit->factor * *number < 1)) return;
+    is_moving = is_moving || *number != 0;
+  }
+  if (!is_moving) return;
+  time.fraction = next;
+  time.fraction_factor = unit->factor;
+}
+
+}  // namespace
+
+bool TimeColumns::has(std::size_t column) const {
+  return column == fraction || std::find(columns.begin(), columns.end(), column) != columns.end();
+}
+
+std::optional<TimeColumns> find_time(const TextTable& table, const ColumnMap* map,
+                                     const std::vector<std::string>& units, const NumberForm& form,
+                                     ProblemList& problems) {
+  auto time = find_clock(table, map, units, form, problems);
+  if (time) find_fraction(table, map, form, *time);
+  return time;
+}
 RunTime read_time(const TextTable& table, const TimeColumns& time, const ColumnMap* map,
                   const std::vector<std::string>& units, const NumberForm& form,
                   ProblemList& problems) {

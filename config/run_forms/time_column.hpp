@@ -15,7 +15,9 @@ namespace thermocomp {
 /// the rows have a period.
 struct TimeColumns {
   std::vector<std::size_t> columns;
-  std::optional<std::size_t> dates;  ///< column with the date at which a counting number was 0
+  std::optional<std::size_t> dates;       ///< column with the date at which a counting number was 0
+  std::optional<std::size_t> fraction{};  ///< column with the fraction of the second of a clock
+  double fraction_factor{1.0};            ///< s per unit of it
   [[nodiscard]] bool has(std::size_t column) const;
 };
 

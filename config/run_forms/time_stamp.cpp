@@ -246,6 +246,12 @@ std::optional<TimeStamp> parse_time_stamp(std::string_view text) {
     text = trimmed(text);
   }
   if (!take_clock(text, stamp)) return std::nullopt;
+  // The day 0 of databases: only a clock time.
+  constexpr std::array day_0{30, 12, 1899};
+  if (stamp.has_date && (stamp.date == day_0 || stamp.date == std::array{1899, 12, 30})) {
+    stamp.has_date = false;
+    stamp.allows = {};
+  }
   return stamp;
 }
 
