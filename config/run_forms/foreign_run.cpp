@@ -2,16 +2,15 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <set>
 #include <tuple>
-#include <utility>
 
 #include "config/run_forms/log_form.hpp"
 #include "config/run_forms/long_table.hpp"
 #include "config/run_forms/number_form.hpp"
+#include "config/run_forms/row_order.hpp"
 #include "config/run_forms/run_text.hpp"
 #include "config/run_forms/spelled_unit.hpp"
 #include "config/run_forms/text_table.hpp"
@@ -72,17 +71,6 @@ std::optional<double> switch_word(std::string_view field) {
   for (const std::string_view off : {"off", "OFF", "Off", "false", "FALSE", "False"})
     if (field == off) return 0.0;
   return std::nullopt;
-}
-
-/// Summer time begins and ends before 3 o'clock on a Sunday of March, April, September, October or
-/// November.
-bool may_be_clock_change(double wall_s) {
-  const auto hour = static_cast<int>(std::floor(wall_s / 3600.0));
-  const auto days = std::chrono::floor<std::chrono::days>(std::chrono::hours{hour});
-  const std::chrono::sys_days day{days};
-  const auto month = static_cast<unsigned>(std::chrono::year_month_day{day}.month());
-  return std::chrono::weekday{day} == std::chrono::Sunday && hour - 24 * days.count() < 3 &&
-         (month == 3 || month == 4 || (month >= 9 && month <= 11));
 }
 
 class ForeignReader {
@@ -176,7 +164,7 @@ class ForeignReader {
     return first;
   }
 
-  /// Pivots a long table; reverses rows in descending order.
+  /// Pivots a long table, and refuses a time that does not increase.
   void order_rows(TimeColumns& time, std::vector<double>& time_s) {
     if (const auto form = long_form(table_, time, time_s, map_, problems_)) {
       const double scan_s = map_ == nullptr ? 0.0 : map_->scan_s;
@@ -189,11 +177,7 @@ class ForeignReader {
       time = {};
       read_units();
     }
-    std::ptrdiff_t falling = 0;
-    for (std::size_t row = 1; row < time_s.size(); ++row)
-      falling += (time_s[row] < time_s[row - 1] ? 1 : 0) - (time_s[row] > time_s[row - 1] ? 1 : 0);
-    if (falling > 0) turn_rows(time_s);
-    follow_summer_time(time_s);
+    order_in_time(table_, time_s, run_);
     const auto at = std::adjacent_find(time_s.begin(), time_s.end(),
                                        [](double a, double b) { return !(b > a); });
     if (at == time_s.end()) return;
@@ -219,51 +203,6 @@ class ForeignReader {
     for (std::size_t i = 0; i < table_.columns(); ++i)
       if (!time.has(i) && is_text(i) && !table_.field(row, i).empty()) return true;
     return false;
-  }
-
-  /// A local clock is set forward by an hour in a night of spring, and back in one of autumn, while
-  /// the rows continue.
-  void follow_summer_time(std::vector<double>& time_s) {
-    constexpr double hour_s = 3600.0;
-    constexpr double steps_max = 3.0;
-    if (!run_.wall_zero || run_.wall_zero->is_utc) return;
-    double added_s = 0.0;
-    double step_s = 0.0;  // between the two rows before
-    double last = time_s.front();
-    for (std::size_t row = 1; row < time_s.size(); ++row) {
-      const double now = time_s[row];
-      const double before_s = std::exchange(step_s, now - last);
-      const double wall_s = run_.wall_zero->seconds + last;
-      const double hours = std::floor((wall_s + step_s) / hour_s) - std::floor(wall_s / hour_s);
-      const double change_s = step_s <= 0.0 ? hour_s : -hour_s;
-      const bool is_change = step_s <= 0.0 || (hours == 2.0 && steps_max * before_s <= hour_s);
-      if (is_change && step_s + change_s > 0.0 && step_s + change_s <= steps_max * before_s &&
-          may_be_clock_change(wall_s)) {
-        added_s += change_s;
-        step_s += change_s;
-        run_.understood.push_back(
-            std::string("summer time: the clock was set ") + (change_s > 0.0 ? "back" : "forward") +
-            " by an hour before line " + std::to_string(table_.lines[row]) +
-            (change_s > 0.0 ? ": an hour is added" : ": an hour is taken off") + " from there on");
-      }
-      last = now;
-      time_s[row] += added_s;
-    }
-  }
-
-  void turn_rows(std::vector<double>& time_s) {
-    const double earliest = time_s.back();
-    std::reverse(time_s.begin(), time_s.end());
-    for (double& at : time_s) at -= earliest;
-    if (run_.wall_zero) run_.wall_zero->seconds += earliest;
-    std::reverse(table_.lines.begin(), table_.lines.end());
-    std::reverse(table_.fields.begin(), table_.fields.end());
-    for (auto row = table_.fields.begin(); row != table_.fields.end();) {
-      const auto end = row + static_cast<std::ptrdiff_t>(table_.columns());
-      std::reverse(row, end);
-      row = end;
-    }
-    run_.understood.emplace_back("the newest row is first: order reversed");
   }
 
   void note_layout() {
