@@ -157,8 +157,9 @@ void find_names(const std::vector<TableFields>& lines, std::size_t columns, Tabl
       if (!header.units) header.units = i;
       continue;
     }
-    const bool has_names =
-        2 <= fields.size() - static_cast<std::size_t>(std::count(fields.begin(), fields.end(), ""));
+    const std::size_t named =
+        columns - static_cast<std::size_t>(std::count(fields.begin(), fields.end(), ""));
+    const bool has_names = named >= 2 || 2 * named >= columns;
     if (has_time_name || !has_names || holds_time(fields) || is_row_of_types(fields)) continue;
     has_time_name = holds_time_name(fields);
     if (has_time_name || (!header.names && is_all_words(fields))) header.names = i;
