@@ -128,11 +128,10 @@ bool may_be_factors(const TableFields& fields) {
   return !all_one;
 }
 
-bool holds_time_name(const TableFields& fields) {
+bool names_time_or_unit(const TableFields& fields) {
   return std::any_of(fields.begin(), fields.end(), [](std::string_view field) {
-    const SpelledName name = spelled_name(field);
     return names_time(field) || !unit_of_time_name(field).empty() ||
-           (name.known != nullptr && name.known->dimension == "time");
+           spelled_name(field).known != nullptr;
   });
 }
 
@@ -144,7 +143,7 @@ bool holds_time(const TableFields& fields) {
 
 /// Finds names and units above the first row.
 void find_names(const std::vector<TableFields>& lines, std::size_t columns, TableHeader& header) {
-  bool has_time_name = false;
+  bool is_found = false;
   for (std::size_t up = 1; up <= std::min(header.row_begin, header_rows_max); ++up) {
     const std::size_t i = header.row_begin - up;
     const TableFields& fields = lines[i];
@@ -160,9 +159,9 @@ void find_names(const std::vector<TableFields>& lines, std::size_t columns, Tabl
     const std::size_t named =
         columns - static_cast<std::size_t>(std::count(fields.begin(), fields.end(), ""));
     const bool has_names = named >= 2 || 2 * named >= columns;
-    if (has_time_name || !has_names || holds_time(fields) || is_row_of_types(fields)) continue;
-    has_time_name = holds_time_name(fields);
-    if (has_time_name || (!header.names && is_all_words(fields))) header.names = i;
+    if (is_found || !has_names || holds_time(fields) || is_row_of_types(fields)) continue;
+    is_found = names_time_or_unit(fields);
+    if (is_found || (!header.names && is_all_words(fields))) header.names = i;
   }
 }
 

@@ -23,9 +23,9 @@ struct TableHeader {
   std::optional<std::size_t> unclear;  ///< numbers below the names that are no row
 };
 
-/// The header is the lowest line above the first row that names the time, else the lowest one of
-/// words; it has as many fields as the rows. Lines of units, types, channel numbers and statistics
-/// between it and the first row are recognised; other numbers there are unclear.
+/// The header is the lowest line above the first row that names the time or a unit, else the lowest
+/// one of words; it has as many fields as the rows. Lines of units, types, channel numbers and
+/// statistics between it and the first row are recognised; other numbers there are unclear.
 /// @param lines  the fields of the first lines
 /// @param begin  the first line with `columns` fields, if names are not in line 0
 /// @param is_first  the names are in line 0

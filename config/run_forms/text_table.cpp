@@ -141,13 +141,14 @@ class TableReader {
                     "must be at most " + std::to_string(fields_max));
     } else if (header_.unclear) {
       const TextLine& line = lines_[*header_.unclear];
-      problems_.add(
-          line.number, "", line.text,
-          "is neither a row like those below nor names, units or numbers of channels: "
-          "delete the line; where it holds names write header_line = " +
-              std::to_string(line.number) +
-              ", where it holds factors \"T1\" = { name = \"t1_degC\", unit = \"0.1 degC\" "
-              "} under [columns], in the file of --columns");
+      const std::string rule =
+          header_.names ? "delete the line; where it holds factors also write \"T1\" = { name = "
+                          "\"t1_degC\", unit = \"0.1 degC\" } under [columns]"
+                        : "delete the line or, if it holds the names, write header_line = " +
+                              std::to_string(line.number);
+      problems_.add(line.number, "", line.text,
+                    "is neither a row like those below nor names, units or numbers of channels: " +
+                        rule + " in the file of --columns");
     } else if (header_.names && !(has_given && fields[*header_.names].size() != cut_.fields)) {
       if (header_.units)
         for (const std::string_view field : fields[*header_.units])

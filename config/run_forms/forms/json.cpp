@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <map>
+#include <set>
 
 #include <nlohmann/json.hpp>
 
@@ -111,13 +112,19 @@ PlainTable plain_store(const Log& log, const json& store) {
 
 // ---- records
 
+/// The first member of one of these names; null: none.
+json first_of(const json& object, std::initializer_list<const char*> names) {
+  for (const char* name : names)
+    if (object.is_object() && object.contains(name)) return object[name];
+  return nullptr;
+}
+
 /// {"value": 68, "unit": "°F"}; empty: something else.
 std::string value_with_unit(const json& object) {
-  const auto value = object.find("value");
-  const auto unit = object.find("unit");
-  if (value == object.end() || unit == object.end() || !value->is_number() || !unit->is_string())
-    return {};
-  return number_text(value->get<double>()) + " " + unit->get<std::string>();
+  const json value = first_of(object, {"value", "val"});
+  const json unit = first_of(object, {"unit", "units", "uom"});
+  if (!value.is_number() || !unit.is_string()) return {};
+  return number_text(value.get<double>()) + " " + unit.get<std::string>();
 }
 
 /// Units by name in an object called "units" or "hourly_units" of the document.
@@ -179,13 +186,7 @@ class Records {
   void add_value(const std::string& name, const json& value,
                  std::map<std::size_t, std::string>& row) {
     if (value.is_array()) {
-      const std::size_t expected = lengths_.emplace(name, value.size()).first->second;
-      if (value.size() != expected)
-        log_.refuse(0, name, std::to_string(value.size()) + " values",
-                    "must have as many as the record before, " + std::to_string(expected) +
-                        ": write null for a missing one");
-      for (std::size_t i = 0; i < value.size(); ++i)
-        add_value(name + "." + std::to_string(i + 1), value[i], row);
+      add_list(name, value, row);
     } else if (value.is_object()) {
       if (const std::string with_unit = value_with_unit(value); !with_unit.empty())
         row[column(name)] = in_quotes(with_unit);
@@ -198,6 +199,26 @@ class Records {
     } else if (value.is_string()) {
       row[column(name)] = in_quotes(value.get<std::string>());
     }
+  }
+
+  /// The elements are called as they say themselves, else by their number.
+  void add_list(const std::string& name, const json& list,
+                std::map<std::size_t, std::string>& row) {
+    bool has_names = !list.empty();
+    std::set<std::string> seen;
+    for (std::size_t i = 0; i < list.size(); ++i) {
+      const json own = first_of(list[i], {"name", "id", "sensor", "tag", "channel"});
+      has_names = has_names && own.is_string();
+      const std::string element = own.is_string() ? own.get<std::string>() : std::to_string(i + 1);
+      if (!seen.insert(element).second)
+        log_.refuse(0, name, element, "must be the name of one element of a list");
+      add_value(name + "." + element, list[i], row);
+    }
+    const std::size_t expected = lengths_.emplace(name, list.size()).first->second;
+    if (!has_names && list.size() != expected)
+      log_.refuse(0, name, std::to_string(list.size()) + " values",
+                  "must have as many as the record before, " + std::to_string(expected) +
+                      ": write null for a missing one");
   }
 
   const Log& log_;

@@ -84,8 +84,9 @@ TEST_CASE("a header has a name for each field, or is refused", "[import]") {
   });
 }
 
-TEST_CASE("the header is the lowest line above the rows that names the time, else of words",
-          "[import]") {
+TEST_CASE(
+    "the header is the lowest line above the rows that names the time or a unit, else of words",
+    "[import]") {
   check_all({
       {"statistics above it",
        "\"testo\";\"Nr. 4\";\n\"Start:\";\"01.02.2026 08:00:00\";\n\"Mean:\";\"20,55\";\"21,05\"\n"
@@ -96,6 +97,9 @@ TEST_CASE("the header is the lowest line above the rows that names the time, els
        "Operator,MK,Shift 2\n,Bed [°C],Bed [°C]\n2026-02-13 08:00:00,20.1,20.9\n"
        "2026-02-13 08:01:00,20.2,21.0\n",
        "time_s,Bed_degC,Bed_2_degC\n0,20.1,20.9\n60,20.2,21\n", ""},
+      {"a title that names a date above it",
+       "Date;Report\nStamp;T1 [C]\n2026-02-01 08:00:00;20\n2026-02-01 08:00:10;21\n",
+       "time_s,T1_degC\n0,20\n10,21\n", ""},
       {"serial numbers above it", "Serial,A123,B345\nTime [s],T [°C],T [°C]\n0,20,21\n10,20,22\n",
        "time_s,T_degC,T_2_degC\n0,20,21\n10,20,22\n", ""},
       {"units and limits below it",
@@ -201,6 +205,12 @@ TEST_CASE("JSON: lists of sensors, and units beside the values", "[import]") {
   check_all({
       {"a list", "{\"time\":0,\"t\":[20.5,21]}\n{\"time\":1,\"t\":[20.6,null]}\n",
        "time_s,t.1,t.2\n0,20.5,21\n1,20.6,\n", "time_unit = \"s\""},
+      {"a list whose elements have names, in any order",
+       "[{\"time\":\"08:00:00\",\"t\":[{\"id\":\"bed\",\"value\":20},{\"id\":\"head\",\"value\":25}"
+       "]},\n"
+       "{\"time\":\"08:00:10\",\"t\":[{\"id\":\"head\",\"value\":26},{\"id\":\"bed\",\"value\":21}]"
+       "}]",
+       "time_s,t.bed.value,t.head.value\n0,20,25\n10,21,26\n", ""},
       {"lists of unequal length", "{\"time\":0,\"t\":[20.5,21]}\n{\"time\":1,\"t\":[20.6]}\n",
        "log: t = 1 values: must have as many as the record before, 2", ""},
       {"a value with its unit",
