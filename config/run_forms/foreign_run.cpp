@@ -368,7 +368,10 @@ class ForeignReader {
                     ": write " + toml_text(header) + " = " + toml_text(example) +
                     (spelled.unit.empty()
                          ? " (or what it is; without a unit it is a signal)"
-                         : ", a signal, or { name = \"its name\", unit = \"a known unit\" }") +
+                         : ", a signal, or { name = \"its name\", unit = " +
+                               toml_text(unit_with_factor(spelled.unit) ? spelled.unit
+                                                                        : "a known unit") +
+                               " }") +
                     " under [columns], or ignore = [" + toml_text(header) +
                     "], in the file of --columns");
       return std::nullopt;

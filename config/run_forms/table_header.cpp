@@ -202,7 +202,8 @@ TableHeader find_table_header(const std::vector<TableFields>& lines, std::size_t
     header.unclear = header.row_begin - 1;
   if (!header.names) return header;
   for (std::size_t i = *header.names + 1; i < header.row_begin; ++i)
-    if (!is_all_words(lines[i]) && i != header.units && !is_known_row_of_numbers(lines[i]))
+    if (!header.unclear && !is_all_words(lines[i]) && i != header.units &&
+        !is_known_row_of_numbers(lines[i]))
       header.unclear = i;
   if (header.units && header.row_begin + 1 < lines.size() &&
       may_be_factors(lines[header.row_begin]) && !may_be_factors(lines[header.row_begin + 1]))

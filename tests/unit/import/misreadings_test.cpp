@@ -138,6 +138,8 @@ TEST_CASE("a unit that is not known, or changes, does not reach a column of anot
        "time_s,Bed_degC\n0,20\n60,21\n", ""},
       {"thousandths of an inch", "Time [s],z (mil)\n0,1\n1,2\n", "time_s,z_um\n0,25.4\n1,50.8\n",
        ""},
+      {"a multiple of a unit", "Time [s],T1 [0.1 °C]\n0,205\n1,206\n",
+       "{ name = \"its name\", unit = \"0.1 °C\" }", ""},
       {"an unknown unit of a mapped name", "Time [s],T1 [0.1 °C]\n0,205\n1,206\n",
        "may not be the unit of 'T1 [0.1 °C]'", "[columns]\n\"T1 [0.1 °C]\" = \"t1_degC\""},
       {"the same with its unit", "Time [s],T1 [0.1 °C]\n0,205\n1,210\n",
