@@ -190,11 +190,14 @@ class ForeignReader {
           "for one row per value write pivot = \"the column that names the series\" in the "
           "file of --columns";
     else if (time_s[row] == time_s[row - 1])
-      rule += "write the time with its fraction of a second, or delete one of the two lines";
+      rule += "delete one of the two lines, or write the time with its fraction of a second";
+    else if (row == 1 && table_.lines[0] < table_.lines[1])
+      rule += "delete line " + std::to_string(table_.lines[0]) +
+              " if it belongs to the header, or put the rows in the order of time";
     else
       rule +=
-          "put the rows in the order of time; where the clock was set, delete the lines "
-          "before or after it";
+          "put the rows in the order of time; where the clock was set, delete the lines before "
+          "or after it";
     problems_.add(table_.lines[row], table_.header[column], table_.field(row, column), rule);
   }
 

@@ -197,7 +197,7 @@ TEST_CASE("a date, a fraction of a second and summer time belong to the clock", 
        "14.07.2026 02:10:00,23\n",
        "log:4: Time = 14.07.2026 02:00:00: must be later than in line 3", ""},
       {"two rows of one time", "Time,T1 [C]\n08:00:00,20\n08:00:00,21\n",
-       "must be later than in line 2 (08:00:00): write the time with its fraction", ""},
+       "must be later than in line 2 (08:00:00): delete one of the two lines, or write", ""},
       {"two times of one name", "Time,T1 [C],Time,z [um]\n0,20,0,1\n1,21,0.1,2\n",
        "log:1: column 3 = Time: is the name of column 1, too", ""},
   });
