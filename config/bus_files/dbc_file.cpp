@@ -13,11 +13,11 @@ namespace thermocomp {
 namespace {
 
 constexpr std::uint32_t extended_flag = 0x80000000u;
-constexpr std::uint32_t standard_id_max = 0x7FF;
+constexpr std::uint32_t message_id_max = 0x7FF;
 constexpr std::uint32_t extended_id_max = 0x1FFFFFFF;
 constexpr std::uint64_t message_bytes_max = 1785;  // of a J1939 transport, the longest in use
 constexpr std::size_t classic_bytes_max = 8;
-constexpr std::size_t signals_max = 4096;  // per message
+constexpr std::size_t message_signals_max = 4096;  // per message
 constexpr std::string_view no_message = "VECTOR__INDEPENDENT_SIG_MSG";
 constexpr std::string_view frame_format = "VFrameFormat";
 constexpr std::string_view long_signal = "SystemSignalLongSymbol";
@@ -229,7 +229,7 @@ class DbcReader {
     message.extended = (id & extended_flag) != 0;
     message.id = id & ~extended_flag;
     if (message.name != no_message) {
-      if (message.id > (message.extended ? extended_id_max : standard_id_max)) {
+      if (message.id > (message.extended ? extended_id_max : message_id_max)) {
         const Keys keys = message.id > extended_id_max ? Keys{"id"} : Keys{"extended_id", "id"};
         flaw(line, message.name, std::to_string(id),
              "must be a number of 11 bits, or one of 29 bits with bit 31 set", about_, keys);
@@ -254,7 +254,7 @@ class DbcReader {
     if (in_broken_message_) return scan_.skip_line();
     Draft& draft = drafts_.back();
     about_.message = draft.message.name;
-    if (draft.message.signals.size() == signals_max) {
+    if (draft.message.signals.size() == message_signals_max) {
       throw DbcSyntaxError{line, "SG_", "a message must have at most 4096 signals"};
     }
     DbcSignal signal;
@@ -652,7 +652,7 @@ auto* find_by_name(Entries& entries, std::string_view name) noexcept {
   return found == entries.end() ? nullptr : &*found;
 }
 
-std::vector<std::string> names_of(const auto& entries) {
+std::vector<std::string> names_in(const auto& entries) {
   std::vector<std::string> names;
   for (const auto& entry : entries) {
     names.push_back(entry.name);
@@ -668,7 +668,7 @@ const DbcSignal* DbcMessage::find(std::string_view signal) const noexcept {
 }
 
 std::vector<std::string> DbcMessage::signal_names() const {
-  return names_of(signals);
+  return names_in(signals);
 }
 
 const DbcMessage* DbcFile::find(std::string_view message,
@@ -680,7 +680,7 @@ const DbcMessage* DbcFile::find(std::string_view message,
 }
 
 std::vector<std::string> DbcFile::message_names() const {
-  return names_of(messages);
+  return names_in(messages);
 }
 
 DbcFile read_dbc_text(std::string_view text, const std::string& name) {

@@ -12,12 +12,12 @@
 namespace thermocomp {
 namespace {
 
-constexpr std::size_t shown_max = 60;  // characters of a value in a flaw
+constexpr std::size_t flaw_letters_max = 60;  // characters of a value in a flaw
 constexpr std::uint64_t object_variable = 0x7;
 constexpr std::uint64_t object_domain = 0x2;
 constexpr std::uint64_t sub_max = 0xFE;  // sub-index FF describes the structure
 
-std::string_view trimmed(std::string_view text) {
+std::string_view without_blanks(std::string_view text) {
   const auto blank = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };
   while (!text.empty() && blank(text.front())) text.remove_prefix(1);
   while (!text.empty() && blank(text.back())) text.remove_suffix(1);
@@ -122,8 +122,8 @@ class EdsReader {
   void flaw(int line, const std::string& key, std::string_view value, const std::string& rule) {
     const std::string_view shown = value.empty() && !key.empty() ? "(missing)" : value;
     EdsFlaw& made = flaws_.emplace_back();
-    made.problem = {name_, line, printed(key.substr(0, shown_max)),
-                    printed(shown.substr(0, shown_max)), rule};
+    made.problem = {name_, line, printed(key.substr(0, flaw_letters_max)),
+                    printed(shown.substr(0, flaw_letters_max)), rule};
     if (about_) made.object = ObjectAddress{about_->first, about_->second};
   }
 
@@ -134,7 +134,7 @@ class EdsReader {
     while (!text.empty() && flaws_.size() < flaws_max) {
       ++line;
       const std::size_t end = text.find('\n');
-      const std::string_view content = trimmed(text.substr(0, end));
+      const std::string_view content = without_blanks(text.substr(0, end));
       text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
       if (content.empty() || content.front() == ';') continue;
       if (content.front() == '[') {
@@ -151,7 +151,7 @@ class EdsReader {
       flaw(line, "", content, "must be a section's name in brackets");
       return &nowhere_;
     }
-    const std::string name(trimmed(content.substr(1, content.size() - 2)));
+    const std::string name(without_blanks(content.substr(1, content.size() - 2)));
     about_ = address_of(lower(name));
     const auto [found, is_new] = sections_.try_emplace(lower(name), Section{name, line, {}});
     if (is_new) return &found->second;
@@ -170,8 +170,8 @@ class EdsReader {
       flaw(line, "", content, "must be in a section");
       return;
     }
-    const std::string key(trimmed(content.substr(0, equal)));
-    const std::string value(trimmed(content.substr(equal + 1)));
+    const std::string key(without_blanks(content.substr(0, equal)));
+    const std::string value(without_blanks(content.substr(equal + 1)));
     const bool is_new = section->entries.try_emplace(lower(key), Entry{value, line}).second;
     if (!is_new) flaw(line, key, value, "appears twice in its section");
   }

@@ -12,7 +12,7 @@ namespace thermocomp::sections {
 namespace {
 
 constexpr int node_max = 127;
-constexpr std::uint32_t standard_id_max = 0x7FF;
+constexpr std::uint32_t cob_id_max = 0x7FF;
 
 const Names<ObjectType>& type_names() {
   static const Names<ObjectType> names{
@@ -119,7 +119,7 @@ std::uint32_t read_cob_id(const TomlTable& own, const TomlTable& base, int node)
   const TomlTable& table = has_own ? own : base;
   if (table.has("cob_id")) {
     table.refuse("pdo", "cannot be combined with cob_id");
-    const auto cob_id = table.integer<std::uint32_t>("cob_id", 0, standard_id_max, 0);
+    const auto cob_id = table.integer<std::uint32_t>("cob_id", 0, cob_id_max, 0);
     if (!can_be_tpdo(cob_id)) {
       table.problem("cob_id", "is kept for other messages; a TPDO is in [0x101, 0x57F]");
     }

@@ -10,7 +10,7 @@
 namespace thermocomp::sections {
 namespace {
 
-constexpr int address_max = 253;
+constexpr int node_address_max = 253;
 constexpr int bytes_max = 1785;
 constexpr std::int64_t pgn_max = 0x3FFFF;
 constexpr std::int64_t first_broadcast_format = 240;
@@ -58,7 +58,7 @@ J1939BusConfig read_j1939_bus(const TomlTable& table, const std::string& name) {
   bus.interface = read_interface(table);
   bus.reconnect_s = table.number("reconnect_s", Range::between(0.01, 1), bus.reconnect_s);
   if (table.has("own_address")) {
-    bus.own_address = table.integer("own_address", 0, address_max, 0);
+    bus.own_address = table.integer("own_address", 0, node_address_max, 0);
     if (!table.has("own_name")) table.problem("own_name", "must be given with own_address");
   }
   bus.own_name = read_name(table, "own_name").value_or(0);
@@ -69,7 +69,7 @@ J1939NodeConfig read_j1939_device(const TomlTable& table, const std::string& nam
                                   const J1939BusConfig& bus) {
   J1939NodeConfig node;
   node.name = name;
-  if (table.has("address")) node.address = table.integer("address", 0, address_max, 0);
+  if (table.has("address")) node.address = table.integer("address", 0, node_address_max, 0);
   node.name_claimed = read_name(table, "j1939_name");
   if (!table.has("address") && !table.has("j1939_name")) {
     table.problem("address", "must be given, or j1939_name");

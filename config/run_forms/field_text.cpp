@@ -1,5 +1,6 @@
 #include "config/run_forms/field_text.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 
@@ -30,6 +31,16 @@ bool take(std::string_view& rest, char separator, std::string_view& part) {
   part = rest.substr(0, end);
   rest = end == std::string_view::npos ? std::string_view() : rest.substr(end + 1);
   return true;
+}
+
+std::string small_letters(std::string_view text) {
+  std::string small(text);
+  for (char& c : small) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  return small;
+}
+
+bool is_one_of(std::span<const std::string_view> words, std::string_view text) {
+  return std::find(words.begin(), words.end(), small_letters(text)) != words.end();
 }
 
 std::string shortened(std::string_view text) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -18,6 +19,12 @@ namespace thermocomp {
 
 /// Splits the part before the next separator off `rest`. @return false at the end
 [[nodiscard]] bool take(std::string_view& rest, char separator, std::string_view& part);
+
+/// ASCII letters only.
+[[nodiscard]] std::string small_letters(std::string_view text);
+
+/// Ignores the case of `text`; `words` are in small letters.
+[[nodiscard]] bool is_one_of(std::span<const std::string_view> words, std::string_view text);
 
 /// At most 40 bytes, cut between characters; " ..." marks an omission.
 [[nodiscard]] std::string shortened(std::string_view text);

@@ -10,6 +10,7 @@
 #include "config/run_forms/log_form.hpp"
 #include "config/run_forms/long_table.hpp"
 #include "config/run_forms/number_form.hpp"
+#include "config/run_forms/row_order.hpp"
 #include "config/run_forms/run_text.hpp"
 #include "config/run_forms/spelled_unit.hpp"
 #include "config/run_forms/text_table.hpp"
@@ -56,9 +57,9 @@ std::string own_name(const SpelledName& spelled) {
 }
 
 /// "ΔT", "dT bed-head", "Temp diff", "rise above ambient".
-bool names_difference(std::string name) {
-  if (name.starts_with("dT")) return true;
-  for (char& c : name) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+bool names_difference(const std::string& base) {
+  if (base.starts_with("dT")) return true;
+  const std::string name = small_letters(base);
   for (const std::string_view word : {"Δ", "∆", "delta", "diff", "rise"})
     if (name.find(word) != std::string::npos) return true;
   return false;
@@ -163,7 +164,7 @@ class ForeignReader {
     return first;
   }
 
-  /// Pivots a long table; reverses rows in descending order.
+  /// Pivots a long table, and refuses a time that does not increase.
   void order_rows(TimeColumns& time, std::vector<double>& time_s) {
     if (const auto form = long_form(table_, time, time_s, map_, problems_)) {
       const double scan_s = map_ == nullptr ? 0.0 : map_->scan_s;
@@ -176,27 +177,27 @@ class ForeignReader {
       time = {};
       read_units();
     }
-    const auto is_not_later = [](double a, double b) { return !(b > a); };
-    if (std::adjacent_find(time_s.begin(), time_s.end(), is_not_later) == time_s.end()) return;
-    const auto is_not_earlier = [](double a, double b) { return !(b < a); };
-    if (std::adjacent_find(time_s.begin(), time_s.end(), is_not_earlier) == time_s.end()) {
-      turn_rows(time_s);
-      return;
-    }
-    if (is_set_back_an_hour(time_s)) return;
-    const auto at = std::adjacent_find(time_s.begin(), time_s.end(), is_not_later);
+    order_in_time(table_, time_s, run_);
+    const auto at = std::adjacent_find(time_s.begin(), time_s.end(),
+                                       [](double a, double b) { return !(b > a); });
+    if (at == time_s.end()) return;
     const auto row = static_cast<std::size_t>(at - time_s.begin()) + 1;
     const std::size_t column = time.columns.empty() ? 0 : time.columns.back();
-    std::string rule =
-        "must be later than in the row before (" + shortened(table_.field(row - 1, column)) + ")";
+    std::string rule = "must be later than in line " + std::to_string(table_.lines[row - 1]) +
+                       " (" + shortened(table_.field(row - 1, column)) + "): ";
     if (has_text(row, time))
       rule +=
-          "; for one row per value write pivot = \"the column that names the series\" in the "
+          "for one row per value write pivot = \"the column that names the series\" in the "
           "file of --columns";
-    else if (row == 1)
-      rule += ": delete line " + std::to_string(table_.lines[0]) + " if it belongs to the header";
+    else if (time_s[row] == time_s[row - 1])
+      rule += "delete one of the two lines, or write the time with its fraction of a second";
+    else if (row == 1 && table_.lines[0] < table_.lines[1])
+      rule += "delete line " + std::to_string(table_.lines[0]) +
+              " if it belongs to the header, or put the rows in the order of time";
     else
-      rule += ": delete one of the two lines";
+      rule +=
+          "put the rows in the order of time; where the clock was set, delete the lines before "
+          "or after it";
     problems_.add(table_.lines[row], table_.header[column], table_.field(row, column), rule);
   }
 
@@ -205,40 +206,6 @@ class ForeignReader {
     for (std::size_t i = 0; i < table_.columns(); ++i)
       if (!time.has(i) && is_text(i) && !table_.field(row, i).empty()) return true;
     return false;
-  }
-
-  /// In autumn, local time is set back by an hour once, while the rows continue.
-  bool is_set_back_an_hour(std::vector<double>& time_s) {
-    constexpr double hour_s = 3600.0;
-    constexpr double steps_max = 3.0;
-    if (!run_.wall_zero || run_.wall_zero->is_utc) return false;
-    const auto is_not_later = [](double a, double b) { return !(b > a); };
-    const auto last = std::adjacent_find(time_s.begin(), time_s.end(), is_not_later);
-    if (last == time_s.begin() ||
-        std::adjacent_find(last + 1, time_s.end(), is_not_later) != time_s.end())
-      return false;
-    const double step_s = *(last + 1) + hour_s - *last;
-    if (!(step_s > 0.0 && step_s <= steps_max * (*last - *(last - 1)))) return false;
-    const auto row = static_cast<std::size_t>(last + 1 - time_s.begin());
-    for (std::size_t i = row; i < time_s.size(); ++i) time_s[i] += hour_s;
-    run_.understood.push_back("the clock was set back by an hour before line " +
-                              std::to_string(table_.lines[row]) +
-                              ": an hour is added from there on");
-    return true;
-  }
-
-  void turn_rows(std::vector<double>& time_s) {
-    const double earliest = time_s.back();
-    std::reverse(time_s.begin(), time_s.end());
-    for (double& at : time_s) at -= earliest;
-    if (run_.wall_zero) run_.wall_zero->seconds += earliest;
-    std::reverse(table_.lines.begin(), table_.lines.end());
-    std::vector<std::string_view> fields;
-    fields.reserve(table_.fields.size());
-    for (std::size_t row = table_.rows(); row-- > 0;)
-      for (std::size_t i = 0; i < table_.columns(); ++i) fields.push_back(table_.field(row, i));
-    table_.fields = std::move(fields);
-    run_.understood.emplace_back("the newest row is first: order reversed");
   }
 
   void note_layout() {
@@ -373,6 +340,19 @@ class ForeignReader {
                     "[columns] in the file of --columns");
       return std::nullopt;
     }
+    const bool has_own = spelled_name(header).unit.empty() && has_own_unit(header);
+    if (has_own && spelled.known != nullptr && spelled.known->dimension != "none" &&
+        !is_mapped_with_unit) {
+      const bool is_same =
+          conversion(*spelled.known, header).value_or(UnitConversion{0}).is_identity();
+      if (is_same && !is_mapped(header)) return Meaning{i, header, {}};
+      if (!is_same)
+        refuse(i, "names one unit, and its column is in " + spelled.unit + ": write " +
+                      toml_text(header) + " = { name = " + toml_text(header) +
+                      ", unit = " + toml_text(spelled.unit) +
+                      " } under [columns] in the file of --columns, or the unit that is true");
+      if (!is_same) return std::nullopt;
+    }
     if (is_mapped(header)) return mapped_meaning(i, map_->columns.at(header), spelled);
     if (spelled.unit.empty() && !unit_of(header).suffix.empty() && is_column_name(header))
       return Meaning{i, header, {}};
@@ -391,7 +371,10 @@ class ForeignReader {
                     ": write " + toml_text(header) + " = " + toml_text(example) +
                     (spelled.unit.empty()
                          ? " (or what it is; without a unit it is a signal)"
-                         : ", a signal, or { name = \"its name\", unit = \"a known unit\" }") +
+                         : ", a signal, or { name = \"its name\", unit = " +
+                               toml_text(unit_with_factor(spelled.unit) ? spelled.unit
+                                                                        : "a known unit") +
+                               " }") +
                     " under [columns], or ignore = [" + toml_text(header) +
                     "], in the file of --columns");
       return std::nullopt;
@@ -423,13 +406,17 @@ class ForeignReader {
       problems_.add({map_->file, 0, "columns", mapped.name, std::string(column_name_rule)});
       return std::nullopt;
     }
-    if (!unit && !spelled.unit.empty() && !unit_of(mapped.name).suffix.empty()) {
+    const bool has_brackets = !unit && !spelled.unit.empty();
+    if (has_brackets && !unit_of(mapped.name).suffix.empty() && may_be_unit(spelled.unit)) {
       problems_.add({map_->file, 0, "columns", mapped.name,
                      "may not be the unit of '" + table_.header[i] +
                          "': write { name = " + toml_text(mapped.name) +
                          ", unit = \"that of the file\" }, such as degC, 0.1 degC or mil"});
       return std::nullopt;
     }
+    if (has_brackets)
+      run_.understood.push_back("in '" + table_.header[i] + "' '" + spelled.unit +
+                                "' is taken for a part of the name, not for a unit");
     if (!unit) return meaning;
     const auto converted = conversion(*unit, mapped.name);
     if (!converted) {
@@ -515,6 +502,13 @@ class ForeignReader {
     for (const std::string& word : words_)
       if (count++ < words_max) list += (list.empty() ? "" : ", ") + toml_text(shortened(word));
     const auto& [line, header, first] = word_at_;
+    if (switch_word(first)) {
+      problems_.add(line, header, first,
+                    "is a switch: write " + toml_text(header) + " = " +
+                        toml_text(plain_name(spelled_name(header).base) + "_on") +
+                        " under [columns] in the file of --columns");
+      return;
+    }
     problems_.add(line, header, first,
                   (is_impossible_ ? "must be between -273.15 and 2500 degC"
                                   : "must be a number with a decimal " +
@@ -528,10 +522,7 @@ class ForeignReader {
   bool takes_as_missing(std::string_view field, const std::optional<double>& number) {
     constexpr double overload_min = 1e37;
     if (is_missing(field)) return true;
-    std::string small(field.substr(0, 20));
-    for (char& c : small) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-    const bool is_word =
-        std::find(missing_words.begin(), missing_words.end(), small) != missing_words.end();
+    const bool is_word = is_one_of(missing_words, field);
     const bool is_listed = map_ != nullptr && std::find(map_->missing.begin(), map_->missing.end(),
                                                         field) != map_->missing.end();
     const bool is_overload = number && std::abs(*number) >= overload_min;

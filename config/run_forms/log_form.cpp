@@ -2,6 +2,7 @@
 
 #include "config/run_forms/field_text.hpp"
 #include "config/run_forms/spelled_unit.hpp"
+#include "config/run_forms/text_lines.hpp"
 #include "config/text/problems.hpp"
 
 namespace thermocomp {
@@ -47,20 +48,10 @@ std::string_view take_line(std::string_view& text) {
 }
 
 std::vector<std::string> fields_of(std::string_view line, char separator) {
+  std::vector<std::string_view> parts;
+  static_cast<void>(split_line(line, separator, parts));
   std::vector<std::string> fields;
-  std::string field;
-  bool is_quoted = false;
-  for (const char c : line) {
-    if (c == '"') {
-      is_quoted = !is_quoted;
-    } else if (c == separator && !is_quoted) {
-      fields.emplace_back(trimmed(field));
-      field.clear();
-    } else {
-      field += c;
-    }
-  }
-  fields.emplace_back(trimmed(field));
+  for (const std::string_view part : parts) fields.push_back(unquoted(part));
   return fields;
 }
 

@@ -18,20 +18,13 @@ constexpr auto unit_names =
     std::to_array<std::string_view>({"unit", "units", "einheit", "unit_of_measurement", "uom"});
 constexpr std::size_t series_max = 1024;
 
-template <std::size_t N>
-bool is_one_of(const std::array<std::string_view, N>& names, std::string_view header) {
-  std::string small(header);
-  for (char& c : small) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return std::find(names.begin(), names.end(), small) != names.end();
-}
-
 struct ColumnContent {
   bool numbers{false};  ///< most fields are numbers
   bool complete{true};  ///< no empty field
   std::size_t distinct{0};
 };
 
-ColumnContent content(const TextTable& table, std::size_t column) {
+ColumnContent content_of(const TextTable& table, std::size_t column) {
   ColumnContent content;
   std::set<std::string_view> distinct;
   std::size_t numbers = 0;
@@ -133,7 +126,7 @@ std::vector<bool> bad_rows(const TextTable& table, const std::vector<std::size_t
       has_good = is_one_of(good, table.field(row, column));
     for (std::size_t row = 0; row < table.rows() && has_good; ++row) {
       const std::string_view quality = table.field(row, column);
-      bad[row] = bad[row] || is_one_of(std::array<std::string_view, 1>{"bad"}, quality) ||
+      bad[row] = bad[row] || small_letters(quality) == "bad" ||
                  finite_number(quality).value_or(least_uncertain) < least_uncertain;
     }
   }
@@ -150,7 +143,7 @@ std::optional<LongForm> long_form(const TextTable& table, const TimeColumns& tim
   std::vector<std::size_t> values;
   for (std::size_t i = 0; i < table.columns(); ++i) {
     if (time.has(i)) continue;
-    const ColumnContent here = content(table, i);
+    const ColumnContent here = content_of(table, i);
     const bool named_value = is_one_of(value_names, table.header[i]);
     if (named_value) values.push_back(i);
     if (is_one_of(unit_names, table.header[i])) {
@@ -172,7 +165,7 @@ std::optional<LongForm> long_form(const TextTable& table, const TimeColumns& tim
   if (form.names.empty() && values.size() == 1) {
     for (std::size_t i = 0; i < table.columns(); ++i) {
       if (time.has(i) || i == values[0] || i == form.unit) continue;
-      const ColumnContent here = content(table, i);
+      const ColumnContent here = content_of(table, i);
       if (!here.numbers && here.complete && here.distinct == 1) form.names.push_back(i);
     }
     while (form.names.size() > 1) form.names.pop_back();

@@ -29,12 +29,19 @@ bool has_steps_below(double step_max, const std::vector<double>& numbers) {
   return std::isinf(least) || least <= step_max;
 }
 
+bool are_whole(const std::vector<double>& numbers) {
+  return std::all_of(numbers.begin(), numbers.end(),
+                     [](double number) { return number == std::floor(number); });
+}
+
 }  // namespace
 
 const Epoch* epoch_of(const std::vector<double>& numbers, bool is_named, bool has_unit) {
   constexpr double step_s_max = 3600.0;
   for (const Epoch& epoch : epochs) {
     if (epoch.only_named && !is_named) continue;
+    // Whole numbers of that size may be ms of a counter of 32 bits.
+    if (epoch.only_named && epoch.per_second == 1 && !has_unit && are_whole(numbers)) continue;
     if (!has_unit && !has_steps_below(step_s_max * epoch.per_second * 1.001, numbers)) continue;
     if (!numbers.empty() && std::all_of(numbers.begin(), numbers.end(), [&](double number) {
           return number >= epoch.low && number < epoch.high;

@@ -14,7 +14,7 @@ constexpr double kelvin_of_0_degC = 273.15;
 constexpr double urad_of_arcsecond = 4.84813681109536;  // pi / 648000 rad
 constexpr double fahrenheit_step = 5.0 / 9.0;
 
-constexpr auto units = std::to_array<SpelledUnit>({
+constexpr auto known_units = std::to_array<SpelledUnit>({
     {"degC", "temperature", 1, 0, "_degC"},
     {"C", "temperature", 1, 0, "_degC", true},
     {"K", "temperature", 1, -kelvin_of_0_degC, "_K", true},
@@ -219,12 +219,12 @@ bool split_letters(std::string_view header, SpelledName& name) {
 
 const SpelledUnit* spelled_unit(std::string_view unit) {
   const auto find = [](std::string_view spelling) {
-    return std::find_if(units.begin(), units.end(),
+    return std::find_if(known_units.begin(), known_units.end(),
                         [&](const SpelledUnit& each) { return each.spelling == spelling; });
   };
   const auto* found = find(unit);
-  if (found == units.end()) found = find(plain_temperature(unit));
-  return found == units.end() ? nullptr : &*found;
+  if (found == known_units.end()) found = find(plain_temperature(unit));
+  return found == known_units.end() ? nullptr : &*found;
 }
 
 SpelledName spelled_name(std::string_view header) {
@@ -239,10 +239,10 @@ std::optional<UnitConversion> conversion(const SpelledUnit& from, std::string_vi
   const std::string_view suffix = unit_of(column).suffix;
   if (suffix.empty()) return UnitConversion{};
   if (suffix == from.suffix && from.factor == 1.0) return UnitConversion{};
-  const auto* const to = std::find_if(units.begin(), units.end(), [&](const SpelledUnit& each) {
-    return each.spelling == suffix.substr(1);
-  });
-  if (to == units.end() || to->dimension != from.dimension) return std::nullopt;
+  const auto* const to =
+      std::find_if(known_units.begin(), known_units.end(),
+                   [&](const SpelledUnit& each) { return each.spelling == suffix.substr(1); });
+  if (to == known_units.end() || to->dimension != from.dimension) return std::nullopt;
   if (to->factor == from.factor && to->offset == from.offset) return UnitConversion{};
   return UnitConversion{from.factor / to->factor, (from.offset - to->offset) / to->factor};
 }
@@ -281,6 +281,25 @@ NumberText number_text_of(std::string_view field) {
   const SpelledUnit* unit = spelled_unit(trimmed(field.substr(cut)));
   if (unit == nullptr) return {field};
   return {trimmed(field.substr(0, cut)), unit};
+}
+
+bool may_be_unit(std::string_view text) {
+  const std::string small = small_letters(text);
+  if (small.find('%') != std::string::npos || small.find("deg") != std::string::npos) return true;
+  for (const DegreeSign& sign : degree_signs)
+    if (small.find(sign.bytes) != std::string::npos) return true;
+  std::string word;
+  for (const char c : small + ' ') {
+    const bool is_letter = (c >= 'a' && c <= 'z') || static_cast<unsigned char>(c) >= 0x80;
+    if (is_letter) word += c;
+    if (is_letter || word.empty()) continue;
+    const auto is_word = [&](const SpelledUnit& each) {
+      return small_letters(each.spelling) == word;
+    };
+    if (std::any_of(known_units.begin(), known_units.end(), is_word)) return true;
+    word.clear();
+  }
+  return false;
 }
 
 std::optional<SpelledUnit> unit_with_factor(std::string_view unit) {

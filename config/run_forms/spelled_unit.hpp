@@ -31,6 +31,10 @@ struct SpelledName {
 /// @return nullptr when it is not a unit
 [[nodiscard]] const SpelledUnit* spelled_unit(std::string_view unit);
 
+/// Whether text in brackets has a degree or percent sign, or a word that is a unit in some case:
+/// "0.1 °C", "1/10 MM"; not "bed 1".
+[[nodiscard]] bool may_be_unit(std::string_view text);
+
 /// A unit, or a multiple of one: "0.1 degC".
 [[nodiscard]] std::optional<SpelledUnit> unit_with_factor(std::string_view unit);
 

@@ -6,6 +6,7 @@
 
 #include "config/run_forms/number_epoch.hpp"
 #include "config/run_forms/spelled_unit.hpp"
+#include "config/run_forms/time_name.hpp"
 #include "config/run_forms/time_stamp.hpp"
 #include "config/text/printable_text.hpp"
 
@@ -13,98 +14,30 @@ namespace thermocomp {
 namespace {
 
 constexpr double day_s = 86400.0;
-constexpr std::size_t rows_read = 100;
 
-constexpr auto time_names = std::to_array<std::string_view>(
-    {"time",          "zeit",      "timestamp", "zeitstempel",  "datetime",     "date",
-     "datum",         "uhrzeit",   "elapsed",   "elapsed time", "date time",    "date/time",
-     "datum/uhrzeit", "t_s",       "laufzeit",  "ts",           "_time",        "x_value",
-     "unixtime",      "unix_time", "epoch",     "seconds",      "last_changed", "elapsed_time",
-     "time stamp",    "scan time", "date_time", "sample time"});
-constexpr auto date_names =
-    std::to_array<std::string_view>({"date", "datum", "datetime", "date time", "date/time",
-                                     "datum/uhrzeit", "time", "zeit", "timestamp", "zeitstempel"});
-
-std::string small_letters(std::string_view text) {
-  std::string small(text);
-  for (char& c : small) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return small;
-}
-
-template <std::size_t N>
-bool is_one_of(const std::array<std::string_view, N>& names, std::string_view header) {
-  std::string base = small_letters(spelled_name(header).base);
-  base = base.substr(0, base.find(','));  // "Date Time, GMT+01:00"
-  return std::find(names.begin(), names.end(), base) != names.end();
-}
-
-/// The unit at the end of a time column's name, "time_ms"; empty: none.
-std::string unit_of_name(std::string_view header) {
-  const auto bar = header.rfind('_');
-  if (bar == std::string_view::npos || bar == 0 || !is_one_of(time_names, header.substr(0, bar)))
-    return {};
-  const SpelledUnit* unit = spelled_unit(header.substr(bar + 1));
-  return unit != nullptr && unit->dimension == "time" ? std::string(unit->spelling) : "";
-}
-
-enum class Holds { other, date, clock, both };
-
-/// The kind of content of a column's first rows, if the same in all of them.
-Holds content(const TextTable& table, std::size_t column) {
-  Holds holds = Holds::other;
-  for (std::size_t row = 0; row < std::min(table.rows(), rows_read); ++row) {
-    const auto stamp = parse_time_stamp(table.field(row, column));
-    if (!stamp) return Holds::other;
-    const Holds here = !stamp->has_date    ? Holds::clock
-                       : !stamp->has_clock ? Holds::date
-                                           : Holds::both;
-    if (row > 0 && here != holds) return Holds::other;
-    holds = here;
-  }
-  return holds;
-}
-
-/// The numbers of a column's first rows; empty if one is not a number.
-std::vector<double> first_numbers(const TextTable& table, std::size_t column,
-                                  const NumberForm& form) {
-  std::vector<double> numbers;
-  for (std::size_t row = 0; row < std::min(table.rows(), rows_read); ++row) {
-    const auto number = number_of(table.field(row, column), form);
-    if (!number) return {};
-    numbers.push_back(*number);
-  }
-  return numbers;
-}
-
-/// "Date Time, GMT+01:00": time zone of the column.
-std::optional<double> zone_of_header(std::string_view header) {
-  for (const std::string_view name : {"GMT", "UTC"}) {
-    const auto at = header.find(name);
-    if (at == std::string_view::npos) continue;
-    std::string_view zone = header.substr(at);
-    zone = zone.substr(0, zone.find_first_of(" )]"));
-    return parse_zone(zone);
-  }
-  return std::nullopt;
-}
-
-bool within(const std::vector<double>& numbers, double low, double high) {
-  return !numbers.empty() && std::all_of(numbers.begin(), numbers.end(), [&](double number) {
-    return number >= low && number <= high && number == std::floor(number);
+/// 95950, 100000, 100010: equal steps only as hours, minutes and seconds.
+bool are_clock_digits(const std::vector<double>& numbers) {
+  const auto steps_of = [&](auto seconds) {
+    double low = INFINITY;
+    double high = -INFINITY;
+    for (std::size_t i = 1; i < numbers.size(); ++i) {
+      const double step = seconds(numbers[i]) - seconds(numbers[i - 1]);
+      low = std::min(low, step);
+      high = std::max(high, step);
+    }
+    return std::pair(low, high);
+  };
+  const auto of_clock = [](double n) {
+    return 3600 * std::floor(n / 1e4) + 60 * std::fmod(std::floor(n / 100), 100) +
+           std::fmod(n, 100);
+  };
+  const bool may_be = std::all_of(numbers.begin(), numbers.end(), [](double n) {
+    return n >= 0 && n < 240000 && std::fmod(n, 100) < 60 && std::fmod(n / 100, 100) < 60;
   });
-}
-
-/// Columns of year, day of the year and hhmm, as in arrays of Campbell loggers.
-std::optional<TimeColumns> day_of_year(const TextTable& table, const NumberForm& form) {
-  for (std::size_t i = 0; i + 2 < std::min<std::size_t>(table.columns(), 6); ++i) {
-    const std::vector<double> clock = first_numbers(table, i + 2, form);
-    if (within(first_numbers(table, i, form), 1980, 2099) &&
-        within(first_numbers(table, i + 1, form), 1, 366) && within(clock, 0, 2400) &&
-        std::all_of(clock.begin(), clock.end(),
-                    [](double hhmm) { return std::fmod(hhmm, 100.0) < 60.0; }))
-      return TimeColumns{{i, i + 1, i + 2}, {}};
-  }
-  return std::nullopt;
+  if (!may_be || numbers.back() < 1e4) return false;
+  const auto [low, high] = steps_of(of_clock);
+  const auto [number_low, number_high] = steps_of([](double n) { return n; });
+  return low > 0 && high <= 2 * low && number_high > 2 * number_low && number_high >= 40 + high;
 }
 
 class TimeReader {
@@ -186,15 +119,22 @@ class TimeReader {
     if (!take_numbers(column)) return;
     std::string unit(asked_unit());
     if (unit.empty()) unit = header == "time_s" ? "s" : units_[column];
-    if (unit.empty()) unit = unit_of_name(header);
+    if (unit.empty()) unit = unit_of_time_name(header);
     if (number_text_of(units_[column]).unit != nullptr) {
       problems_.add(table_.header_line, header, units_[column],
                     "is a multiple of a unit: write the times in s, and s as their unit");
       return;
     }
+    if (!unit.empty() && are_clock_digits(run_.time_s)) {
+      problems_.add(table_.lines[0], header, table_.field(0, column),
+                    "is a clock without colons, as the last digits of all rows show, and not a "
+                    "number of " +
+                        unit + ": write time_unit = \"hhmmss\" in the file of --columns");
+      return;
+    }
     const SpelledUnit* known = spelled_unit(unit);
     const bool is_time = known != nullptr && known->dimension == "time";
-    const Epoch* epoch = epoch_of(run_.time_s, is_time || is_one_of(date_names, header), is_time);
+    const Epoch* epoch = epoch_of(run_.time_s, is_time || names_date(header), is_time);
     if (epoch != nullptr && is_time && std::abs(known->factor * epoch->per_second - 1) > 1e-9)
       epoch = nullptr;  // the unit implies another scale
     if (epoch != nullptr) {
@@ -240,10 +180,15 @@ class TimeReader {
 
   void read_stamps() {
     std::vector<TimeStamp> stamps;
+    std::optional<TimeStamp> date;  // the last one written
     const auto zone = zone_of_header(table_.header[time_.columns[0]]);
     for (std::size_t row = 0; row < table_.rows() && !problems_.full(); ++row) {
-      std::optional<TimeStamp> stamp = stamp_of(table_.field(row, time_.columns[0]));
-      if (stamp && time_.columns.size() == 2) stamp = joined(row, *stamp);
+      const bool has_clocks = time_.columns.size() == 2;
+      if (const std::string_view field = table_.field(row, time_.columns[0]);
+          !has_clocks || row == 0 || !field.empty())
+        date = stamp_of(field);
+      std::optional<TimeStamp> stamp = date;
+      if (stamp && has_clocks) stamp = joined(row, *stamp);
       if (stamp && stamp->has_date && !stamp->zone_s) stamp->zone_s = zone;
       if (stamp && !stamps.empty() && !alike(*stamp, stamps.front())) stamp.reset();
       if (!stamp && row == 0) {
@@ -261,6 +206,7 @@ class TimeReader {
     if (!problems_.empty()) return;
     const DateOrder taken = order.value_or(DateOrder::unknown);
     run_.time_s = seconds_by(stamps, taken);
+    add_fractions();
     const double first = run_.time_s.front();
     for (std::size_t row = 0; row < stamps.size(); ++row) {
       if (std::isnan(run_.time_s[row]))
@@ -292,9 +238,15 @@ class TimeReader {
     return seconds;
   }
 
+  void add_fractions() {
+    for (std::size_t row = 0; row < table_.rows() && time_.fraction; ++row)
+      run_.time_s[row] += time_.fraction_factor *
+                          number_of(table_.field(row, *time_.fraction), form_).value_or(NAN);
+  }
+
   std::optional<TimeStamp> joined(std::size_t row, TimeStamp date) const {
     const auto clock = stamp_of(table_.field(row, time_.columns[1]));
-    if (!clock || clock->has_date || date.has_clock) return std::nullopt;
+    if (!clock || clock->has_date || (date.has_clock && !date.is_midnight())) return std::nullopt;
     TimeStamp both = *clock;
     both.has_date = true;
     both.date = date.date;
@@ -365,6 +317,7 @@ class TimeReader {
   void note_stamps(const TimeStamp& first, std::optional<DateOrder> order, double first_s) {
     run_.note = "time_s: '" + table_.header[time_.columns[0]] + "'";
     if (time_.columns.size() == 2) run_.note += " and '" + table_.header[time_.columns[1]] + "'";
+    if (time_.fraction) run_.note += " and '" + table_.header[*time_.fraction] + "'";
     if (first.has_date && !order) {
       run_.note +=
           ", seconds after the first row; the date may begin with the day or the month, which "
@@ -406,139 +359,7 @@ class TimeReader {
   RunTime run_;
 };
 
-/// Possible time columns, by kind.
-struct Candidates {
-  std::vector<std::size_t> dates;   ///< with or without clock time
-  std::vector<std::size_t> clocks;  ///< clock time only
-  std::vector<std::size_t> epochs;
-  std::vector<std::size_t> counting;  ///< numbers with a unit of time, or called time
-};
-
-/// Drops constant dates, such as the start of a query, unless all are; of the rest keeps the one
-/// called time, if there is exactly one.
-void keep_moving_dates(const TextTable& table, std::vector<std::size_t>& dates) {
-  if (dates.size() < 2) return;
-  const auto is_constant = [&](std::size_t column) {
-    for (std::size_t row = 1; row < table.rows(); ++row)
-      if (table.field(row, column) != table.field(0, column)) return false;
-    return true;
-  };
-  if (!std::all_of(dates.begin(), dates.end(), is_constant)) std::erase_if(dates, is_constant);
-  const auto named = std::find_if(dates.begin(), dates.end(), [&](std::size_t column) {
-    return is_one_of(time_names, table.header[column]);
-  });
-  const auto named_count = std::count_if(dates.begin(), dates.end(), [&](std::size_t column) {
-    return is_one_of(time_names, table.header[column]);
-  });
-  if (named_count == 1) dates = {*named};
-}
-
-bool numbers_increase(const TextTable& table, std::size_t column, const NumberForm& form) {
-  double last = -INFINITY;
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    const auto at = number_of(table.field(row, column), form);
-    if (!at || !(*at > last)) return false;
-    last = *at;
-  }
-  return true;
-}
-
-bool increases(const TextTable& table, std::size_t column) {
-  double last = -INFINITY;
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    const auto stamp = parse_time_stamp(table.field(row, column));
-    const auto at = stamp ? seconds_of(*stamp, DateOrder::unknown, false) : std::nullopt;
-    if (!at || !(*at > last)) return false;
-    last = *at;
-  }
-  return true;
-}
-
-Candidates candidates(const TextTable& table, const ColumnMap* map,
-                      const std::vector<std::string>& units, const NumberForm& form) {
-  Candidates found;
-  for (std::size_t i = 0; i < table.columns(); ++i) {
-    const std::string& header = table.header[i];
-    if (map != nullptr &&
-        (map->columns.contains(header) ||
-         std::find(map->ignored.begin(), map->ignored.end(), header) != map->ignored.end()))
-      continue;
-    const Holds here = content(table, i);
-    const SpelledUnit* unit = spelled_unit(units[i]);
-    const bool is_time = unit != nullptr && unit->dimension == "time";
-    if (here == Holds::date || here == Holds::both)
-      found.dates.push_back(i);
-    else if (here == Holds::clock)
-      found.clocks.push_back(i);
-    else if (epoch_of(first_numbers(table, i, form), is_one_of(date_names, header), is_time) !=
-             nullptr)
-      found.epochs.push_back(i);
-    else if (is_one_of(time_names, header) || !unit_of_name(header).empty() || is_time)
-      found.counting.push_back(i);
-  }
-  return found;
-}
-
 }  // namespace
-
-bool TimeColumns::has(std::size_t column) const {
-  return std::find(columns.begin(), columns.end(), column) != columns.end();
-}
-
-std::optional<TimeColumns> find_time(const TextTable& table, const ColumnMap* map,
-                                     const std::vector<std::string>& units, const NumberForm& form,
-                                     ProblemList& problems) {
-  const auto column_of = [&](std::string_view name) {
-    return static_cast<std::size_t>(std::find(table.header.begin(), table.header.end(), name) -
-                                    table.header.begin());
-  };
-  if (map != nullptr && !map->time.empty()) {
-    TimeColumns time;
-    for (const std::string& name : map->time) {
-      if (column_of(name) == table.columns()) {
-        problems.add({map->file, 0, "time", name, "must be a column of the run file"});
-        return std::nullopt;
-      }
-      time.columns.push_back(column_of(name));
-    }
-    return time;
-  }
-  if (column_of("time_s") < table.columns()) return TimeColumns{{column_of("time_s")}, {}};
-  Candidates found = candidates(table, map, units, form);
-  keep_moving_dates(table, found.dates);
-  const std::size_t dates = found.dates.size();
-  if (dates == 1 && found.clocks.size() == 1 && content(table, found.dates[0]) == Holds::date)
-    return TimeColumns{{found.dates[0], found.clocks[0]}, {}};
-  const bool is_finer =
-      found.counting.size() == 1 && numbers_increase(table, found.counting[0], form);
-  if (dates == 1 && is_finer && !increases(table, found.dates[0]))
-    return TimeColumns{{found.counting[0]}, found.dates[0]};
-  for (const auto* kind : {&found.dates, &found.epochs, &found.clocks, &found.counting}) {
-    if (kind->size() == 1) return TimeColumns{{kind->front()}, {}};
-    if (kind->empty()) continue;
-    const std::string first = toml_text(table.header[(*kind)[0]]);
-    const std::string second = toml_text(table.header[(*kind)[1]]);
-    problems.add(
-        table.header_line, "column " + std::to_string((*kind)[0] + 1), table.header[(*kind)[0]],
-        "may be the time, and so may " + second + ": write time = " + first + " and ignore = [" +
-            second + "], or the other way round, in the file of --columns");
-    return std::nullopt;
-  }
-  if (const auto time = day_of_year(table, form)) return time;
-  if (map != nullptr && map->period_s) return TimeColumns{};
-  if (!table.has_header)
-    problems.add(table.lines.empty() ? 1 : table.lines[0], "names", "(missing)",
-                 "has no header that names the time: write names = [\"time_s\", "
-                 "\"t1_degC\", ...], one for each of the " +
-                     std::to_string(table.columns()) +
-                     " fields per row, in the file of --columns (of import: --names "
-                     "time_s,t1_degC,...), and period_s where no field is the time");
-  else
-    problems.add(table.header_line, "time_s", "(missing)",
-                 "must be one of the columns; if another is the time, write time = \"its name\" in "
-                 "the file of --columns; if none is, period_s = the seconds between two rows");
-  return std::nullopt;
-}
 
 RunTime read_time(const TextTable& table, const TimeColumns& time, const ColumnMap* map,
                   const std::vector<std::string>& units, const NumberForm& form,

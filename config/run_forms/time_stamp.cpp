@@ -36,8 +36,7 @@ bool take_char(std::string_view& text, std::string_view any_of) {
 
 std::optional<int> take_month_name(std::string_view& text) {
   if (text.size() < 3) return std::nullopt;
-  std::string name(text.substr(0, 3));
-  for (char& c : name) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  const std::string name = small_letters(text.substr(0, 3));
   const auto* const found = std::find(month_names.begin(), month_names.end(), name);
   if (found == month_names.end()) return std::nullopt;
   text.remove_prefix(3);
@@ -247,6 +246,12 @@ std::optional<TimeStamp> parse_time_stamp(std::string_view text) {
     text = trimmed(text);
   }
   if (!take_clock(text, stamp)) return std::nullopt;
+  // The day 0 of databases: only a clock time.
+  constexpr std::array day_0{30, 12, 1899};
+  if (stamp.has_date && (stamp.date == day_0 || stamp.date == std::array{1899, 12, 30})) {
+    stamp.has_date = false;
+    stamp.allows = {};
+  }
   return stamp;
 }
 

@@ -26,6 +26,9 @@ struct TimeStamp {
   double clock_b{0.0};
   double clock_c{0.0};
   std::optional<double> zone_s;  ///< east of Greenwich
+  [[nodiscard]] bool is_midnight() const noexcept {
+    return has_clock && clock_a == 0.0 && clock_b == 0.0 && clock_c == 0.0;
+  }
 };
 
 /// @return nullopt when `text` is neither a date nor a clock time. Nonexistent days are found by

@@ -27,6 +27,13 @@ inline std::string unique_name(const TomlTable& table, std::set<std::string>& se
   return name;
 }
 
+/// "x, y, z"
+[[nodiscard]] inline std::string listed(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text.append(text.empty() ? "" : ", ").append(name);
+  return text.empty() ? "there is none" : text;
+}
+
 /// A scale: any finite number but 0.
 [[nodiscard]] inline double read_scale(const TomlTable& table, double otherwise) {
   const double scale = table.number("scale", Range::any(), otherwise);

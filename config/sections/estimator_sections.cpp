@@ -30,12 +30,6 @@ SmoothingConfig read_smoothing(const TomlTable& table, const SmoothingConfig& fa
   return config;
 }
 
-std::string joined(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text.append(text.empty() ? "" : ", ").append(name);
-  return text.empty() ? "there is none" : text;
-}
-
 std::map<std::string, std::size_t> index_of(const std::vector<SensorConfig>& sensors) {
   std::map<std::string, std::size_t> index;
   for (std::size_t i = 0; i < sensors.size(); ++i) index.try_emplace(sensors[i].name, i);
@@ -249,7 +243,7 @@ CompensationConfig read_compensation(const TomlTable& table,
   const auto read_signal = [&](std::string_view key) {
     std::string name = table.text(key, "");
     if (!name.empty() && std::find(signals.begin(), signals.end(), name) == signals.end()) {
-      table.problem(key, "must be a signal of the controller: " + joined(signals));
+      table.problem(key, "must be a signal of the controller: " + listed(signals));
     }
     return name;
   };

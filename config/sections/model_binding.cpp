@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "config/sections/common.hpp"
 #include "config/text/units.hpp"
 #include "estimator/estimator_config.hpp"
 #include "estimator/sensing/neighbours.hpp"
@@ -16,12 +17,6 @@ bool contains(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-std::string joined(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text.append(text.empty() ? "" : ", ").append(name);
-  return text;
-}
-
 void check_blocks(const BindingTables& tables, const EstimatorConfig& config,
                   const std::vector<std::string>& columns) {
   std::vector<std::string> bound;
@@ -30,7 +25,7 @@ void check_blocks(const BindingTables& tables, const EstimatorConfig& config,
     if (!is_temperature(input)) continue;  // reported already
     if (!contains(columns, input)) {
       tables.blocks[i].problem(
-          "input", "must be a temperature of the model: " + joined(columns) + like_hint);
+          "input", "must be a temperature of the model: " + listed(columns) + like_hint);
     } else if (contains(bound, input)) {
       tables.blocks[i].problem("input", "is bound by another block already");
     }
@@ -64,7 +59,7 @@ void check_travel(const TomlTable& table, const AxisConfig& axis, const ThermalM
   if (!contains(positions, axis.node->position))
     travel.problem("position", positions.empty()
                                    ? "the model depends on no position: give the axis an `offset`"
-                                   : "must be a position of the model: " + joined(positions));
+                                   : "must be a position of the model: " + listed(positions));
   for (const TermSpec& term : model.terms)
     if (term.kind == "hysteresis" && term.subject == axis.output)
       table.problem("output",
@@ -114,7 +109,7 @@ void check_binding(const BindingTables& tables, const EstimatorConfig& config,
     const AxisConfig& axis = config.axes[spans[i].first];
     if (is_output(axis.output) && !contains(model.outputs, axis.output))
       tables.axes[i].problem(
-          "output", "must be an output of the model: " + joined(model.outputs) + like_hint);
+          "output", "must be an output of the model: " + listed(model.outputs) + like_hint);
     check_diameter(tables.axes[i], axis, model);
     if (axis.node) check_travel(tables.axes[i], axis, model);
   }

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <map>
+#include <set>
 
 #include <nlohmann/json.hpp>
 
@@ -111,8 +112,37 @@ PlainTable plain_store(const Log& log, const json& store) {
 
 // ---- records
 
+/// The first member of one of these names; null: none.
+json first_of(const json& object, std::initializer_list<const char*> names) {
+  for (const char* name : names)
+    if (object.is_object() && object.contains(name)) return object[name];
+  return nullptr;
+}
+
+/// {"value": 68, "unit": "°F"}; empty: something else.
+std::string value_with_unit(const json& object) {
+  const json value = first_of(object, {"value", "val"});
+  const json unit = first_of(object, {"unit", "units", "uom"});
+  if (!value.is_number() || !unit.is_string()) return {};
+  return number_text(value.get<double>()) + " " + unit.get<std::string>();
+}
+
+/// Units by name in an object called "units" or "hourly_units" of the document.
+std::map<std::string, std::string> stated_units(const json& document) {
+  std::map<std::string, std::string> units;
+  if (!document.is_object()) return units;
+  for (const auto& [key, object] : document.items()) {
+    if (!object.is_object() || !(key == "units" || key.ends_with("_units"))) continue;
+    for (const auto& [name, unit] : object.items())
+      if (unit.is_string() && name != "time") units[name] = unit.get<std::string>();
+  }
+  return units;
+}
+
 class Records {
  public:
+  explicit Records(const Log& log) : log_(log) {}
+
   /// @param time  given outside of the record; empty: one of its values
   void add(const json& record, const std::string& time = {}) {
     std::map<std::size_t, std::string> row;
@@ -123,10 +153,13 @@ class Records {
 
   [[nodiscard]] bool empty() const { return rows_.empty(); }
 
-  [[nodiscard]] std::string text() const {
+  [[nodiscard]] std::string text(const std::map<std::string, std::string>& units) const {
     std::string text;
-    for (std::size_t i = 0; i < names_.size(); ++i)
-      text.append(i > 0 ? "," : "").append(in_quotes(names_[i]));
+    for (std::size_t i = 0; i < names_.size(); ++i) {
+      const auto unit = units.find(names_[i]);
+      text.append(i > 0 ? "," : "")
+          .append(with_unit(names_[i], unit == units.end() ? "" : unit->second));
+    }
     for (const auto& row : rows_) {
       text += '\n';
       for (std::size_t i = 0; i < names_.size(); ++i) {
@@ -147,20 +180,49 @@ class Records {
 
   void add_values(const json& record, const std::string& before,
                   std::map<std::size_t, std::string>& row) {
-    for (const auto& [key, value] : record.items()) {
-      const std::string name = before + key;
-      if (value.is_object()) {
+    for (const auto& [key, value] : record.items()) add_value(before + key, value, row);
+  }
+
+  void add_value(const std::string& name, const json& value,
+                 std::map<std::size_t, std::string>& row) {
+    if (value.is_array()) {
+      add_list(name, value, row);
+    } else if (value.is_object()) {
+      if (const std::string with_unit = value_with_unit(value); !with_unit.empty())
+        row[column(name)] = in_quotes(with_unit);
+      else
         add_values(value, name + ".", row);
-      } else if (value.is_number() || value.is_boolean()) {
-        row[column(name)] = value.is_number_float() ? number_text(value.get<double>())
-                            : value.is_boolean()    ? (value.get<bool>() ? "1" : "0")
-                                                    : value.dump();
-      } else if (value.is_string()) {
-        row[column(name)] = in_quotes(value.get<std::string>());
-      }
+    } else if (value.is_number() || value.is_boolean()) {
+      row[column(name)] = value.is_number_float() ? number_text(value.get<double>())
+                          : value.is_boolean()    ? (value.get<bool>() ? "1" : "0")
+                                                  : value.dump();
+    } else if (value.is_string()) {
+      row[column(name)] = in_quotes(value.get<std::string>());
     }
   }
 
+  /// The elements are called as they say themselves, else by their number.
+  void add_list(const std::string& name, const json& list,
+                std::map<std::size_t, std::string>& row) {
+    bool has_names = !list.empty();
+    std::set<std::string> seen;
+    for (std::size_t i = 0; i < list.size(); ++i) {
+      const json own = first_of(list[i], {"name", "id", "sensor", "tag", "channel"});
+      has_names = has_names && own.is_string();
+      const std::string element = own.is_string() ? own.get<std::string>() : std::to_string(i + 1);
+      if (!seen.insert(element).second)
+        log_.refuse(0, name, element, "must be the name of one element of a list");
+      add_value(name + "." + element, list[i], row);
+    }
+    const std::size_t expected = lengths_.emplace(name, list.size()).first->second;
+    if (!has_names && list.size() != expected)
+      log_.refuse(0, name, std::to_string(list.size()) + " values",
+                  "must have as many as the record before, " + std::to_string(expected) +
+                      ": write null for a missing one");
+  }
+
+  const Log& log_;
+  std::map<std::string, std::size_t> lengths_;  ///< of lists, by their name
   std::vector<std::string> names_;
   std::map<std::string, std::size_t> index_;
   std::vector<std::map<std::size_t, std::string>> rows_;
@@ -242,7 +304,7 @@ void collect(const json& value, int depth, Records& records) {
 }
 
 PlainTable plain_lines(const Log& log) {
-  Records records;
+  Records records(log);
   std::string_view rest = log.text;
   for (int line = 1; !rest.empty(); ++line) {
     const std::string_view text = trimmed(take_line(rest));
@@ -252,7 +314,7 @@ PlainTable plain_lines(const Log& log) {
     records.add(record);
   }
   PlainTable table;
-  table.text = records.text();
+  table.text = records.text({});
   table.lines_above = -1;
   table.notes.emplace_back("JSON, a record a line; what a record does not have is missing");
   return table;
@@ -281,7 +343,7 @@ PlainTable plain_json(const Log& log) {
   }
   if (is_store(document)) return plain_store(log, document);
   PlainTable table;
-  Records records;
+  Records records(log);
   collect_tables(document, 0, records);
   const bool has_tables = !records.empty();
   if (!has_tables) collect(document, 0, records);
@@ -291,7 +353,7 @@ PlainTable plain_json(const Log& log) {
         "must be records (a line each, a list, or each under its time), lists of values with "
         "their names, or the answer of Moonraker's server/temperature_store, a list "
         "\"temperatures\" for each heater and sensor");
-  table.text = records.text();
+  table.text = records.text(stated_units(document));
   table.notes.emplace_back(has_tables
                                ? "JSON, names once and lists of values"
                                : "JSON, a row a record; what a record does not have is missing");

@@ -60,7 +60,7 @@ std::string_view first_word(std::string_view text) {
     const char next = end + 1 < text.size() ? text[end + 1] : ' ';
     if (std::string_view(" \t;)]}|").find(text[end]) != std::string_view::npos) break;
     if (text[end] == ',' && !is_digit(next)) break;
-    if (text[end] == '/' && (is_digit(next) || next == ' ')) break;
+    if (text[end] == '/' && (is_digit(next) || next == ' ' || next == '-')) break;
   }
   return text.substr(0, end);
 }

@@ -14,6 +14,18 @@ char separator_of(std::string_view text) {
   return behind.empty() || behind.front() == '"' ? '\t' : behind.front();
 }
 
+/// The exported values may be those before or after the scale.
+void check_scales(const Log& log, const std::vector<std::string>& fields, int line) {
+  const double neutral = fields[0] == "Offset" ? 0.0 : 1.0;
+  for (const std::string& field : fields) {
+    if (&field == &fields[0] || field.empty() || field == fields[0]) continue;
+    if (number_of(field, {','}) == neutral || finite_number(field) == neutral) continue;
+    log.refuse(line, fields[0], field,
+               "may be in the values or not: export with a factor of 1 and an offset of 0, or "
+               "write the values that are meant and delete this line");
+  }
+}
+
 /// Converts 100 ns since 1601 to ms since 1970.
 std::string start_ms(const std::string& filetime) {
   const auto ticks = finite_number(filetime);
@@ -42,6 +54,7 @@ PlainTable plain_twincat(const Log& log) {
     if (key.starts_with("Start") && fields.size() > 1 && start.empty()) start = start_ms(fields[1]);
     if (key == "Name" && fields.size() >= names.size()) names = fields;
     if (key == "Unit") units = fields;
+    if (key == "ScaleFactor" || key == "Offset") check_scales(log, fields, line);
     if (!looks_like_number(key) || fields.size() < 2) continue;
     rows = before;
     break;
@@ -61,17 +74,19 @@ PlainTable plain_twincat(const Log& log) {
     table.text = "time [ms];series;value";
   }
   const double zero_ms = finite_number(start).value_or(0.0);
+  const NumberForm form{separator != ',' && rows.find(',') != std::string_view::npos ? ',' : '.',
+                        '\0'};
   table.lines_above = line - 2;
   while (!rows.empty()) {
     const std::vector<std::string> fields = fields_of(take_line(rows), separator);
     if (fields.size() < 2) continue;  // "EOF"
     std::string time;
     for (std::size_t i = 0; i < std::min(fields.size(), names.size()); ++i) {
-      std::string field = fields[i];
-      std::replace(field.begin(), field.end(), ',', '.');
+      const std::string& field = fields[i];
       if (names[i] == "Name") {
-        const auto at = finite_number(field);
+        const auto at = number_of(field, form);
         time = at ? number_text(*at < 1e15 ? *at + zero_ms : *at * 1e-4 - 11644473600000.0) : "";
+        std::replace(time.begin(), time.end(), '.', form.decimal);
         if (!many_times) table.text.append("\n").append(time);
       } else if (!many_times) {
         table.text.append(";").append(field);

@@ -52,6 +52,8 @@ TEST_CASE("named values keep their decimals, units and names", "[import]") {
        "time_s,bed-T,T_Öl,head\n0,20.5,21.5,22.5\n", ""},
       {"names of two words", "08:00:00 Bed temp: 20.5, Head temp: 25.5\n",
        "log:1: temp = 25.5: must be there once at a time", ""},
+      {"a target below zero", "08:00:00 T:20.5/-1 n:1\n08:00:10 T:20.6/-1 n:1\n",
+       "time_s,T,n\n0,20.5,1\n10,20.6,1\n", ""},
       {"two polls in a second", "08:00:00 T=20.5\n08:00:00 T=20.6\n08:00:01 T=20.7\n",
        "log:2: T = 20.6: must be there once at a time", ""},
       {"a word among numbers", "start\n08:00:00 T=20.5\n\n08:00:10 T=lost\n08:00:20 T=21\n",
@@ -82,6 +84,53 @@ TEST_CASE("a header has a name for each field, or is refused", "[import]") {
   });
 }
 
+TEST_CASE(
+    "the header is the lowest line above the rows that names the time or a unit, else of words",
+    "[import]") {
+  check_all({
+      {"statistics above it",
+       "\"testo\";\"Nr. 4\";\n\"Start:\";\"01.02.2026 08:00:00\";\n\"Mean:\";\"20,55\";\"21,05\"\n"
+       ";\"T1 [°C]\";\"T2 [°C]\"\n\"01.02.2026 08:00:00\";20,4;20,9\n\"01.02.2026 "
+       "08:05:00\";20,5;21,0\n",
+       "time_s,T1_degC,T2_degC\n0,20.4,20.9\n300,20.5,21\n", ""},
+      {"a title of words above it",
+       "Operator,MK,Shift 2\n,Bed [°C],Bed [°C]\n2026-02-13 08:00:00,20.1,20.9\n"
+       "2026-02-13 08:01:00,20.2,21.0\n",
+       "time_s,Bed_degC,Bed_2_degC\n0,20.1,20.9\n60,20.2,21\n", ""},
+      {"a title that names a date above it",
+       "Date;Report\nStamp;T1 [C]\n2026-02-01 08:00:00;20\n2026-02-01 08:00:10;21\n",
+       "time_s,T1_degC\n0,20\n10,21\n", ""},
+      {"serial numbers above it", "Serial,A123,B345\nTime [s],T [°C],T [°C]\n0,20,21\n10,20,22\n",
+       "time_s,T_degC,T_2_degC\n0,20,21\n10,20,22\n", ""},
+      {"units and limits below it",
+       "Time,T1,T2\nUnit,°C,°F\nMax,100,212\nMin,0,32\n13.02.2026 08:00:00,20.5,69.8\n"
+       "13.02.2026 08:00:10,20.6,68\n",
+       "time_s,T1_degC,T2_degC\n0,20.5,21\n10,20.6,20\n", ""},
+      {"channel numbers below it", "Time [s],T1 [°C],T2 [°C]\n,1,2\n0,20.5,21\n10,20.6,22\n",
+       "time_s,T1_degC,T2_degC\n0,20.5,21\n", ""},
+      {"rows of missing values below it",
+       "Time [s],T1 [°C],T2 [°C]\n0,,\n10,OL,\n20,20.5,21\n30,20.6,22\n40,20.6,22\n",
+       "time_s,T1_degC,T2_degC\n0,,\n10,,\n20,20.5,21\n", ""},
+      {"a missing first column", "T1 [°C],z [µm]\n,0\n,0.5\n20.5,1\n20.6,1.5\n20.7,2\n",
+       "time_s,T1_degC,z_um\n0,,0\n10,,0.5\n20,20.5,1\n", "period_s = 10"},
+      {"no name of the time", ",bed_degC\n2026-02-13 08:00:00,20\n2026-02-13 08:00:10,21\n",
+       "time_s,bed_degC\n0,20\n10,21\n", ""},
+      {"a name that is a number", ",0\n2026-02-13 08:00:00,20\n2026-02-13 08:00:10,21\n",
+       "log:1: ,0: is neither a row like those below", ""},
+      {"the same, said to be one", ",0\n2026-02-13 08:00:00,20\n2026-02-13 08:00:10,21\n",
+       "time_s,0\n0,20\n10,21\n", "header_line = 1"},
+      {"names of groups, names, and the index below",
+       ",bed,head\n,mean,max\ntime,,\n2026-02-13 08:00:00,20,21\n2026-02-13 08:00:10,22,23\n",
+       "time_s,mean,max\n0,20,21\n", ""},
+      {"clock times that are none", "Time,T1 [°C]\n-00:00:05,20\n00:00:00,21\n00:00:05,21\n",
+       "log:2: -00:00:05,20: is neither a row like those below", ""},
+      {"factors below the units", "Time,T1,T2\ns,°C,°C\n1,0.1,0.1\n10,205,210\n20,206,220\n",
+       "log:3: 1,0.1,0.1: is neither a row like those below", ""},
+      {"factors with a word", "Time,T1\ns,°C\nFactor,0.1\n10,205\n20,206\n",
+       "log:3: Factor,0.1: is neither a row like those below", ""},
+  });
+}
+
 TEST_CASE("a unit that is not known, or changes, does not reach a column of another", "[import]") {
   check_all({
       {"a changing unit of a series",
@@ -89,11 +138,20 @@ TEST_CASE("a unit that is not known, or changes, does not reach a column of anot
        "time_s,Bed_degC\n0,20\n60,21\n", ""},
       {"thousandths of an inch", "Time [s],z (mil)\n0,1\n1,2\n", "time_s,z_um\n0,25.4\n1,50.8\n",
        ""},
+      {"a multiple of a unit", "Time [s],T1 [0.1 °C]\n0,205\n1,206\n",
+       "{ name = \"its name\", unit = \"0.1 °C\" }", ""},
       {"an unknown unit of a mapped name", "Time [s],T1 [0.1 °C]\n0,205\n1,206\n",
        "may not be the unit of 'T1 [0.1 °C]'", "[columns]\n\"T1 [0.1 °C]\" = \"t1_degC\""},
       {"the same with its unit", "Time [s],T1 [0.1 °C]\n0,205\n1,210\n",
        "time_s,t1_degC\n0,20.5\n1,21\n",
        "[columns]\n\"T1 [0.1 °C]\" = { name = \"t1_degC\", unit = \"0.1 degC\" }"},
+      {"a place in brackets", "Time [s],T1 (bed 1)\n0,205\n1,206\n",
+       "time_s,t1_degC\n0,205\n1,206\n", "[columns]\n\"T1 (bed 1)\" = \"t1_degC\""},
+      {"a name and a row of units that disagree", "Time,Bed_degC\ns,°F\n0,68\n1,69\n",
+       "log:1: column 2 = Bed_degC: names one unit, and its column is in °F", ""},
+      {"and agree", "Time,Bed_degC\ns,°C\n0,20\n1,21\n", "time_s,Bed_degC\n0,20\n1,21\n", ""},
+      {"a switch", "Time [s],Pump,T1 [C]\n0,TRUE,20\n1,FALSE,21\n",
+       "log:2: Pump = TRUE: is a switch: write \"Pump\" = \"Pump_on\"", ""},
       {"a unit behind one number of several", "Time [s],T1\n0,20.5\n10,80.6 A\n",
        "log:3: T1 = 80.6 A: must be a number", ""},
       {"a difference in degF", "Time [s],dT (°F)\n0,1.8\n1,3.6\n",
@@ -103,8 +161,79 @@ TEST_CASE("a unit that is not known, or changes, does not reach a column of anot
   });
 }
 
+TEST_CASE("a date, a fraction of a second and summer time belong to the clock", "[import]") {
+  check_all({
+      {"a date written where it changes",
+       "Date;Time;T1 [°C]\n01.02.2026;16:00:00;20,5\n;17:00:00;20,6\n05.02.2026;18:00:00;19,7\n"
+       ";19:00:00;19,8\n",
+       "time_s,T1_degC\n0,20.5\n3600,20.6\n352800,19.7\n356400,19.8\n", ""},
+      {"milliseconds beside the clock",
+       "Date,Time,ms,T1 [C]\n2026/02/13,08:00:00,250,20\n2026/02/13,08:00:00,750,21\n"
+       "2026/02/13,08:00:02,0,22\n",
+       "time_s,T1_degC\n0,20\n0.5,21\n1.75,22\n", ""},
+      {"fractions in seconds", "Time,sec.,T1 [C]\n08:00:00,.500,20\n08:00:02,.750,21\n",
+       "time_s,T1_degC\n0,20\n2.25,21\n", ""},
+      {"the same, used otherwise", "Time,ms,T1 [C]\n08:00:00,250,20\n08:00:01,750,21\n",
+       "time_s,delay,T1_degC\n0,250,20\n1,750,21\n", "[columns]\nms = \"delay\""},
+      {"milliseconds of more than a second", "Time,ms,T1 [C]\n08:00:00,250,20\n08:00:01,1250,21\n",
+       "time_s,ms,T1_degC\n0,250,20\n1,1250,21\n", ""},
+      {"a database's day and clock",
+       "Day;Time;T1 [°C]\n13.02.2026 00:00:00;30.12.1899 23:59:50;20,5\n"
+       "14.02.2026 00:00:00;30.12.1899 00:00:10;20,6\n",
+       "time_s,T1_degC\n0,20.5\n20,20.6\n", ""},
+      {"the begin of summer time",
+       "Time,T1 [C]\n29.03.2026 01:58:00,20\n29.03.2026 01:59:00,21\n29.03.2026 03:00:00,22\n"
+       "29.03.2026 03:01:00,23\n",
+       "time_s,T1_degC\n0,20\n60,21\n120,22\n180,23\n", ""},
+      {"a gap of that length on another day",
+       "Time,T1 [C]\n30.03.2026 01:58:00,20\n30.03.2026 01:59:00,21\n30.03.2026 03:00:00,22\n",
+       "time_s,T1_degC\n0,20\n60,21\n3720,22\n", ""},
+      {"the end of summer time, newest row first",
+       "Time,T1 [C]\n25.10.2026 02:10:00,23\n25.10.2026 02:00:00,22\n25.10.2026 02:50:00,21\n"
+       "25.10.2026 02:40:00,20\n",
+       "time_s,T1_degC\n0,20\n600,21\n1200,22\n1800,23\n", ""},
+      {"a clock set back in July",
+       "Time,T1 [C]\n14.07.2026 02:40:00,20\n14.07.2026 02:50:00,21\n14.07.2026 02:00:00,22\n"
+       "14.07.2026 02:10:00,23\n",
+       "log:4: Time = 14.07.2026 02:00:00: must be later than in line 3", ""},
+      {"two rows of one time", "Time,T1 [C]\n08:00:00,20\n08:00:00,21\n",
+       "must be later than in line 2 (08:00:00): delete one of the two lines, or write", ""},
+      {"two times of one name", "Time,T1 [C],Time,z [um]\n0,20,0,1\n1,21,0.1,2\n",
+       "log:1: column 3 = Time: is the name of column 1, too", ""},
+  });
+}
+
+TEST_CASE("JSON: lists of sensors, and units beside the values", "[import]") {
+  check_all({
+      {"a list", "{\"time\":0,\"t\":[20.5,21]}\n{\"time\":1,\"t\":[20.6,null]}\n",
+       "time_s,t.1,t.2\n0,20.5,21\n1,20.6,\n", "time_unit = \"s\""},
+      {"a list whose elements have names, in any order",
+       "[{\"time\":\"08:00:00\",\"t\":[{\"id\":\"bed\",\"value\":20},{\"id\":\"head\",\"value\":25}"
+       "]},\n"
+       "{\"time\":\"08:00:10\",\"t\":[{\"id\":\"head\",\"value\":26},{\"id\":\"bed\",\"value\":21}]"
+       "}]",
+       "time_s,t.bed.value,t.head.value\n0,20,25\n10,21,26\n", ""},
+      {"lists of unequal length", "{\"time\":0,\"t\":[20.5,21]}\n{\"time\":1,\"t\":[20.6]}\n",
+       "log: t = 1 values: must have as many as the record before, 2", ""},
+      {"a value with its unit",
+       "[{\"time\":\"08:00:00\",\"bed\":{\"value\":68,\"unit\":\"°F\"}},\n"
+       "{\"time\":\"08:00:10\",\"bed\":{\"value\":21,\"unit\":\"°C\"}}]",
+       "time_s,bed_degC\n0,20\n10,21\n", ""},
+      {"units by name",
+       "{\"units\":{\"bed\":\"°F\"},\"data\":[{\"time\":\"08:00:00\",\"bed\":68},\n"
+       "{\"time\":\"08:00:10\",\"bed\":69.8}]}",
+       "time_s,bed_degC\n0,20\n10,21\n", ""},
+  });
+}
+
 TEST_CASE("numbers that may be another time are asked for", "[import]") {
   check_all({
+      {"a counter of ms, of the size of seconds since 1904",
+       "Time,T1 [C]\n3200000000,20\n3200000500,21\n", "log:1: Time = (no unit)", ""},
+      {"a clock without colons, called seconds", "Time,T1 [C]\n95940,20\n95950,21\n100000,22\n",
+       "write time_unit = \"hhmmss\"", "time_unit = \"s\""},
+      {"seconds of such size", "Time [s],T1 [C]\n95940,20\n95950,21\n95960,22\n",
+       "time_s,T1_degC\n95940,20\n95950,21\n95960,22\n", ""},
       {"a multiple of a unit", "Time [0.1 s],T1 [C]\n0,20\n10,21\n",
        "log:1: Time [0.1 s] = 0.1 s: is a multiple of a unit", "time_unit = \"s\""},
       {"seconds of the day", "Time,T1 [C]\n28800,20\n28810,21\n", "log:1: Time = (no unit)", ""},
@@ -137,6 +266,16 @@ TEST_CASE("values of a fault are missing, or asked for", "[import]") {
        "Bed;13.02.2026 08:01:00;0;24\nHead;13.02.2026 08:01:00;22;64\n",
        "time_s,Bed,Head\n0,20.5,21\n60,,22\n", ""},
   });
+}
+
+TEST_CASE("TwinCAT's scope: groups of thousands are read, a scale is refused", "[import]") {
+  const std::string head =
+      "Name\tScope\nName\tBed\tName\tWay\nSampleTime[ms]\t500\tSampleTime[ms]\t500\n";
+  check_all(
+      {{"groups", head + "\n0\t20,5\t0\t1.234,5\n500\t20,75\t500\t1.234,6\n",
+        "time_s,Bed,Way\n0,20.5,1234.5\n0.5,20.75,1234.6\n", ""},
+       {"a scale", head + "ScaleFactor\t0,1\tScaleFactor\t1\n\n0\t205\t0\t1\n500\t206\t500\t2\n",
+        "log:4: ScaleFactor = 0,1: may be in the values or not", ""}});
 }
 
 TEST_CASE("the comments of an LVM are left out", "[import]") {

@@ -1,0 +1,31 @@
+/// Finds the columns that hold the time of a table.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "config/run_forms/number_form.hpp"
+#include "config/run_forms/text_table.hpp"
+
+namespace thermocomp {
+
+/// Columns of the time: one column; date and clock time; year, day of the year and hhmm; none if
+/// the rows have a period.
+struct TimeColumns {
+  std::vector<std::size_t> columns;
+  std::optional<std::size_t> dates;       ///< column with the date at which a counting number was 0
+  std::optional<std::size_t> fraction{};  ///< column with the fraction of the second of a clock
+  double fraction_factor{1.0};            ///< s per unit of it
+  [[nodiscard]] bool has(std::size_t column) const;
+};
+
+/// `time_s`; else as mapped; else the one column that has dates or clock times, has a unit of time,
+/// counts from 1970 (or another epoch shown by its size), or is called time.
+/// @param map  may be nullptr
+/// @return nullopt after a problem
+[[nodiscard]] std::optional<TimeColumns> find_time(const TextTable& table, const ColumnMap* map,
+                                                   const std::vector<std::string>& units,
+                                                   const NumberForm& form, ProblemList& problems);
+
+}  // namespace thermocomp

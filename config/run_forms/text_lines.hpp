@@ -1,0 +1,35 @@
+/// The lines of a text table, and their fields.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace thermocomp {
+
+struct TextLine {
+  int number{0};  ///< counted from 1
+  std::string_view text;
+};
+
+struct TextLines {
+  std::vector<TextLine> lines;    ///< without empty lines, comments and drawn frames
+  TextLine last_comment;          ///< of those above the first line
+  std::optional<char> separator;  ///< stated by Excel's "sep=;"
+};
+
+/// Also spells signs and groups of digits plainly, and joins the lines of a quoted name.
+/// @param lines_above  lines of the file before `text`
+/// @param first_line  earlier ones are left out
+[[nodiscard]] TextLines find_lines(std::string& text, int lines_above, int first_line);
+
+/// A quoted field may contain the separator and doubled quotes. A quote with text behind it is a
+/// part of its field: "AI".Bed.
+/// @return false for an unclosed quote
+bool split_line(std::string_view line, char separator, std::vector<std::string_view>& fields);
+
+/// Replaces each doubled quote by one.
+[[nodiscard]] std::string unquoted(std::string_view field);
+
+}  // namespace thermocomp
