@@ -329,7 +329,8 @@ TEST_CASE("values that are being confirmed are the reason, not a lost sensor", "
   CHECK_THAT(status_text(status, false), Contains("no good sensor left"));
   status.confirming = {{.sensors = {"bed"}, .settle_s = 2.0}};
   CHECK_THAT(status_text(status, false),
-             Contains("new values are being confirmed: bed count after settle_s = 2 s") && !Contains("no good sensor left"));
+             Contains("new values are being confirmed: bed count after settle_s = 2 s") &&
+                 !Contains("no good sensor left"));
 }
 
 TEST_CASE("a module that may be frozen is a degradation", "[cli][status]") {
