@@ -243,7 +243,8 @@ StatusView Supervisor::view() {
       parts_.history != nullptr ? parts_.history->statistics() : HistoryStatistics{};
   if (!statistics.last_error.empty()) all.push_back(statistics.last_error);
   std::vector<FrozenModule> frozen;
-  for (const auto& [module, same_s] : frozen_modules_.frozen_s()) frozen.push_back({module, same_s});
+  for (const auto& [module, same_s] : frozen_modules_.frozen_s())
+    frozen.push_back({module, same_s});
   StatusView view{
       parts_.config,
       parts_.cycle.report(),
