@@ -118,6 +118,15 @@ TEST_CASE("only steps of displacements are removed before a fit, above or below 
   CHECK(without_steps({run}, {"z_um"}).notes.empty());
 }
 
+TEST_CASE("the leap after a stuck displacement is no step of its zero", "[inspection]") {
+  RunFile run = recording();
+  std::vector<double>& z_um = column(run, "z_um");
+  std::fill(z_um.begin() + 225, z_um.begin() + 265, z_um[225]);
+  REQUIRE(std::abs(z_um[265] - z_um[225]) > 5.0);
+  CHECK(without_steps({run}, {"z_um"}).notes.empty());
+  CHECK(find(inspect({run}), "displacement_step") == nullptr);
+}
+
 TEST_CASE("noise of a signal does not hide a step of a displacement, a change of the signal does",
           "[inspection]") {
   const bool operated = GENERATE(false, true);
