@@ -66,25 +66,13 @@ constexpr std::size_t times_named_max = 6;
 
 using Values = std::vector<double>;
 
-/// Robust line (median of pairwise slopes) through the values next to an end, evaluated at the end.
-double line_at_end(const Values& values, bool front) {
-  const std::size_t count = 2 * side;
-  const auto at = [&](std::size_t i) { return front ? values[i] : values[values.size() - 1 - i]; };
-  Values slopes;
-  for (std::size_t i = 1; i <= side; ++i)
-    slopes.push_back((at(i + side) - at(i)) / static_cast<double>(side));
-  const double slope = median(slopes);
-  Values levels;
-  for (std::size_t i = 1; i <= count; ++i) levels.push_back(at(i) - slope * static_cast<double>(i));
-  return median(levels);
-}
-
 /// Deviation of each value from its neighbours.
 Values leaps_of(const Values& values) {
   Values leaps(values.size());
   for (std::size_t i = 0; i < values.size(); ++i) {
     const bool at_end = i == 0 || i + 1 == values.size();
-    leaps[i] = values[i] - (at_end ? line_at_end(values, i == 0) : median_around(values, i, side));
+    leaps[i] = values[i] -
+               (at_end ? line_beside(values, i, side, i == 0) : median_around(values, i, side));
   }
   return leaps;
 }

@@ -29,6 +29,21 @@ double median_around(const std::vector<double>& values, std::size_t row, std::si
                  values.begin() + static_cast<std::ptrdiff_t>(row + half + 1)});
 }
 
+double line_beside(const std::vector<double>& values, std::size_t row, std::size_t side,
+                   bool after) {
+  const std::size_t count = 2 * side;
+  if ((after ? values.size() - 1 - row : row) < count)
+    return std::numeric_limits<double>::quiet_NaN();
+  const auto at = [&](std::size_t i) { return after ? values[row + i] : values[row - i]; };
+  std::vector<double> slopes;
+  for (std::size_t i = 1; i <= side; ++i)
+    slopes.push_back((at(i + side) - at(i)) / static_cast<double>(side));
+  const double slope = median(slopes);
+  std::vector<double> levels;
+  for (std::size_t i = 1; i <= count; ++i) levels.push_back(at(i) - slope * static_cast<double>(i));
+  return median(levels);
+}
+
 std::pair<StillRows, std::size_t> longest_still(const std::vector<double>& values) {
   StillRows longest;
   std::size_t second = 1;

@@ -19,6 +19,11 @@ namespace thermocomp {
 [[nodiscard]] double median_around(const std::vector<double>& values, std::size_t row,
                                    std::size_t side);
 
+/// Robust line (median of pairwise slopes) through the 2 `side` values after the row, or before it,
+/// at the row; NaN if there are too few.
+[[nodiscard]] double line_beside(const std::vector<double>& values, std::size_t row,
+                                 std::size_t side, bool after);
+
 /// Rows [begin, end) of one value.
 struct StillRows {
   std::size_t begin{0};

@@ -36,6 +36,9 @@ constexpr int findings_max = 12;  // removed one after another
 constexpr double taken_out_score_min = 5.0;
 // Strongest candidate of the median column on a calm machine.
 constexpr double usual_level = 3.0;
+/// Exchanged readings agree with the other runs if they are at most so many times as far from them
+/// as these from each other.
+constexpr double alike_max = 2.0;
 constexpr double loose_gain_max = 0.9;
 constexpr double loose_gain_min = -0.3;
 // A signal explains a step if, within so many rows of it, it changes by more than this share of its
@@ -441,26 +444,42 @@ void check_exchanged(const Recording& recording, Suspicions& found) {
   const Index places = recording.temps_K.cols();
   if (recording.runs() < 2 || places < 2) return;
   // Temperatures relative to each run's mean: an exchange shows in the motion.
-  MatrixXd moved = recording.temps_K;
-  for (std::size_t r = 0; r < recording.runs(); ++r) {
-    auto rows =
-        moved.middleRows(recording.begins[r], recording.begins[r + 1] - recording.begins[r]);
-    rows.rowwise() -= rows.colwise().mean().eval();
-  }
+  std::vector<MatrixXd> sums;
+  std::vector<double> rows;
   for (std::size_t r = 0; r < recording.runs(); ++r) {
     const Index begin = recording.begins[r];
-    const Index rows = recording.begins[r + 1] - begin;
-    if (rows < rows_min) continue;
-    MatrixXd others = moved;
-    others.middleRows(begin, rows).setZero();
-    const MatrixXd own = moved.middleRows(begin, rows);
-    const double noise = 0.05;  // K, of a thermocouple: similar places are not distinguished
-    const MatrixXd covariance =
-        others.transpose() * others / static_cast<double>(others.rows() - rows) +
-        noise * noise * MatrixXd::Identity(places, places);
-    const MatrixXd precision = covariance.inverse();
-    const MatrixXd scatter = own.transpose() * own / static_cast<double>(rows);
-    const double as_is = (precision * scatter).trace();
+    MatrixXd moved = recording.temps_K.middleRows(begin, recording.begins[r + 1] - begin);
+    moved.rowwise() -= moved.colwise().mean().eval();
+    sums.emplace_back(moved.transpose() * moved);
+    rows.push_back(static_cast<double>(moved.rows()));
+  }
+  // Distance of a run from the others but one: about the number of places if they move alike.
+  const auto precision_of_others = [&](std::size_t r, std::size_t but) {
+    constexpr double noise_K = 0.05;  // of a thermocouple: similar places are not distinguished
+    MatrixXd sum = MatrixXd::Zero(places, places);
+    double count = 0.0;
+    for (std::size_t other = 0; other < sums.size(); ++other) {
+      if (other == r || other == but) continue;
+      sum += sums[other];
+      count += rows[other];
+    }
+    return MatrixXd(
+        (sum / count + noise_K * noise_K * MatrixXd::Identity(places, places)).inverse());
+  };
+  const auto distance = [](const MatrixXd& precision, const MatrixXd& scatter) {
+    return (precision * scatter).trace();
+  };
+  for (std::size_t r = 0; r < recording.runs(); ++r) {
+    const Index begin = recording.begins[r];
+    if (recording.begins[r + 1] - begin < rows_min) continue;
+    std::vector<double> of_others{static_cast<double>(places)};
+    for (std::size_t other = 0; other < sums.size() && sums.size() > 2; ++other)
+      if (other != r)
+        of_others.push_back(distance(precision_of_others(other, r), sums[other] / rows[other]));
+    const double usual = std::max(static_cast<double>(places), median(of_others));
+    const MatrixXd scatter = sums[r] / rows[r];
+    const MatrixXd precision = precision_of_others(r, r);
+    const double as_is = distance(precision, scatter);
     for (Index a = 0; a < places; ++a) {
       for (Index b = a + 1; b < places; ++b) {
         const double apart =
@@ -469,9 +488,9 @@ void check_exchanged(const Recording& recording, Suspicions& found) {
         MatrixXd turned = scatter;
         turned.row(a).swap(turned.row(b));
         turned.col(a).swap(turned.col(b));
-        const double exchanged = (precision * turned).trace();
-        const double ratio = as_is / std::max(exchanged, 0.1 * static_cast<double>(places));
-        if (!(ratio > 1.5)) continue;
+        const double exchanged = distance(precision, turned);
+        const double ratio = as_is / std::max(exchanged, usual);
+        if (!(ratio > 1.5) || !(exchanged < alike_max * usual)) continue;
         Suspicion suspicion;
         suspicion.score = ratio;
         suspicion.finding.kind = std::string("sensor_swap");
@@ -479,7 +498,7 @@ void check_exchanged(const Recording& recording, Suspicions& found) {
         suspicion.finding.other = recording.temps[static_cast<std::size_t>(b)];
         suspicion.finding.run = r;
         suspicion.finding.at_s = recording.time_s[begin];
-        suspicion.finding.until_s = recording.time_s[begin + rows - 1];
+        suspicion.finding.until_s = recording.time_s[recording.begins[r + 1] - 1];
         suspicion.finding.size = apart;
         suspicion.finding.unit = std::string("K");
         found.push_back(suspicion);

@@ -6,6 +6,7 @@
 #include <limits>
 #include <string_view>
 
+#include "config/runs/model_inputs.hpp"
 #include "config/runs/robust.hpp"
 #include "config/text/units.hpp"
 #include "modelling/inspection/checks.hpp"
@@ -90,6 +91,16 @@ RunFile selected_part(RunFile run, const std::vector<std::string>& outputs) {
   return run;
 }
 
+/// The run without values that hide or imitate changes: outliers, which are added to `found`, and
+/// stuck displacements, whose leap at the end looks like another zero.
+RunFile without_blunders(RunFile run, std::size_t index, Suspicions& found) {
+  check_spikes(run, index, found);
+  std::vector<std::string> outputs = run.columns;
+  std::erase_if(outputs, [](const std::string& name) { return !is_output(name); });
+  leave_out_blunders(run, outputs);
+  return run;
+}
+
 Eigen::Index rows_max(std::size_t runs) {
   return std::min(
       rows_of_a_run_max,
@@ -104,7 +115,7 @@ Cleaned without_steps(const std::vector<RunFile>& runs, const std::vector<std::s
   Suspicions spikes;
   Suspicions steps;
   for (const RunFile& run : runs)
-    check_spikes(despiked.emplace_back(selected_part(run, outputs)), despiked.size() - 1, spikes);
+    despiked.push_back(without_blunders(selected_part(run, outputs), despiked.size(), spikes));
   check_changes(make_recording(despiked, rows_max(runs.size())), Looked::displacements, steps, {});
   Inspection inspection;
   for (Suspicion& each : steps) {
@@ -122,12 +133,12 @@ Inspection inspect(const std::vector<RunFile>& given, double probability_min,
   for (const RunFile& run : given) runs.push_back(of_machine(run));
   Inspection inspection;
   Suspicions suspicions;
-  std::vector<RunFile> despiked = runs;
+  std::vector<RunFile> despiked;
   for (std::size_t i = 0; i < runs.size(); ++i) {
     inspection.runs.push_back(sampling_of(runs[i]));
     check_clock(runs[i], i, inspection.runs.back(), suspicions);
     check_empty(runs[i], i, suspicions);
-    check_spikes(despiked[i], i, suspicions);
+    despiked.push_back(without_blunders(runs[i], i, suspicions));
   }
   check_values(runs, suspicions);
   for (const Suspicion& each : suspicions)

@@ -15,11 +15,13 @@ constexpr std::size_t half_window = 3;
 constexpr double leap_K_min = 0.5;
 constexpr double leap_um_min = 1.0;
 constexpr double leap_deviations_min = 8.0;
-constexpr std::size_t nearby = 15;    // rows on each side that give the local deviation
-constexpr double coarse_K_min = 0.2;  // half of it is 0.1 K, about 1 um on a machine
+constexpr double leap_steps_min = 1.5;  ///< least steps of the column, if it changes thrice
+constexpr std::size_t nearby = 15;      // rows on each side that give the local deviation
+constexpr double coarse_K_min = 0.2;    // half of it is 0.1 K, about 1 um on a machine
 constexpr double coarse_um_min = 1.0;
 constexpr std::size_t stuck_rows_min = 10;
 constexpr double others_moved_K_min = 1.0;
+constexpr double stuck_steps_min = 3.0;  ///< least expected motion, in least steps of the reading
 constexpr std::size_t copy_values_min = 20;  // distinct values; fewer agree by chance
 
 Suspicion suspicion(const std::string& kind, const std::string& column, std::size_t run,
@@ -54,10 +56,39 @@ bool returns(const std::vector<double>& values, std::size_t row, double leap) {
   return std::abs(median({at + 1, at + 1 + after}) - median({at - before, at})) < std::abs(leap);
 }
 
-double deviation_nearby(const std::vector<double>& leaps, std::size_t row) {
-  const std::size_t begin = row - std::min(nearby, row);
-  const std::size_t end = std::min(leaps.size(), row + nearby + 1);
-  return robust_deviation(std::span(leaps).subspan(begin, end - begin));
+/// The value is on a line through those before it or after it: a corner of the course.
+bool continues(const std::vector<double>& values, std::size_t row, double leap) {
+  for (const bool after : {false, true}) {
+    const double off = values[row] - line_beside(values, row, half_window, after);
+    if (off / leap < 0.5) return true;
+  }
+  return false;
+}
+
+/// Deviation of the noise in the `reach` rows on each side: the larger of what the distances from
+/// the median of the neighbours, which is 0 on a slope, and the second differences show.
+double noise(const std::vector<double>& leaps, const std::vector<double>& bends, std::size_t row,
+             std::size_t reach) {
+  const std::size_t begin = row - std::min(reach, row);
+  const std::size_t count = std::min(leaps.size(), row + reach + 1) - begin;
+  return std::max(robust_deviation(std::span(leaps).subspan(begin, count)),
+                  robust_deviation(std::span(bends).subspan(begin, count)) / std::sqrt(6.0));
+}
+
+/// Changes between neighbouring rows, without 0.
+std::vector<double> moves_of(const std::vector<double>& values) {
+  std::vector<double> steps;
+  for (std::size_t row = 1; row < values.size(); ++row) {
+    const double step = std::abs(values[row] - values[row - 1]);
+    if (std::isfinite(step) && step > 0) steps.push_back(step);
+  }
+  return steps;
+}
+
+/// The smallest change of a column; 0 with fewer changes than needed to show it.
+double least_step(const std::vector<double>& values, std::size_t changes_min) {
+  const std::vector<double> steps = moves_of(values);
+  return steps.size() < changes_min ? 0.0 : *std::min_element(steps.begin(), steps.end());
 }
 
 void check_leaps(RunFile& run, std::size_t index, std::size_t column, Suspicions& found) {
@@ -65,26 +96,32 @@ void check_leaps(RunFile& run, std::size_t index, std::size_t column, Suspicions
   const bool output = is_output(run.columns[column]);
   std::vector<double> around(values.size());
   std::vector<double> leaps(values.size());
+  std::vector<double> bends(values.size());
   for (std::size_t row = 0; row < values.size(); ++row) {
     around[row] = median_around(values, row, half_window);
     leaps[row] = values[row] - around[row];
+    if (row > 0 && row + 1 < values.size())
+      bends[row] = values[row - 1] - 2.0 * values[row] + values[row + 1];
   }
-  double deviation = robust_deviation(leaps);
-  // If most rows are constant, the others give the deviation.
-  if (!(deviation > 0)) {
+  double deviation = noise(leaps, bends, 0, values.size());
+  // If most rows are constant or on slopes, the others give the deviation.
+  if (!(robust_deviation(leaps) > 0)) {
     std::vector<double> moving;
     for (const double leap : leaps)
       if (std::isfinite(leap) && leap != 0) moving.push_back(std::abs(leap));
-    if (moving.size() > values.size() / 50) deviation = median(std::move(moving));
+    if (moving.size() > values.size() / 50)
+      deviation = std::max(deviation, median(std::move(moving)));
   }
-  const double least = std::max(leap_deviations_min * deviation, output ? leap_um_min : leap_K_min);
+  const double least =
+      std::max({leap_deviations_min * deviation, leap_steps_min * least_step(values, 3),
+                output ? leap_um_min : leap_K_min});
   Suspicion made =
       suspicion(output ? "outliers" : "spikes", run.columns[column], index, 0, 0, 0, 0);
   std::vector<std::size_t> leapt;
   for (std::size_t row = 1; row + 1 < values.size(); ++row) {
     const double leap = leaps[row];
-    if (!(std::abs(leap) > least) || !returns(values, row, leap) ||
-        !(std::abs(leap) > leap_deviations_min * deviation_nearby(leaps, row)) ||
+    if (!(std::abs(leap) > least) || !returns(values, row, leap) || continues(values, row, leap) ||
+        !(std::abs(leap) > leap_deviations_min * noise(leaps, bends, row, nearby)) ||
         others_leap(run, column, row, leap))
       continue;
     made.finding.times_s.push_back(run.time_s()[row]);
@@ -122,13 +159,25 @@ bool is_held(const RunFile& run, std::size_t column, StillRows rows) {
 void check_stuck(const RunFile& run, std::size_t index, std::size_t column, Suspicions& found) {
   const auto [longest, second] = longest_still(run.values[column]);
   if (longest.rows() < stuck_rows_min || is_held(run, column, longest)) return;
-  std::vector<double> others;
-  for (std::size_t i = 0; i < run.columns.size(); ++i)
-    if (i != column && is_temperature(run.columns[i]))
-      others.push_back(range_of(run.values[i], longest));
-  const double moved = others.empty() ? 0.0 : median(others);
-  if (!(moved > others_moved_K_min)) return;
+  const StillRows all{0, run.rows()};
   const bool throughout = longest.rows() == run.rows();
+  double step_K = least_step(run.values[column], 1);
+  std::vector<double> others;
+  std::vector<double> shares;
+  for (std::size_t i = 0; i < run.columns.size(); ++i) {
+    const double range_K = range_of(run.values[i], all);
+    if (i == column || !is_temperature(run.columns[i]) || !(range_K > 0)) continue;
+    others.push_back(range_of(run.values[i], longest));
+    shares.push_back(others.back() / range_K);
+    // A column without any change has the step of the coarsest neighbour.
+    if (throughout) step_K = std::max(step_K, least_step(run.values[i], 1));
+  }
+  if (others.empty()) return;
+  const double moved = median(others);
+  // Of its own range, the reading should have moved the share that the others moved of theirs.
+  const double expected = throughout ? *std::min_element(others.begin(), others.end())
+                                     : median(shares) * range_of(run.values[column], all);
+  if (!(moved > others_moved_K_min) || !(expected > stuck_steps_min * step_K)) return;
   const double longer = static_cast<double>(longest.rows()) / static_cast<double>(second);
   const double score = throughout ? moved : std::min(longer, 5.0 * moved);
   if (!throughout && longer < 3.0) return;
@@ -137,12 +186,7 @@ void check_stuck(const RunFile& run, std::size_t index, std::size_t column, Susp
 }
 
 void check_coarse(const RunFile& run, std::size_t index, std::size_t column, Suspicions& found) {
-  const std::vector<double>& values = run.values[column];
-  std::vector<double> steps;
-  for (std::size_t row = 1; row < values.size(); ++row) {
-    const double step = std::abs(values[row] - values[row - 1]);
-    if (std::isfinite(step) && step > 0) steps.push_back(step);
-  }
+  const std::vector<double> steps = moves_of(run.values[column]);
   if (steps.size() < 5) return;
   const double least = *std::min_element(steps.begin(), steps.end());
   const bool output = is_output(run.columns[column]);
@@ -150,7 +194,7 @@ void check_coarse(const RunFile& run, std::size_t index, std::size_t column, Sus
   const auto on_grid = std::count_if(steps.begin(), steps.end(), [&](double step) {
     return std::abs(step / least - std::round(step / least)) < 0.05;
   });
-  const double range = range_of(values, {0, values.size()});
+  const double range = range_of(run.values[column], {0, run.rows()});
   if (on_grid < static_cast<std::ptrdiff_t>(steps.size()) || least < 0.02 * range) return;
   found.push_back(suspicion("coarse", run.columns[column], index, run.time_s().front(),
                             run.time_s().back(), least, 10.0));

@@ -118,6 +118,15 @@ TEST_CASE("only steps of displacements are removed before a fit, above or below 
   CHECK(without_steps({run}, {"z_um"}).notes.empty());
 }
 
+TEST_CASE("the leap after a stuck displacement is no step of its zero", "[inspection]") {
+  RunFile run = recording();
+  std::vector<double>& z_um = column(run, "z_um");
+  std::fill(z_um.begin() + 225, z_um.begin() + 265, z_um[225]);
+  REQUIRE(std::abs(z_um[265] - z_um[225]) > 5.0);
+  CHECK(without_steps({run}, {"z_um"}).notes.empty());
+  CHECK(find(inspect({run}), "displacement_step") == nullptr);
+}
+
 TEST_CASE("noise of a signal does not hide a step of a displacement, a change of the signal does",
           "[inspection]") {
   const bool operated = GENERATE(false, true);
@@ -227,6 +236,51 @@ TEST_CASE("a reading controlled to a setpoint is not stuck", "[inspection]") {
   run.columns.emplace_back("heater_target");
   run.values.emplace_back(rows, 40.0);
   CHECK(find(inspect({run}), "stuck") == nullptr);
+}
+
+TEST_CASE("readings in steps of 1 K that stay at a step are not stuck", "[inspection]") {
+  RunFile run = recording();
+  for (const std::string& name : run.columns)
+    if (name.ends_with("_degC"))
+      for (double& value : column(run, name)) value = std::round(value / 2.0);
+  const Inspection inspection = inspect({run});
+  INFO(inspection_text(inspection));
+  CHECK(find(inspection, "coarse") != nullptr);
+  CHECK(find(inspection, "stuck") == nullptr);
+}
+
+TEST_CASE("a corner of the course is no outlier", "[inspection]") {
+  // Up and down by 6 um per row, noise 0.5 um.
+  RunFile run = recording();
+  std::mt19937 random(3);
+  std::normal_distribution<double> noise_um(0.0, 0.5);
+  for (std::size_t row = 0; row < rows; ++row) {
+    const auto phase = static_cast<double>(row % 160);
+    column(run, "z_um")[row] = 6.0 * std::min(phase, 160.0 - phase) + noise_um(random);
+  }
+  CHECK(find(inspect({run}), "outliers") == nullptr);
+  column(run, "z_um")[300] += 100.0;
+  const Inspection inspection = inspect({run});
+  REQUIRE(find(inspection, "outliers") != nullptr);
+  CHECK(find(inspection, "outliers")->times_s == std::vector<double>{18000});
+}
+
+TEST_CASE("exchanged readings are found among alike runs, not among runs of other operation",
+          "[inspection]") {
+  const auto is_exchanged = [](const std::vector<RunFile>& runs) {
+    return find(inspect(runs), "sensor_swap") != nullptr;
+  };
+  std::vector<RunFile> runs{recording(1), recording(2), recording(3)};
+  CHECK_FALSE(is_exchanged(runs));
+  std::swap(column(runs[1], "t1_degC"), column(runs[1], "t4_degC"));
+  CHECK(is_exchanged(runs));
+  // A second heater beside t1 or t4 that only one of two runs uses.
+  runs = {recording(1), recording(2)};
+  const char* heated[] = {"t1_degC", "t4_degC"};
+  for (std::size_t r = 0; r < 2; ++r)
+    for (std::size_t row = 0; row < rows; ++row)
+      column(runs[r], heated[r])[row] += 4.0 * std::sin(0.03 * static_cast<double>(row));
+  CHECK_FALSE(is_exchanged(runs));
 }
 
 TEST_CASE("stuck, coarse and duplicate readings are reported", "[inspection]") {
