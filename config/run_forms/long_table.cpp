@@ -16,6 +16,12 @@ constexpr auto value_names = std::to_array<std::string_view>(
     {"value", "_value", "varvalue", "state", "val", "wert", "reading", "mean", "messwert"});
 constexpr auto unit_names =
     std::to_array<std::string_view>({"unit", "units", "einheit", "unit_of_measurement", "uom"});
+/// Columns that say which sensor a row is of.
+constexpr auto series_names = std::to_array<std::string_view>(
+    {"sensor", "sensors",    "sensor_id", "sensor_name", "sensor name", "channel",
+     "kanal",  "tag",        "tagname",   "tag name",    "probe",       "place",
+     "point",  "messstelle", "series",    "signal",      "variable",    "parameter",
+     "metric", "item",       "topic",     "entity_id",   "sphere"});
 constexpr std::size_t series_max = 1024;
 
 struct ColumnContent {
@@ -104,6 +110,11 @@ void keep_needed_names(const TextTable& table, const std::vector<double>& time_s
   }
 }
 
+bool is_ignored(const ColumnMap* map, const std::string& header) {
+  return map != nullptr &&
+         std::find(map->ignored.begin(), map->ignored.end(), header) != map->ignored.end();
+}
+
 /// The columns that a pivot leaves out.
 std::vector<std::size_t> other_columns(const TextTable& table, const TimeColumns& time,
                                        const LongForm& form) {
@@ -152,7 +163,7 @@ std::optional<LongForm> long_form(const TextTable& table, const TimeColumns& tim
       // A number for each series, such as InfluxDB's "table", is not a value.
       if (here.distinct > 1 || named_value) numbers.push_back(i);
     } else if (here.complete && here.distinct > 1 && 2 * here.distinct <= table.rows() &&
-               here.distinct <= series_max) {
+               here.distinct <= series_max && !is_ignored(map, table.header[i])) {
       form.names.push_back(i);
     }
   }
@@ -182,12 +193,26 @@ std::optional<LongForm> long_form(const TextTable& table, const TimeColumns& tim
       return form;
     }
   if (form.names.empty()) return std::nullopt;
-  if (values.size() == 1)
+  const auto names = std::find_if(
+      form.names.begin(), form.names.end(),
+      [&table](std::size_t column) { return is_one_of(series_names, table.header[column]); });
+  const bool is_named = names != form.names.end();
+  if (values.size() == 1) {
     form.value = values[0];
-  else if (numbers.size() == 1 && !increases(time_s) && !decreases(time_s))
+  } else if (numbers.size() == 1 && (is_named || (!increases(time_s) && !decreases(time_s)))) {
     form.value = numbers[0];
-  else
+  } else {
+    if (is_named && !numbers.empty()) {
+      const std::string& name = table.header[*names];
+      problems.add(table.header_line, name, table.field(0, *names),
+                   "names the sensor of a row, whose values are in several columns: write pivot = "
+                   "[" +
+                       toml_text(name) + ", " + toml_text(table.header[numbers[0]]) +
+                       "] to read one of them, or ignore = [" + toml_text(name) +
+                       "] if all rows are of one sensor");
+    }
     return std::nullopt;
+  }
   keep_needed_names(table, time_s, form);
   return form;
 }

@@ -11,6 +11,7 @@ namespace thermocomp::inspection {
 namespace {
 
 constexpr std::size_t half_window = 3;
+constexpr std::size_t bends_min = 9;
 // Jumps of a row that have other causes: tolerance of a thermocouple or a probing.
 constexpr double leap_K_min = 0.5;
 constexpr double leap_um_min = 1.0;
@@ -66,12 +67,15 @@ bool continues(const std::vector<double>& values, std::size_t row, double leap) 
 }
 
 /// Deviation of the noise in the `reach` rows on each side: the larger of what the distances from
-/// the median of the neighbours, which is 0 on a slope, and the second differences show.
+/// the median of the neighbours, which is 0 on a slope, and the second differences show. One
+/// outlier is in three of these: they need more rows.
 double noise(const std::vector<double>& leaps, const std::vector<double>& bends, std::size_t row,
              std::size_t reach) {
   const std::size_t begin = row - std::min(reach, row);
   const std::size_t count = std::min(leaps.size(), row + reach + 1) - begin;
-  return std::max(robust_deviation(std::span(leaps).subspan(begin, count)),
+  const double of_leaps = robust_deviation(std::span(leaps).subspan(begin, count));
+  if (count < bends_min) return of_leaps;
+  return std::max(of_leaps,
                   robust_deviation(std::span(bends).subspan(begin, count)) / std::sqrt(6.0));
 }
 

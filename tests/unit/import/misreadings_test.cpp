@@ -268,6 +268,25 @@ TEST_CASE("values of a fault are missing, or asked for", "[import]") {
   });
 }
 
+TEST_CASE("rows of several sensors are never one column", "[import]") {
+  const std::string rows =
+      "2026-02-01 08:00:00,Bed,20,40\n2026-02-01 08:00:05,Head,30,41\n"
+      "2026-02-01 08:01:00,Bed,21,42\n2026-02-01 08:01:05,Head,31,43\n";
+  check_all({
+      {"each with a time of its own",
+       "Time,Sensor,T1 [C]\n2026-02-01 08:00:00,Bed,20\n2026-02-01 08:00:05,Head,30\n"
+       "2026-02-01 08:01:00,Bed,21\n2026-02-01 08:01:05,Head,31\n",
+       "time_s,Bed_degC,Head_degC\n0,20,\n5,,30\n60,21,\n65,,31\n", ""},
+      {"with two values each", "Time,Sensor,T [C],H [%]\n" + rows,
+       "log:1: Sensor = Bed: names the sensor of a row", ""},
+      {"of which one is read", "Time,Sensor,T [C],H [%]\n" + rows,
+       "time_s,Bed_degC,Head_degC\n0,20,\n5,,30\n60,21,\n65,,31\n",
+       "pivot = [\"Sensor\", \"T [C]\"]"},
+      {"or all are of one", "Time,Sensor,T [C],H [%]\n" + rows,
+       "time_s,T_degC,H_percent\n0,20,40\n5,30,41\n60,21,42\n65,31,43\n", "ignore = [\"Sensor\"]"},
+  });
+}
+
 TEST_CASE("TwinCAT's scope: groups of thousands are read, a scale is refused", "[import]") {
   const std::string head =
       "Name\tScope\nName\tBed\tName\tWay\nSampleTime[ms]\t500\tSampleTime[ms]\t500\n";
