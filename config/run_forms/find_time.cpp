@@ -129,13 +129,16 @@ Candidates candidates(const TextTable& table, const ColumnMap* map,
     const Holds here = content(table, i);
     const SpelledUnit* unit = spelled_unit(units[i]);
     const bool is_time = unit != nullptr && unit->dimension == "time";
+    const bool is_named = names_time(header) || !unit_of_time_name(header).empty() || is_time;
     if (here == Holds::date || here == Holds::both)
       found.dates.push_back(i);
     else if (here == Holds::clock)
       found.clocks.push_back(i);
+    else if (!is_named)
+      continue;
     else if (epoch_of(first_numbers(table, i, form), names_date(header), is_time) != nullptr)
       found.epochs.push_back(i);
-    else if (names_time(header) || !unit_of_time_name(header).empty() || is_time)
+    else
       found.counting.push_back(i);
   }
   return found;

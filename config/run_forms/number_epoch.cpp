@@ -29,9 +29,10 @@ bool has_steps_below(double step_max, const std::vector<double>& numbers) {
   return std::isinf(least) || least <= step_max;
 }
 
-bool are_whole(const std::vector<double>& numbers) {
-  return std::all_of(numbers.begin(), numbers.end(),
-                     [](double number) { return number == std::floor(number); });
+bool are_multiples_of(double unit, const std::vector<double>& numbers) {
+  return std::all_of(numbers.begin(), numbers.end(), [unit](double number) {
+    return std::abs(number / unit - std::round(number / unit)) < 1e-6;
+  });
 }
 
 }  // namespace
@@ -41,7 +42,10 @@ const Epoch* epoch_of(const std::vector<double>& numbers, bool is_named, bool ha
   for (const Epoch& epoch : epochs) {
     if (epoch.only_named && !is_named) continue;
     // Whole numbers of that size may be ms of a counter of 32 bits.
-    if (epoch.only_named && epoch.per_second == 1 && !has_unit && are_whole(numbers)) continue;
+    if (epoch.only_named && epoch.per_second == 1 && !has_unit && are_multiples_of(1, numbers))
+      continue;
+    // No clock goes in steps of 86.4 s: these are seconds.
+    if (epoch.per_second < 1 && !has_unit && are_multiples_of(0.001, numbers)) continue;
     if (!has_unit && !has_steps_below(step_s_max * epoch.per_second * 1.001, numbers)) continue;
     if (!numbers.empty() && std::all_of(numbers.begin(), numbers.end(), [&](double number) {
           return number >= epoch.low && number < epoch.high;

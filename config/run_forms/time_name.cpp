@@ -17,7 +17,8 @@ constexpr auto time_names = std::to_array<std::string_view>(
      "datum",         "uhrzeit",   "elapsed",   "elapsed time", "date time",    "date/time",
      "datum/uhrzeit", "t_s",       "laufzeit",  "ts",           "_time",        "x_value",
      "unixtime",      "unix_time", "epoch",     "seconds",      "last_changed", "elapsed_time",
-     "time stamp",    "scan time", "date_time", "sample time",  "sec"});
+     "time stamp",    "scan time", "date_time", "sample time",  "sec",          "clock",
+     "unix"});
 constexpr auto date_names =
     std::to_array<std::string_view>({"date", "datum", "datetime", "date time", "date/time",
                                      "datum/uhrzeit", "time", "zeit", "timestamp", "zeitstempel"});
