@@ -230,10 +230,25 @@ void find_fraction(const TextTable& table, const ColumnMap* map, const NumberFor
   time.fraction_factor = unit->factor;
 }
 
+/// A column of nothing but AM and PM, of a clock without.
+void find_half(const TextTable& table, TimeColumns& time) {
+  constexpr std::array<std::string_view, 2> halves{"am", "pm"};
+  if (time.columns.empty() || time.columns.size() > 2 || table.rows() == 0) return;
+  const auto stamp = parse_time_stamp(table.field(0, time.columns.back()));
+  if (!stamp || !stamp->has_clock) return;
+  for (std::size_t i = 0; i < table.columns() && !time.half; ++i) {
+    bool is_half = true;
+    for (std::size_t row = 0; row < table.rows() && is_half; ++row)
+      is_half = is_one_of(halves, table.field(row, i));
+    if (is_half) time.half = i;
+  }
+}
+
 }  // namespace
 
 bool TimeColumns::has(std::size_t column) const {
-  return column == fraction || std::find(columns.begin(), columns.end(), column) != columns.end();
+  return column == fraction || column == half ||
+         std::find(columns.begin(), columns.end(), column) != columns.end();
 }
 
 std::optional<TimeColumns> find_time(const TextTable& table, const ColumnMap* map,
@@ -241,6 +256,7 @@ std::optional<TimeColumns> find_time(const TextTable& table, const ColumnMap* ma
                                      ProblemList& problems) {
   auto time = find_clock(table, map, units, form, problems);
   if (time) find_fraction(table, map, form, *time);
+  if (time) find_half(table, *time);
   return time;
 }
 

@@ -17,6 +17,7 @@ struct TimeColumns {
   std::optional<std::size_t> dates;       ///< column with the date at which a counting number was 0
   std::optional<std::size_t> fraction{};  ///< column with the fraction of the second of a clock
   double fraction_factor{1.0};            ///< s per unit of it
+  std::optional<std::size_t> half{};      ///< column with AM or PM of a clock
   [[nodiscard]] bool has(std::size_t column) const;
 };
 

@@ -51,7 +51,7 @@ class TimeReader {
       read_period();
     else if (time_.columns.size() == 3)
       read_day_of_year();
-    else if (time_.columns.size() == 2 || stamp_of(table_.field(0, time_.columns[0])))
+    else if (time_.columns.size() == 2 || stamp_of(0, time_.columns[0]))
       read_stamps();
     else
       read_numbers(time_.columns[0]);
@@ -165,8 +165,13 @@ class TimeReader {
 
   // ---- dates and clock times
   /// The stamp of a field; with time_unit = "hhmmss" of the number 95950.
-  [[nodiscard]] std::optional<TimeStamp> stamp_of(std::string_view field) const {
-    const auto number = asked_unit() == "hhmmss" ? finite_number(field) : std::nullopt;
+  [[nodiscard]] std::optional<TimeStamp> stamp_of(std::size_t row, std::size_t column) const {
+    const std::string_view field = table_.field(row, column);
+    if (time_.half && column == time_.columns.back())
+      return parse_time_stamp(std::string(field) + ' ' +
+                              std::string(table_.field(row, *time_.half)));
+    if (asked_unit() != "hhmmss") return parse_time_stamp(field);
+    const auto number = finite_number(field);
     if (!number || *number >= 1e6) return parse_time_stamp(field);
     TimeStamp stamp;
     stamp.has_clock = true;
@@ -184,9 +189,8 @@ class TimeReader {
     const auto zone = zone_of_header(table_.header[time_.columns[0]]);
     for (std::size_t row = 0; row < table_.rows() && !problems_.full(); ++row) {
       const bool has_clocks = time_.columns.size() == 2;
-      if (const std::string_view field = table_.field(row, time_.columns[0]);
-          !has_clocks || row == 0 || !field.empty())
-        date = stamp_of(field);
+      if (!has_clocks || row == 0 || !table_.field(row, time_.columns[0]).empty())
+        date = stamp_of(row, time_.columns[0]);
       std::optional<TimeStamp> stamp = date;
       if (stamp && has_clocks) stamp = joined(row, *stamp);
       if (stamp && stamp->has_date && !stamp->zone_s) stamp->zone_s = zone;
@@ -245,7 +249,7 @@ class TimeReader {
   }
 
   std::optional<TimeStamp> joined(std::size_t row, TimeStamp date) const {
-    const auto clock = stamp_of(table_.field(row, time_.columns[1]));
+    const auto clock = stamp_of(row, time_.columns[1]);
     if (!clock || clock->has_date || (date.has_clock && !date.is_midnight())) return std::nullopt;
     TimeStamp both = *clock;
     both.has_date = true;
@@ -307,7 +311,9 @@ class TimeReader {
 
   bool clock_is_clear(const std::vector<TimeStamp>& stamps) {
     const TimeStamp& first = stamps.front();
-    if (first.has_date || first.clock_parts != 2 || !asked_unit().empty()) return true;
+    if (first.clock_parts != 2 || !asked_unit().empty()) return true;
+    // Beside a date they are hours and minutes, unless a spreadsheet shows 00:10.0.
+    if (first.has_date && !first.has_fraction) return true;
     refuse(0,
            "may be hours and minutes or minutes and seconds: write time_unit = \"hh:mm\" or "
            "\"mm:ss\" in the file of --columns");
@@ -318,6 +324,7 @@ class TimeReader {
     run_.note = "time_s: '" + table_.header[time_.columns[0]] + "'";
     if (time_.columns.size() == 2) run_.note += " and '" + table_.header[time_.columns[1]] + "'";
     if (time_.fraction) run_.note += " and '" + table_.header[*time_.fraction] + "'";
+    if (time_.half) run_.note += " and '" + table_.header[*time_.half] + "'";
     if (first.has_date && !order) {
       run_.note +=
           ", seconds after the first row; the date may begin with the day or the month, which "

@@ -194,7 +194,8 @@ bool take_clock(std::string_view& text, TimeStamp& stamp) {
     stamp.clock_parts = 3;
     stamp.clock_c = *c;
   }
-  if (take_char(rest, stamp.clock_parts == 3 ? ".,:" : ".,")) {
+  stamp.has_fraction = take_char(rest, stamp.clock_parts == 3 ? ".,:" : ".,");
+  if (stamp.has_fraction) {
     double unit = 0.1;
     double fraction = 0.0;
     if (rest.empty() || !is_digit(rest.front())) return false;

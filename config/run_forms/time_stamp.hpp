@@ -25,6 +25,7 @@ struct TimeStamp {
   double clock_a{0.0};  ///< the number before the first colon
   double clock_b{0.0};
   double clock_c{0.0};
+  bool has_fraction{false};
   std::optional<double> zone_s;  ///< east of Greenwich
   [[nodiscard]] bool is_midnight() const noexcept {
     return has_clock && clock_a == 0.0 && clock_b == 0.0 && clock_c == 0.0;
