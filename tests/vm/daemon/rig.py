@@ -325,7 +325,7 @@ def assert_no_jump_on_the_bus(offsets):
     s. Half a second is allowed for a stall of the machine."""
     assert len(offsets) > ENOUGH_FRAMES
     for (before, a, _), (after, b, _) in zip(offsets, offsets[1:]):
-        bound = RATE_UM_PER_S_MAX * min(after - before + 0.5, 1.0) + 0.002
+        bound = RATE_UM_PER_S_MAX * (min(after - before, 1.0) + 0.5) + 0.002
         assert abs(b - a) <= bound, f"{a} -> {b} um in {after - before:.3f} s"
 
 
