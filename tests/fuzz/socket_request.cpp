@@ -80,8 +80,8 @@ class Rig {
     return limits;
   }
   StatusView view() {
-    return {config_, report_, controller_,         timing_, {}, {}, {}, {},
-            1.0,     false,   server_.statistics()};
+    return {config_, report_, controller_, timing_, {},    {},
+            {},      {},      {},          1.0,     false, server_.statistics()};
   }
   /// Every other command is answered one round later.
   RpcPending take(const Command& asked) {
