@@ -21,8 +21,8 @@ struct TimeColumns {
   [[nodiscard]] bool has(std::size_t column) const;
 };
 
-/// `time_s`; else as mapped; else the one column that has dates or clock times, has a unit of time,
-/// counts from 1970 (or another epoch shown by its size), or is called time.
+/// As mapped; else `time_s`; else the one column that has dates or clock times; else the one of
+/// numbers that is called time or has a unit of it, counted from an epoch if their size shows one.
 /// @param map  may be nullptr
 /// @return nullopt after a problem
 [[nodiscard]] std::optional<TimeColumns> find_time(const TextTable& table, const ColumnMap* map,

@@ -383,7 +383,7 @@ std::optional<ProbeDueStatus> probe_due_of(const StatusView& view) {
   return due.axes.empty() ? std::nullopt : std::optional(due);
 }
 
-/// Says of each module which new values do not count yet, and until when.
+/// Sensors whose new values do not count yet, by module.
 std::vector<Confirmation> confirmations_of(const StatusView& view) {
   const std::vector<SensorReport>& reports = view.report.sensors;
   std::map<std::string, std::vector<std::size_t>> modules;

@@ -178,7 +178,7 @@ void check_stuck(const RunFile& run, std::size_t index, std::size_t column, Susp
   }
   if (others.empty()) return;
   const double moved = median(others);
-  // Of its own range, the reading should have moved the share that the others moved of theirs.
+  // A reading that works moves by the same share of its range as the others do of theirs.
   const double expected = throughout ? *std::min_element(others.begin(), others.end())
                                      : median(shares) * range_of(run.values[column], all);
   if (!(moved > others_moved_K_min) || !(expected > stuck_steps_min * step_K)) return;
