@@ -1,6 +1,9 @@
 #include "config/run_forms/column_map.hpp"
 
+#include <algorithm>
+
 #include "config/run_forms/spelled_unit.hpp"
+#include "config/run_forms/text_table.hpp"
 #include "config/text/units.hpp"
 #include "config/toml/toml_reader.hpp"
 
@@ -25,6 +28,17 @@ void read_column(const TomlTable& table, const std::string& key, ColumnMap& map)
 }
 
 }  // namespace
+
+bool ColumnMap::ignores(std::string_view header) const {
+  const auto has = [&](std::string_view name) {
+    return std::find(ignored.begin(), ignored.end(), name) != ignored.end();
+  };
+  return has(header) || (is_unnamed(header) && has(""));
+}
+
+bool ColumnMap::uses(std::string_view header) const {
+  return ignores(header) || columns.contains(std::string(header));
+}
 
 ColumnMap parse_column_map(const std::string& text, const std::string& name) {
   const TomlDocument document = TomlDocument::from_text(text, name);

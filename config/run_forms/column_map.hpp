@@ -6,6 +6,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace thermocomp {
@@ -36,6 +37,10 @@ struct ColumnMap {
   std::vector<std::string> ignored;  ///< columns left out; "": those without a name
   bool takes_signals{false};         ///< columns without a unit are signals; set by `import`
   std::map<std::string, MappedColumn> columns;  ///< by the name in the header
+
+  [[nodiscard]] bool ignores(std::string_view header) const;
+  /// Whether it says what the column is, or leaves it out.
+  [[nodiscard]] bool uses(std::string_view header) const;
 };
 
 /// @throws ConfigurationError with every problem of the file

@@ -73,6 +73,14 @@ struct Candidates {
   std::vector<std::size_t> counting;  ///< numbers with a unit of time, or called time
 };
 
+/// Of several columns keeps the one called time, if there is exactly one.
+void keep_named(const TextTable& table, std::vector<std::size_t>& columns) {
+  std::vector<std::size_t> named;
+  for (const std::size_t column : columns)
+    if (names_time(table.header[column])) named.push_back(column);
+  if (named.size() == 1) columns = named;
+}
+
 /// Drops constant dates, such as the start of a query, unless all are; of the rest keeps the one
 /// called time, if there is exactly one.
 void keep_moving_dates(const TextTable& table, std::vector<std::size_t>& dates) {
@@ -83,13 +91,7 @@ void keep_moving_dates(const TextTable& table, std::vector<std::size_t>& dates) 
     return true;
   };
   if (!std::all_of(dates.begin(), dates.end(), is_constant)) std::erase_if(dates, is_constant);
-  const auto named = std::find_if(dates.begin(), dates.end(), [&](std::size_t column) {
-    return names_time(table.header[column]);
-  });
-  const auto named_count = std::count_if(dates.begin(), dates.end(), [&](std::size_t column) {
-    return names_time(table.header[column]);
-  });
-  if (named_count == 1) dates = {*named};
+  keep_named(table, dates);
 }
 
 bool numbers_increase(const TextTable& table, std::size_t column, const NumberForm& form) {
@@ -113,11 +115,10 @@ bool increases(const TextTable& table, std::size_t column) {
   return true;
 }
 
-/// Whether the map makes another use of the column.
-bool is_used(const ColumnMap* map, const std::string& header) {
-  return map != nullptr &&
-         (map->columns.contains(header) ||
-          std::find(map->ignored.begin(), map->ignored.end(), header) != map->ignored.end());
+/// Whether the clock of a column shows seconds.
+bool has_seconds(const TextTable& table, std::size_t column) {
+  const auto stamp = parse_time_stamp(table.field(0, column));
+  return stamp && stamp->clock_parts != 2;
 }
 
 Candidates candidates(const TextTable& table, const ColumnMap* map,
@@ -125,7 +126,7 @@ Candidates candidates(const TextTable& table, const ColumnMap* map,
   Candidates found;
   for (std::size_t i = 0; i < table.columns(); ++i) {
     const std::string& header = table.header[i];
-    if (is_used(map, header)) continue;
+    if (map != nullptr && map->uses(header)) continue;
     const Holds here = content(table, i);
     const SpelledUnit* unit = spelled_unit(units[i]);
     const bool is_time = unit != nullptr && unit->dimension == "time";
@@ -166,11 +167,15 @@ std::optional<TimeColumns> find_clock(const TextTable& table, const ColumnMap* m
   Candidates found = candidates(table, map, units, form);
   keep_moving_dates(table, found.dates);
   const std::size_t dates = found.dates.size();
-  if (dates == 1 && found.clocks.size() == 1 && content(table, found.dates[0]) == Holds::date)
+  const bool has_clock_beside = dates == 1 && content(table, found.dates[0]) == Holds::date;
+  if (has_clock_beside) keep_named(table, found.clocks);
+  if (has_clock_beside && found.clocks.size() == 1)
     return TimeColumns{{found.dates[0], found.clocks[0]}, {}};
+  if (has_clock_beside && found.clocks.size() > 1) found.dates.clear();  // asked for below
   const bool is_finer =
       found.counting.size() == 1 && numbers_increase(table, found.counting[0], form);
-  if (dates == 1 && is_finer && !increases(table, found.dates[0]))
+  if (dates == 1 && is_finer &&
+      (!increases(table, found.dates[0]) || !has_seconds(table, found.dates[0])))
     return TimeColumns{{found.counting[0]}, found.dates[0]};
   for (const auto* kind : {&found.dates, &found.epochs, &found.clocks, &found.counting}) {
     if (kind->size() == 1) return TimeColumns{{kind->front()}, {}};
@@ -213,10 +218,11 @@ void find_fraction(const TextTable& table, const ColumnMap* map, const NumberFor
   if (time.columns.empty() || time.columns.size() > 2) return;
   const std::size_t clock = time.columns.back();
   const std::size_t next = clock + 1;
-  if (next >= table.columns() || time.has(next) || is_used(map, table.header[next])) return;
+  if (next >= table.columns() || time.has(next)) return;
+  if (map != nullptr && map->uses(table.header[next])) return;
   const std::string name = small_letters(table.header[next]);
   const SpelledUnit* unit = spelled_unit(name == "millitm" || name == "millis" ? "ms" : name);
-  if (unit == nullptr || unit->dimension != "time") return;
+  if (unit == nullptr || unit->dimension != "time" || unit->factor > 1) return;
   bool is_moving = false;
   for (std::size_t row = 0; row < table.rows(); ++row) {
     const auto stamp = parse_time_stamp(table.field(row, clock));

@@ -7,6 +7,8 @@
 #include <set>
 #include <tuple>
 
+#include "config/run_forms/column_meanings.hpp"
+#include "config/run_forms/column_roles.hpp"
 #include "config/run_forms/log_form.hpp"
 #include "config/run_forms/long_table.hpp"
 #include "config/run_forms/number_form.hpp"
@@ -34,36 +36,6 @@ constexpr auto missing_words = std::to_array<std::string_view>(
 /// Outside, a temperature is a sign of a fault, such as -9999.
 constexpr double degC_min = -273.15;
 constexpr double degC_max = 2500.0;
-
-/// The target of a column of the file.
-struct Meaning {
-  std::size_t source{0};
-  std::string name;
-  UnitConversion conversion;
-};
-
-/// Suggested name for a column without a unit; the user corrects it.
-std::string example_name(std::string_view base) {
-  std::string name = plain_name(base);
-  if (name.empty()) return "t1_degC";
-  const char first = name.front();
-  if (first == 't' || first == 'T') return name + "_degC";
-  if (first >= 'x' && first <= 'z') return name + "_um";
-  return name + "_degC";
-}
-
-std::string own_name(const SpelledName& spelled) {
-  return plain_name(spelled.base).append(spelled.known->suffix);
-}
-
-/// "ΔT", "dT bed-head", "Temp diff", "rise above ambient".
-bool names_difference(const std::string& base) {
-  if (base.starts_with("dT")) return true;
-  const std::string name = small_letters(base);
-  for (const std::string_view word : {"Δ", "∆", "delta", "diff", "rise"})
-    if (name.find(word) != std::string::npos) return true;
-  return false;
-}
 
 std::optional<double> switch_word(std::string_view field) {
   for (const std::string_view on : {"on", "ON", "On", "true", "TRUE", "True"})
@@ -120,7 +92,7 @@ class ForeignReader {
     run_.values.push_back(std::move(run_time.time_s));
     find_meanings(time);
     problems_.throw_any();
-    for (const Meaning& meaning : meanings_) read_values(meaning);
+    for (const ColumnMeaning& meaning : meanings_) read_values(meaning);
     ask_for_words();
     problems_.throw_any();
     if (missing_ > 0)
@@ -176,6 +148,11 @@ class ForeignReader {
       if (run_.wall_zero && first < 0) run_.wall_zero->seconds += first;
       time = {};
       read_units();
+    } else {
+      join_units(table_, map_);
+      read_units();
+      std::string note = leave_bad_values_out(table_, time, map_);
+      if (!note.empty()) run_.understood.push_back(std::move(note));
     }
     order_in_time(table_, time_s, run_);
     const auto at = std::adjacent_find(time_s.begin(), time_s.end(),
@@ -219,14 +196,6 @@ class ForeignReader {
     run_.understood.insert(run_.understood.end(), table_.notes.begin(), table_.notes.end());
   }
 
-  [[nodiscard]] bool is_ignored(const std::string& header) const {
-    if (map_ == nullptr) return false;
-    const auto has = [&](std::string_view name) {
-      return std::find(map_->ignored.begin(), map_->ignored.end(), name) != map_->ignored.end();
-    };
-    return has(header) || (is_unnamed(header) && has(""));
-  }
-
   /// Whether the column has no number at all: it cannot be a value and is left out.
   [[nodiscard]] bool is_text(std::size_t column) const {
     for (std::size_t row = 0; row < table_.rows(); ++row) {
@@ -234,6 +203,18 @@ class ForeignReader {
       if (looks_like_number(field) || switch_word(field)) return false;
     }
     return true;
+  }
+
+  /// "3 K rpm", "4.5 K rpm": numbers with a unit that is not known.
+  [[nodiscard]] bool begins_with_numbers(std::size_t column) const {
+    bool is_filled = false;
+    for (std::size_t row = 0; row < table_.rows(); ++row) {
+      const std::string_view field = table_.field(row, column);
+      if (field.empty()) continue;
+      if (!finite_number(field.substr(0, field.find(' ')))) return false;
+      is_filled = true;
+    }
+    return is_filled;
   }
 
   /// Whether the column numbers the rows, 0 1 2 or 1 2 3.
@@ -256,12 +237,10 @@ class ForeignReader {
     if (is_count && (counts_rows(i) || header == "RECORD")) return "it counts the rows";
     const SpelledUnit* unit = spelled_unit(units_[i]);
     if (unit != nullptr && unit->dimension == "time") return "another time";
-    return unit == nullptr && is_text(i) && !has_own_unit(header) ? "no field of it is a number"
-                                                                  : "";
-  }
-
-  static bool has_own_unit(const std::string& header) {
-    return is_column_name(header) && !unit_of(header).suffix.empty();
+    if (!bad_rows(table_, i).empty()) return "it is the quality of values";
+    const bool is_left_out =
+        unit == nullptr && is_text(i) && !has_own_unit(header) && !begins_with_numbers(i);
+    return is_left_out ? "no field of it is a number" : "";
   }
 
   [[nodiscard]] bool is_mapped(const std::string& header) const {
@@ -270,11 +249,12 @@ class ForeignReader {
 
   void find_meanings(const TimeColumns& time) {
     check_map();
+    ColumnMeanings meanings(table_, map_, units_, has_own_names_, problems_, run_.understood);
     std::set<std::string> seen{"time_s"};
     for (std::size_t i = 0; i < table_.columns(); ++i) {
       const std::string& header = table_.header[i];
       if (time.has(i)) continue;
-      if (is_ignored(header)) {
+      if (map_ != nullptr && map_->ignores(header)) {
         run_.understood.push_back("'" + header + "' left out");
         continue;
       }
@@ -282,15 +262,22 @@ class ForeignReader {
         run_.understood.push_back("'" + header + "' left out: " + why);
         continue;
       }
-      auto meaning = meaning_of(i);
+      if (const std::string why = is_mapped(header) ? "" : unclear_role(table_, i); !why.empty()) {
+        refuse_column(table_, i, why, problems_);
+        continue;
+      }
+      auto meaning = meanings.of(i);
       if (!meaning) continue;
       if (!is_mapped(header)) number_name(*meaning, seen);
       if (!seen.insert(meaning->name).second) {
-        refuse(i, "becomes " + meaning->name + ", which appears twice: write " + toml_text(header) +
-                      " = \"another name\" under [columns] in the file of --columns");
+        refuse_column(table_, i,
+                      "becomes " + meaning->name + ", which appears twice: write " +
+                          toml_text(header) +
+                          " = \"another name\" under [columns] in the file of --columns",
+                      problems_);
         continue;
       }
-      note_meaning(i, *meaning);
+      meanings.note(*meaning);
       run_.columns.push_back(meaning->name);
       meanings_.push_back(*meaning);
     }
@@ -299,7 +286,7 @@ class ForeignReader {
   }
 
   /// Numbers columns of equal names: Temp_degC, Temp_2_degC.
-  static void number_name(Meaning& meaning, const std::set<std::string>& seen) {
+  static void number_name(ColumnMeaning& meaning, const std::set<std::string>& seen) {
     const std::string suffix(unit_of(meaning.name).suffix);
     const std::string base = meaning.name.substr(0, meaning.name.size() - suffix.size());
     for (int i = 2; seen.contains(meaning.name); ++i)
@@ -324,133 +311,7 @@ class ForeignReader {
       if (!header.empty()) check("ignore", header);
   }
 
-  std::optional<Meaning> meaning_of(std::size_t i) {
-    const std::string& header = table_.header[i];
-    SpelledName spelled = spelled_name(header);
-    if (spelled.unit.empty() && !units_[i].empty()) {
-      spelled.unit = units_[i];
-      spelled.known = spelled_unit(units_[i]);
-    }
-    const bool is_mapped_with_unit = is_mapped(header) && !map_->columns.at(header).unit.empty();
-    if (spelled.known != nullptr && spelled.known->offset != 0.0 && !is_mapped_with_unit &&
-        spelled.known->suffix == "_degC" && names_difference(spelled.base)) {
-      refuse(i, "may be a difference of temperatures: write " + toml_text(header) +
-                    " = { name = " + toml_text(plain_name(spelled.base) + "_K") +
-                    ", unit = \"delta_degF\" }, or unit = \"degF\" with a name in _degC, under "
-                    "[columns] in the file of --columns");
-      return std::nullopt;
-    }
-    const bool has_own = spelled_name(header).unit.empty() && has_own_unit(header);
-    if (has_own && spelled.known != nullptr && spelled.known->dimension != "none" &&
-        !is_mapped_with_unit) {
-      const bool is_same =
-          conversion(*spelled.known, header).value_or(UnitConversion{0}).is_identity();
-      if (is_same && !is_mapped(header)) return Meaning{i, header, {}};
-      if (!is_same)
-        refuse(i, "names one unit, and its column is in " + spelled.unit + ": write " +
-                      toml_text(header) + " = { name = " + toml_text(header) +
-                      ", unit = " + toml_text(spelled.unit) +
-                      " } under [columns] in the file of --columns, or the unit that is true");
-      if (!is_same) return std::nullopt;
-    }
-    if (is_mapped(header)) return mapped_meaning(i, map_->columns.at(header), spelled);
-    if (spelled.unit.empty() && !unit_of(header).suffix.empty() && is_column_name(header))
-      return Meaning{i, header, {}};
-    const bool is_named = map_ != nullptr && std::find(map_->names.begin(), map_->names.end(),
-                                                       header) != map_->names.end();
-    const bool takes_signal = spelled.unit.empty() && (has_own_names_ || is_named ||
-                                                       (map_ != nullptr && map_->takes_signals));
-    if (takes_signal && is_column_name(plain_name(header)))
-      return Meaning{i, plain_name(header), {}};
-    if (spelled.known == nullptr || spelled.known->dimension == "time") {
-      const std::string example = spelled.unit.empty()
-                                      ? example_name(spelled.base)
-                                      : plain_name(spelled.base + "_" + spelled.unit);
-      refuse(i, (spelled.unit.empty() ? std::string("has no unit")
-                                      : "has an unknown unit, " + spelled.unit) +
-                    ": write " + toml_text(header) + " = " + toml_text(example) +
-                    (spelled.unit.empty()
-                         ? " (or what it is; without a unit it is a signal)"
-                         : ", a signal, or { name = \"its name\", unit = " +
-                               toml_text(unit_with_factor(spelled.unit) ? spelled.unit
-                                                                        : "a known unit") +
-                               " }") +
-                    " under [columns], or ignore = [" + toml_text(header) +
-                    "], in the file of --columns");
-      return std::nullopt;
-    }
-    Meaning meaning{i, own_name(spelled), {}};
-    const bool own_unit = unit_of(meaning.name).suffix == spelled.known->suffix;
-    if (plain_name(spelled.base).empty() || !own_unit || !is_plain(meaning.name)) {
-      refuse(i, "is not a descriptive name: write " + toml_text(header) +
-                    " = \"its name\" under [columns] in the file of --columns");
-      return std::nullopt;
-    }
-    meaning.conversion = conversion(*spelled.known, meaning.name).value_or(UnitConversion{});
-    return meaning;
-  }
-
-  /// A name that keeps its meaning in a file of our own form.
-  static bool is_plain(const std::string& name) {
-    return is_column_name(name) && spelled_name(name).known == nullptr && name != "time_s";
-  }
-
-  std::optional<Meaning> mapped_meaning(std::size_t i, const MappedColumn& mapped,
-                                        const SpelledName& spelled) {
-    Meaning meaning{i, mapped.name, {}};
-    const auto unit =
-        mapped.unit.empty()
-            ? (spelled.known == nullptr ? std::nullopt : std::optional(*spelled.known))
-            : unit_with_factor(mapped.unit);
-    if (!is_plain(mapped.name)) {
-      problems_.add({map_->file, 0, "columns", mapped.name, std::string(column_name_rule)});
-      return std::nullopt;
-    }
-    const bool has_brackets = !unit && !spelled.unit.empty();
-    if (has_brackets && !unit_of(mapped.name).suffix.empty() && may_be_unit(spelled.unit)) {
-      problems_.add({map_->file, 0, "columns", mapped.name,
-                     "may not be the unit of '" + table_.header[i] +
-                         "': write { name = " + toml_text(mapped.name) +
-                         ", unit = \"that of the file\" }, such as degC, 0.1 degC or mil"});
-      return std::nullopt;
-    }
-    if (has_brackets)
-      run_.understood.push_back("in '" + table_.header[i] + "' '" + spelled.unit +
-                                "' is taken for a part of the name, not for a unit");
-    if (!unit) return meaning;
-    const auto converted = conversion(*unit, mapped.name);
-    if (!converted) {
-      problems_.add({map_->file, 0, "columns", mapped.name,
-                     "cannot be made from '" + table_.header[i] + "', which is in " +
-                         std::string(unit->spelling)});
-      return std::nullopt;
-    }
-    meaning.conversion = *converted;
-    return meaning;
-  }
-
-  void note_meaning(std::size_t i, const Meaning& meaning) {
-    std::string note = "'" + table_.header[i] + "' is " + meaning.name;
-    const bool has_unit = !unit_of(meaning.name).suffix.empty();
-    if (!has_unit) note += ", a signal without unit";
-    if (!has_unit && !is_mapped(table_.header[i]) && !has_own_names_ && map_ != nullptr &&
-        map_->takes_signals && map_->names.empty())
-      note += " (if it has one, write " + toml_text(table_.header[i]) + " = " +
-              toml_text(example_name(spelled_name(table_.header[i]).base)) +
-              ", or what it is, under [columns] in the file of --columns)";
-    if (meaning.conversion.factor != 1.0)
-      note += ", times " + number_text(meaning.conversion.factor);
-    if (meaning.conversion.offset != 0.0)
-      note += ", plus " + number_text(meaning.conversion.offset);
-    const bool from_mm = kind_of(meaning.name) == QuantityKind::position;
-    if (from_mm && meaning.name != table_.header[i])
-      note += ", a position (a displacement: write " + toml_text(table_.header[i]) + " = " +
-              toml_text(meaning.name.substr(0, meaning.name.size() - 2) + "um") +
-              " under [columns] in the file of --columns)";
-    run_.understood.push_back(note);
-  }
-
-  void read_values(const Meaning& meaning) {
+  void read_values(const ColumnMeaning& meaning) {
     const bool is_switch = unit_of(meaning.name).suffix == "_on";
     const bool is_degC = unit_of(meaning.name).suffix == "_degC";
     std::vector<double> values;
@@ -479,7 +340,7 @@ class ForeignReader {
   }
 
   /// Converts a cell in another unit than its column: 850 mA among A.
-  std::optional<double> in_unit_of_column(const Meaning& meaning, double number,
+  std::optional<double> in_unit_of_column(const ColumnMeaning& meaning, double number,
                                           const SpelledUnit& unit) const {
     const SpelledUnit* of_column = spelled_unit(units_[meaning.source]);
     if (of_column == nullptr || of_column->dimension != unit.dimension) return std::nullopt;
@@ -487,7 +348,7 @@ class ForeignReader {
     return (unit.factor * number + unit.offset - of_column->offset) / of_column->factor;
   }
 
-  void ask_for_word(std::size_t row, const Meaning& meaning) {
+  void ask_for_word(std::size_t row, const ColumnMeaning& meaning) {
     const std::string word(table_.field(row, meaning.source));
     if (words_.empty()) word_at_ = {table_.lines[row], table_.header[meaning.source], word};
     words_.insert(word);
@@ -531,12 +392,6 @@ class ForeignReader {
     return true;
   }
 
-  void refuse(std::size_t column, std::string rule) {
-    const std::string& header = table_.header[column];
-    problems_.add(table_.header_line, "column " + std::to_string(column + 1),
-                  header.empty() ? "(empty)" : header, std::move(rule));
-  }
-
   ProblemList problems_;
   const ColumnMap* map_;
   TextTable table_;
@@ -548,7 +403,7 @@ class ForeignReader {
   std::tuple<int, std::string, std::string> word_at_;  ///< line, column and word of the first
   bool is_impossible_{false};  ///< the first of them is a number, but no temperature
   NumberForm form_;
-  std::vector<Meaning> meanings_;
+  std::vector<ColumnMeaning> meanings_;
   std::size_t missing_{0};
   std::string missing_as_;
 };

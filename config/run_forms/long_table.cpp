@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 
+#include "config/run_forms/column_roles.hpp"
 #include "config/run_forms/field_text.hpp"
 #include "config/run_forms/spelled_unit.hpp"
 #include "config/text/units.hpp"
@@ -14,14 +15,6 @@ namespace {
 
 constexpr auto value_names = std::to_array<std::string_view>(
     {"value", "_value", "varvalue", "state", "val", "wert", "reading", "mean", "messwert"});
-constexpr auto unit_names =
-    std::to_array<std::string_view>({"unit", "units", "einheit", "unit_of_measurement", "uom"});
-/// Columns that say which sensor a row is of.
-constexpr auto series_names = std::to_array<std::string_view>(
-    {"sensor", "sensors",    "sensor_id", "sensor_name", "sensor name", "channel",
-     "kanal",  "tag",        "tagname",   "tag name",    "probe",       "place",
-     "point",  "messstelle", "series",    "signal",      "variable",    "parameter",
-     "metric", "item",       "topic",     "entity_id",   "sphere"});
 constexpr std::size_t series_max = 1024;
 
 struct ColumnContent {
@@ -110,11 +103,6 @@ void keep_needed_names(const TextTable& table, const std::vector<double>& time_s
   }
 }
 
-bool is_ignored(const ColumnMap* map, const std::string& header) {
-  return map != nullptr &&
-         std::find(map->ignored.begin(), map->ignored.end(), header) != map->ignored.end();
-}
-
 /// The columns that a pivot leaves out.
 std::vector<std::size_t> other_columns(const TextTable& table, const TimeColumns& time,
                                        const LongForm& form) {
@@ -124,24 +112,6 @@ std::vector<std::size_t> other_columns(const TextTable& table, const TimeColumns
         std::find(form.names.begin(), form.names.end(), i) == form.names.end())
       others.push_back(i);
   return others;
-}
-
-/// Rows that a column of good and bad qualities, in words or as OPC's numbers, calls bad.
-std::vector<bool> bad_rows(const TextTable& table, const std::vector<std::size_t>& columns) {
-  constexpr std::array<std::string_view, 2> good{"good", "192"};
-  constexpr double least_uncertain = 64;
-  std::vector<bool> bad(table.rows());
-  for (const std::size_t column : columns) {
-    bool has_good = false;
-    for (std::size_t row = 0; row < table.rows() && !has_good; ++row)
-      has_good = is_one_of(good, table.field(row, column));
-    for (std::size_t row = 0; row < table.rows() && has_good; ++row) {
-      const std::string_view quality = table.field(row, column);
-      bad[row] = bad[row] || small_letters(quality) == "bad" ||
-                 finite_number(quality).value_or(least_uncertain) < least_uncertain;
-    }
-  }
-  return bad;
 }
 
 }  // namespace
@@ -157,13 +127,14 @@ std::optional<LongForm> long_form(const TextTable& table, const TimeColumns& tim
     const ColumnContent here = content_of(table, i);
     const bool named_value = is_one_of(value_names, table.header[i]);
     if (named_value) values.push_back(i);
-    if (is_one_of(unit_names, table.header[i])) {
+    if (names_units(table.header[i])) {
       form.unit = i;
     } else if (here.numbers || named_value) {
       // A number for each series, such as InfluxDB's "table", is not a value.
       if (here.distinct > 1 || named_value) numbers.push_back(i);
     } else if (here.complete && here.distinct > 1 && 2 * here.distinct <= table.rows() &&
-               here.distinct <= series_max && !is_ignored(map, table.header[i])) {
+               here.distinct <= series_max && bad_rows(table, i).empty() &&
+               !(map != nullptr && map->ignores(table.header[i]))) {
       form.names.push_back(i);
     }
   }
@@ -193,13 +164,22 @@ std::optional<LongForm> long_form(const TextTable& table, const TimeColumns& tim
       return form;
     }
   if (form.names.empty()) return std::nullopt;
-  const auto names = std::find_if(
-      form.names.begin(), form.names.end(),
-      [&table](std::size_t column) { return is_one_of(series_names, table.header[column]); });
+  const bool is_ordered = increases(time_s) || decreases(time_s);
+  if (numbers.size() == 1 && !table.has_header && is_ordered) {
+    const std::string& name = table.header[form.names[0]];
+    problems.add(table.lines[0], name, table.field(0, form.names[0]),
+                 "may say what the number of a row is: write pivot = [" + toml_text(name) +
+                     "] in the file of --columns, or ignore = [" + toml_text(name) +
+                     "] if all numbers are of one sensor");
+    return std::nullopt;
+  }
+  const auto names =
+      std::find_if(form.names.begin(), form.names.end(),
+                   [&table](std::size_t column) { return names_series(table.header[column]); });
   const bool is_named = names != form.names.end();
   if (values.size() == 1) {
     form.value = values[0];
-  } else if (numbers.size() == 1 && (is_named || (!increases(time_s) && !decreases(time_s)))) {
+  } else if (numbers.size() == 1 && (is_named || !is_ordered)) {
     form.value = numbers[0];
   } else {
     if (is_named && !numbers.empty()) {
@@ -220,7 +200,11 @@ std::optional<LongForm> long_form(const TextTable& table, const TimeColumns& tim
 std::string pivot(TextTable& table, const TimeColumns& time, std::vector<double>& time_s,
                   const LongForm& form, double scan_s, ProblemList& problems) {
   const std::vector<std::size_t> others = other_columns(table, time, form);
-  const std::vector<bool> bad = bad_rows(table, others);
+  std::vector<bool> bad(table.rows());
+  for (const std::size_t column : others) {
+    const std::vector<bool> here = bad_rows(table, column);
+    for (std::size_t row = 0; row < here.size(); ++row) bad[row] = bad[row] || here[row];
+  }
   std::map<double, std::size_t> row_of;
   for (const double at : time_s) row_of.emplace(at, 0);
   std::vector<double> times;
@@ -238,6 +222,7 @@ std::string pivot(TextTable& table, const TimeColumns& time, std::vector<double>
   wide.lines.assign(times.size(), 0);
   for (std::size_t row = 0; row < table.rows(); ++row) {
     const std::string series = series_of(table, row, form);
+    if (series.starts_with("$RT_")) continue;  // WinCC: the archive was switched on or off
     const auto [found, is_new] = column_of.emplace(series, columns.size());
     const std::string_view unit = form.unit ? table.field(row, *form.unit) : value_unit;
     if (is_new && columns.size() < series_max) {

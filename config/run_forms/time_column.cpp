@@ -205,7 +205,8 @@ class TimeReader {
                "measurement");
       stamps.push_back(stamp.value_or(TimeStamp{}));
     }
-    if (!problems_.empty() || stamps.empty() || !clock_is_clear(stamps)) return;
+    if (!problems_.empty() || stamps.empty() || !clock_is_clear(stamps) || counts_ms(stamps))
+      return;
     const std::optional<DateOrder> order = date_order(stamps);
     if (!problems_.empty()) return;
     const DateOrder taken = order.value_or(DateOrder::unknown);
@@ -299,6 +300,7 @@ class TimeReader {
               [](const auto& a, const auto& b) { return a.first < b.first; });
     if (spans.size() == 1) return spans[0].second;
     if (spans.size() > 1 && spans[1].first > 5 * spans[0].first) return spans[0].second;
+    if (stamps.front().has_points) return DateOrder::day_month_year;
     const bool one_day = std::all_of(stamps.begin(), stamps.end(), [&](const TimeStamp& stamp) {
       return stamp.date == stamps.front().date;
     });
@@ -313,11 +315,27 @@ class TimeReader {
     const TimeStamp& first = stamps.front();
     if (first.clock_parts != 2 || !asked_unit().empty()) return true;
     // Beside a date they are hours and minutes, unless a spreadsheet shows 00:10.0.
-    if (first.has_date && !first.has_fraction) return true;
+    if (first.has_date && first.fraction_digits == 0) return true;
     refuse(0,
            "may be hours and minutes or minutes and seconds: write time_unit = \"hh:mm\" or "
            "\"mm:ss\" in the file of --columns");
     return false;
+  }
+
+  /// Refuses 8:00:00.3, 8:00:00.20: the fractions may be of a second, or counts of ms.
+  bool counts_ms(const std::vector<TimeStamp>& stamps) {
+    int digits = 0;  // of the first row with a fraction
+    const auto other = std::find_if(stamps.begin(), stamps.end(), [&](const TimeStamp& stamp) {
+      if (digits == 0) digits = stamp.fraction_digits;
+      return stamp.fraction_digits != 0 && stamp.fraction_digits != digits;
+    });
+    if (other == stamps.end() || std::none_of(stamps.begin(), stamps.end(),
+                                              [](const TimeStamp& s) { return s.may_count_ms; }))
+      return false;
+    refuse(static_cast<std::size_t>(other - stamps.begin()),
+           "may end with a fraction of a second or with a number of ms, since the rows have "
+           "different numbers of digits: write three in each row");
+    return true;
   }
 
   void note_stamps(const TimeStamp& first, std::optional<DateOrder> order, double first_s) {

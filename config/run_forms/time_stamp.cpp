@@ -87,7 +87,8 @@ void find_orders(const std::array<DatePart, 3>& parts, char separator, TimeStamp
     if (!by_points && (parts[0].digits == 0 || parts[0].value <= 12))
       allow(DateOrder::month_day_year, 1, 0, 2);
   }
-  if (year_is(0) && (is_long || separator != '.')) allow(DateOrder::year_month_day, 2, 1, 0);
+  if (year_is(0)) allow(DateOrder::year_month_day, 2, 1, 0);
+  stamp.has_points = separator == '.' && !is_long;
 }
 
 /// 20260301123000
@@ -194,13 +195,15 @@ bool take_clock(std::string_view& text, TimeStamp& stamp) {
     stamp.clock_parts = 3;
     stamp.clock_c = *c;
   }
-  stamp.has_fraction = take_char(rest, stamp.clock_parts == 3 ? ".,:" : ".,");
-  if (stamp.has_fraction) {
+  const bool has_colon = rest.starts_with(':');
+  if (take_char(rest, stamp.clock_parts == 3 ? ".,:" : ".,")) {
     double unit = 0.1;
     double fraction = 0.0;
     if (rest.empty() || !is_digit(rest.front())) return false;
-    for (; !rest.empty() && is_digit(rest.front()); rest.remove_prefix(1), unit /= 10)
+    for (; !rest.empty() && is_digit(rest.front()); rest.remove_prefix(1), unit /= 10) {
       fraction += unit * (rest.front() - '0');
+      stamp.may_count_ms = has_colon || (++stamp.fraction_digits > 1 && rest.front() == '0');
+    }
     (stamp.clock_parts == 3 ? stamp.clock_c : stamp.clock_b) += fraction;
   }
   stamp.has_clock = true;

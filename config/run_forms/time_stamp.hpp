@@ -13,6 +13,7 @@ namespace thermocomp {
 /// The parts of a time stamp, before the order of day, month and year is known.
 struct TimeStamp {
   bool has_date{false};
+  bool has_points{false};     ///< 13.04.26, which usually begins with the day
   std::array<int, 3> date{};  ///< in written order; a month's name is its number
   /// The orders that the spelling allows; up to three for two-digit years and slashes.
   std::array<bool, 4> allows{};  ///< by DateOrder
@@ -25,7 +26,10 @@ struct TimeStamp {
   double clock_a{0.0};  ///< the number before the first colon
   double clock_b{0.0};
   double clock_c{0.0};
-  bool has_fraction{false};
+  int fraction_digits{0};
+  /// Of fewer digits than others, the fraction is a count of ms: it follows a colon, or ends in 0,
+  /// as "20".
+  bool may_count_ms{false};
   std::optional<double> zone_s;  ///< east of Greenwich
   [[nodiscard]] bool is_midnight() const noexcept {
     return has_clock && clock_a == 0.0 && clock_b == 0.0 && clock_c == 0.0;

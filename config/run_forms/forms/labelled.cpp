@@ -1,6 +1,8 @@
 #include <algorithm>
+#include <array>
 #include <map>
 
+#include "config/run_forms/column_roles.hpp"
 #include "config/run_forms/field_text.hpp"
 #include "config/run_forms/log_form.hpp"
 #include "config/run_forms/spelled_unit.hpp"
@@ -13,6 +15,7 @@ namespace {
 struct Labelled {
   std::string time;
   std::vector<std::pair<std::string, std::string>> values;  ///< name and its number or word
+  std::string words;  ///< in front of the first name, without levels such as INFO
   [[nodiscard]] bool has_number() const {
     return std::any_of(values.begin(), values.end(),
                        [](const auto& value) { return looks_like_number(value.second); });
@@ -74,6 +77,46 @@ std::string_view unit_after(std::string_view rest) {
   return rest.starts_with('=') || rest.starts_with(':') ? std::string_view() : unit;
 }
 
+/// The words of a text, without digits and without the levels of a log.
+std::string words_of(std::string_view text) {
+  constexpr auto levels = std::to_array<std::string_view>(
+      {"info", "warn", "warning", "error", "debug", "trace", "notice"});
+  std::string words;
+  std::string word;
+  for (const char c : std::string(text) + ' ') {
+    const bool is_letter = static_cast<unsigned char>(c | 0x20) >= 'a';
+    if (is_letter) word += c;
+    if (is_letter || word.empty()) continue;
+    if (!is_one_of(levels, word)) words.append(words.empty() ? "" : " ").append(word);
+    word.clear();
+  }
+  return words;
+}
+
+/// Refuses lines of equal names that differ in other words, each again and again: they may be of
+/// several sensors.
+class WordsBesideNames {
+ public:
+  void add(const Log& log, int line, const Labelled& found) {
+    std::string names;
+    for (const auto& [name, value] : found.values) names += name + ' ';
+    auto& counts = counts_[names];
+    ++counts[found.words];
+    const auto repeated = [](const auto& each) { return each.second > 1; };
+    const auto first = std::find_if(counts.begin(), counts.end(), repeated);
+    const auto second =
+        first == counts.end() ? first : std::find_if(std::next(first), counts.end(), repeated);
+    if (second == counts.end()) return;
+    log.refuse(line, names.substr(0, names.find(' ')), second->first,
+               "may be of another sensor than the lines with '" + shortened(first->first) +
+                   "': give each value a name of its own, such as " + plain_name(second->first) +
+                   "=");
+  }
+
+ private:
+  std::map<std::string, std::map<std::string, int>> counts_;  ///< by names, then by words
+};
+
 /// Parses "T:25.00 /0.00", "T1: 10.0 degC", "temp = 22,1".
 Labelled labelled_of(std::string_view line) {
   Labelled found;
@@ -85,6 +128,9 @@ Labelled labelled_of(std::string_view line) {
     name.remove_prefix(name.find_last_of(" \t,;:=()[]{}|/\"") + 1);
     const std::string_view word = first_word(trimmed(line.substr(i + 1)));
     if (name.empty() || word.empty() || finite_number(name)) continue;
+    if (found.values.empty())
+      found.words = words_of(line.substr(0, static_cast<std::size_t>(name.data() - line.data())));
+    if (names_series(name)) found.words += words_of(word);
     std::string value(word);
     const auto end = static_cast<std::size_t>(word.data() + word.size() - line.data());
     const std::string with_unit = value + " " + std::string(unit_after(line.substr(end)));
@@ -118,6 +164,7 @@ PlainTable plain_labelled(const Log& log) {
   std::vector<std::string> names;
   std::vector<LabelledRow> rows;
   std::size_t left_out = 0;
+  WordsBesideNames words;
   std::string_view rest = log.text;
   for (int line = 1; !rest.empty(); ++line) {
     Labelled found = labelled_of(take_line(rest));
@@ -126,6 +173,7 @@ PlainTable plain_labelled(const Log& log) {
       ++left_out;
       continue;
     }
+    words.add(log, line, found);
     // Lines of equal time form one row.
     if (rows.empty() || rows.back().time != found.time) rows.push_back({found.time, line, {}});
     std::vector<std::string>& row = rows.back().values;

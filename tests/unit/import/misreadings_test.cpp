@@ -300,6 +300,87 @@ TEST_CASE("rows of several sensors are never one column", "[import]") {
   });
 }
 
+TEST_CASE("a column may be the unit, the quality or the sensor of another's values", "[import]") {
+  check_all({
+      {"a unit behind each value", "Time [s],Bed,Unit,Head,Unit\n0,20,C,68,F\n60,21,C,69.8,F\n",
+       "time_s,Bed_degC,Head_degC\n0,20,20\n60,21,21\n", ""},
+      {"a quality behind each value",
+       "Time [s],Bed [C],Bed Quality,z [um],z Quality\n0,20,Good,1,Good\n60,0,Bad,2,Good\n",
+       "time_s,Bed_degC,z_um\n0,20,1\n60,,2\n", ""},
+      {"a quality before its value", "Time [s],Quality,Bed [C]\n0,Good,20\n60,Bad,0\n",
+       "time_s,Bed_degC\n0,20\n60,\n", ""},
+      {"in hexadecimal numbers",
+       "Time [s],Bed [C],Quality\n0,20,0x000000C0\n60,0,0x00000018\n120,0,0x80000000\n",
+       "time_s,Bed_degC\n0,20\n60,\n120,\n", ""},
+      {"as 1 and 0", "Time [s],Bed [C],Validity\n0,20,1\n60,0,0\n", "time_s,Bed_degC\n0,20\n60,\n",
+       ""},
+      {"a state is no quality", "Time [s],Bed [C],State\n0,20,RUN\n60,0,STOP\n",
+       "time_s,Bed_degC\n0,20\n60,0\n", ""},
+      {"the number of a sensor", "Time [s],Channel,T [C]\n0,1,20\n1,2,30\n60,1,21\n61,2,31\n",
+       "log:1: column 2 = Channel: may say which sensor a row is of", ""},
+      {"each sensor a column", "Time [s],Channel,T [C]\n0,1,20\n1,2,30\n60,1,21\n61,2,31\n",
+       "time_s,1_degC,2_degC\n0,20,\n1,,30\n60,21,\n61,,31\n", "pivot = [\"Channel\", \"T [C]\"]"},
+      {"a name without a header",
+       "2026-02-01 08:00:00|bed|20\n2026-02-01 08:00:05|head|30\n"
+       "2026-02-01 08:01:00|bed|21\n2026-02-01 08:01:05|head|31\n",
+       "log:1: column 2 = bed: may say what the number of a row is", ""},
+      {"another word in front of the value",
+       "08:00:00 INFO Bed temp=20\n08:00:01 INFO Head temp=30\n08:01:00 INFO Bed temp=21\n"
+       "08:01:01 WARN Head temp=31\n",
+       "log:4: temp = Head: may be of another sensor than the lines with 'Bed'", ""},
+      {"a level is no sensor",
+       "08:00:00 INFO temp=20\n08:01:00 WARN temp=21\n08:02:00 INFO temp=22\n"
+       "08:03:00 WARN temp=23\n",
+       "time_s,temp\n0,20\n60,21\n120,22\n180,23\n", ""},
+  });
+}
+
+TEST_CASE("a unit that may be another is asked for", "[import]") {
+  check_all({
+      {"a letter of the name", "Time,Spindle (A)\ns,degC\n0,20\n60,21\n",
+       "log:1: column 2 = Spindle (A): may be in A, as its name says, or in degC", ""},
+      {"as the row of units says", "Time,Spindle (A)\ns,degC\n0,20\n60,21\n",
+       "time_s,Spindle_degC\n0,20\n60,21\n",
+       "[columns]\n\"Spindle (A)\" = { name = \"Spindle_degC\", unit = \"degC\" }"},
+      {"tenths", "Time [s],Bed 0.1℃\n0,205\n60,206\n",
+       "write \"Bed 0.1℃\" = { name = \"Bed_degC\", unit = \"0.1 ℃\" }", ""},
+      {"ten times", "Time [s],Bed x10°C\n0,205\n60,206\n", "may be a multiple of its unit", ""},
+      {"the number of a sensor is no factor", "Time [s],Bed 1 °C\n0,20\n60,21\n",
+       "time_s,Bed_1_degC\n0,20\n60,21\n", ""},
+      {"thousands", "Time [s],speed\n0,3.00 K\n60,4.50 K\n", "may be a unit or mean a thousand",
+       ""},
+      {"more than a unit", "Time [s],T [C],speed\n0,20,3 K rpm\n60,21,4.5 K rpm\n",
+       "log:2: speed = 3 K rpm: must be a number", ""},
+  });
+}
+
+TEST_CASE("what may be a part of the time is asked for", "[import]") {
+  check_all({
+      {"seconds beside hours and minutes",
+       "Date;Time;Sec;T "
+       "[C]\n01.02.2026;08:00;0;20\n01.02.2026;08:01;30;21\n01.02.2026;08:03;0;22\n",
+       "log:1: column 3 = Sec: may be a part of the time", ""},
+      {"counts of ms",
+       "Time,T [C]\n2026-02-01 08:00:00.3,20\n2026-02-01 08:00:01.20,21\n2026-02-01 "
+       "08:00:02.370,22\n",
+       "may end with a fraction of a second or with a number of ms", ""},
+      {"a whole second without a fraction",
+       "Time,T [C]\n2026-02-01T08:00:00,20\n2026-02-01T08:00:00.500,21\n",
+       "time_s,T_degC\n0,20\n0.5,21\n", ""},
+      {"the year first", "Time,T [C]\n26.04.13 23:59:30,20\n26.04.14 00:00:00,21\n",
+       "time_s,T_degC\n0,20\n30,21\n", ""},
+      {"the day first", "Time,T [C]\n13.04.26 23:59:30,20\n14.04.26 00:00:00,21\n",
+       "time_s,T_degC\n0,20\n30,21\n", ""},
+      {"two clocks beside the date",
+       "Date;Time;Duration;T "
+       "[C]\n01.02.2026;08:00:00;00:01:10;20\n02.02.2026;13:00:00;00:01:11;21\n",
+       "time_s,T_degC\n0,20\n104400,21\n", ""},
+      {"seconds beside a date without them",
+       "Timestamp,Elapsed [s],T [C]\n2026-02-01 08:00,0,20\n2026-02-01 08:01,90,21\n",
+       "time_s,T_degC\n0,20\n90,21\n", ""},
+  });
+}
+
 TEST_CASE("TwinCAT's scope: groups of thousands are read, a scale is refused", "[import]") {
   const std::string head =
       "Name\tScope\nName\tBed\tName\tWay\nSampleTime[ms]\t500\tSampleTime[ms]\t500\n";
