@@ -44,6 +44,36 @@ double line_beside(const std::vector<double>& values, std::size_t row, std::size
   return median(levels);
 }
 
+std::pair<double, double> range_of_reading(const std::vector<double>& values_degC) {
+  constexpr double apart_K_min = 100.0;
+  constexpr double ranges_apart = 10.0;
+  constexpr std::size_t changing_min = 10;  // one of so many rows
+  std::vector<double> changing;
+  for (std::size_t row = 1; row < values_degC.size(); ++row)
+    if (std::abs(values_degC[row] - values_degC[row - 1]) > 0) changing.push_back(values_degC[row]);
+  const bool is_setpoint = changing.size() * changing_min < values_degC.size();
+  if (is_setpoint) {
+    changing = values_degC;
+    if (changing.size() > 4) changing = {values_degC.begin() + 2, values_degC.end() - 2};
+    std::erase_if(changing, [](double value) { return !std::isfinite(value); });
+  }
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  if (changing.empty()) return {-infinity, infinity};
+  std::sort(changing.begin(), changing.end());
+  std::size_t low = is_setpoint ? 0 : changing.size() / 2;
+  std::size_t high = is_setpoint ? changing.size() - 1 : low;
+  const auto joins = [&](double value_degC) {
+    const double range_K = changing[high] - changing[low];
+    return std::max(changing[low] - value_degC, value_degC - changing[high]) <=
+           std::max(apart_K_min, ranges_apart * range_K);
+  };
+  while (low > 0 && joins(changing[low - 1])) --low;
+  while (high + 1 < changing.size() && joins(changing[high + 1])) ++high;
+  while (low > 0 && joins(changing[low - 1])) --low;
+  const double beyond_K = std::max(apart_K_min, ranges_apart * (changing[high] - changing[low]));
+  return {changing[low] - beyond_K, changing[high] + beyond_K};
+}
+
 std::pair<StillRows, std::size_t> longest_still(const std::vector<double>& values) {
   StillRows longest;
   std::size_t second = 1;

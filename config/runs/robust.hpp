@@ -24,6 +24,12 @@ namespace thermocomp {
 [[nodiscard]] double line_beside(const std::vector<double>& values, std::size_t row,
                                  std::size_t side, bool after);
 
+/// Least and greatest value that a reading of temperature can have: at most 100 K, or ten times the
+/// range, beyond those of its rows that change and are not further apart. A channel whose sensor is
+/// open stays at one value. Of a setpoint, which changes in less than a tenth of the rows, beyond
+/// all but two rows at each end.
+[[nodiscard]] std::pair<double, double> range_of_reading(const std::vector<double>& values_degC);
+
 /// Rows [begin, end) of one value.
 struct StillRows {
   std::size_t begin{0};

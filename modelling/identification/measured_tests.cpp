@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "config/runs/model_inputs.hpp"
+#include "config/runs/robust.hpp"
 #include "config/text/printable_text.hpp"
 #include "config/text/units.hpp"
 #include "modelling/identification/printed.hpp"
@@ -45,8 +46,6 @@ bool in_all(const std::vector<RunFile>& runs, const std::string& column) {
 constexpr double spike_K_min = 10.0;
 constexpr double usual_steps = 30.0;
 constexpr std::size_t near = 5;
-constexpr double end_spike_K_min = 100.0;
-constexpr double ranges_beyond = 10.0;
 
 /// True if the value differs from the median of itself and its four neighbours by more than the
 /// limit.
@@ -57,19 +56,6 @@ bool is_spike(const std::vector<double>& values, std::size_t row, double limit_K
     return false;
   std::nth_element(five.begin(), five.begin() + 2, five.end());
   return std::abs(values[row] - five[2]) > limit_K;
-}
-
-/// At an end of the run a spike looks like a heater that was just switched on, and the first row is
-/// the reference of all rises. Only values far outside the reading's range are removed.
-bool is_end_spike(const std::vector<double>& values, std::size_t row) {
-  double least = std::numeric_limits<double>::infinity();
-  double most = -least;
-  for (std::size_t i = 2; i + 2 < values.size(); ++i) {
-    least = std::fmin(least, values[i]);
-    most = std::fmax(most, values[i]);
-  }
-  const double limit_K = std::max(end_spike_K_min, ranges_beyond * (most - least));
-  return values[row] < least - limit_K || values[row] > most + limit_K;
 }
 
 /// 10 K, or 30 times the reading's median step if that is more; NaN without steps.
@@ -84,23 +70,28 @@ double spike_limit_K(const std::vector<double>& values) {
   return std::max(spike_K_min, usual_steps * *middle);
 }
 
-/// Replaces spikes, which are faster than any structure, by NaN.
+/// Replaces by NaN spikes, which are faster than any structure, and values beyond the reading's
+/// range: of an open sensor, and at an end of the run, where the first row is the reference of all
+/// rises and a smaller spike looks like a heater that was just switched on.
 void leave_out_spikes(RunFile& run, std::vector<std::string>& notes) {
   for (std::size_t i = 0; i < run.columns.size() && run.rows() >= near; ++i) {
     if (!is_temperature(run.columns[i])) continue;
     const std::vector<double> read = run.values[i];
     const double limit_K = spike_limit_K(read);
+    const auto [least, most] = range_of_reading(read);
     std::size_t spikes = 0;
     for (std::size_t row = 0; row < read.size(); ++row) {
       const bool at_end = row < 2 || row + 2 >= read.size();
-      if (!(at_end ? is_end_spike(read, row) : is_spike(read, row, limit_K))) continue;
+      if (!(read[row] < least || read[row] > most || (!at_end && is_spike(read, row, limit_K))))
+        continue;
       run.values[i][row] = std::numeric_limits<double>::quiet_NaN();
       ++spikes;
     }
     if (spikes > 0)
       notes.push_back(run.name + ": " + run.columns[i] + ": " + std::to_string(spikes) +
                       (spikes == 1 ? " reading is" : " readings are") + " left out: more than " +
-                      number_text(limit_K) + " K from the neighbouring rows");
+                      number_text(limit_K) +
+                      " K from the neighbouring rows, or far from all others");
   }
 }
 
@@ -223,10 +214,11 @@ void leave_out_still_places(MeasuredTests& tests) {
     }
   }
   if (kept.size() == tests.places.size()) return;
-  for (TestRun& run : tests.runs) {
-    run.places_K = run.places_K(Eigen::all, kept).eval();
-    run.reference_degC = run.reference_degC(kept).eval();
-  }
+  for (std::vector<TestRun>* runs : {&tests.runs, &tests.between})
+    for (TestRun& run : *runs) {
+      run.places_K = run.places_K(Eigen::all, kept).eval();
+      run.reference_degC = run.reference_degC(kept).eval();
+    }
   tests.places = names;
 }
 
@@ -377,9 +369,13 @@ MeasuredTests measured_tests(const std::vector<RunFile>& given, const TestOption
     tests.constant.assign(constant, tests.signals.end());
     tests.signals.erase(constant, tests.signals.end());
   }
-  for (const RunFile& run : runs)
-    tests.runs.push_back(
-        make_run(run, tests.places, tests.outputs, tests.signals, options.between_probings));
+  for (const RunFile& run : runs) {
+    const auto of_run = [&](bool between_probings) {
+      return make_run(run, tests.places, tests.outputs, tests.signals, between_probings);
+    };
+    tests.runs.push_back(of_run(options.between_probings));
+    tests.between.push_back(of_run(true));
+  }
   find_unmoved(tests);
   leave_out_still_places(tests);
   if (tests.places.empty())

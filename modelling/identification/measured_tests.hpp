@@ -47,6 +47,7 @@ struct MeasuredTests {
   /// Those of `unmoved` that change gradually, like a charge: see fit_families().
   std::vector<std::string> gradual;
   std::vector<TestRun> runs;
+  std::vector<TestRun> between;  ///< `runs` with the rows between two probings; outputs NaN there
   std::vector<Fold> folds;
   HotHalf hot;
   std::vector<std::string> notes;  ///< what was left out and why

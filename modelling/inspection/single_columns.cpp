@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <span>
 
@@ -95,9 +96,33 @@ double least_step(const std::vector<double>& values, std::size_t changes_min) {
   return steps.size() < changes_min ? 0.0 : *std::min_element(steps.begin(), steps.end());
 }
 
+/// Sets values beyond the reading's range, as of an open sensor, to missing.
+void leave_out_impossible(std::vector<double>& values,
+                          const std::function<void(std::size_t, double)>& note) {
+  const auto [least, most] = range_of_reading(values);
+  const auto is_impossible = [least = least, most = most](double value) {
+    return value < least || value > most;
+  };
+  std::vector<double> possible = values;
+  std::erase_if(possible, is_impossible);
+  const double usual = median(std::move(possible));
+  for (std::size_t row = 0; row < values.size(); ++row) {
+    if (!is_impossible(values[row])) continue;
+    note(row, values[row] - usual);
+    values[row] = std::numeric_limits<double>::quiet_NaN();
+  }
+}
+
 void check_leaps(RunFile& run, std::size_t index, std::size_t column, Suspicions& found) {
   std::vector<double>& values = run.values[column];
   const bool output = is_output(run.columns[column]);
+  Suspicion made =
+      suspicion(output ? "outliers" : "spikes", run.columns[column], index, 0, 0, 0, 0);
+  const auto note = [&](std::size_t row, double leap) {
+    made.finding.times_s.push_back(run.time_s()[row]);
+    if (std::abs(leap) > std::abs(made.finding.size)) made.finding.size = leap;
+  };
+  if (!output) leave_out_impossible(values, note);
   std::vector<double> around(values.size());
   std::vector<double> leaps(values.size());
   std::vector<double> bends(values.size());
@@ -119,8 +144,6 @@ void check_leaps(RunFile& run, std::size_t index, std::size_t column, Suspicions
   const double least =
       std::max({leap_deviations_min * deviation, leap_steps_min * least_step(values, 3),
                 output ? leap_um_min : leap_K_min});
-  Suspicion made =
-      suspicion(output ? "outliers" : "spikes", run.columns[column], index, 0, 0, 0, 0);
   std::vector<std::size_t> leapt;
   for (std::size_t row = 1; row + 1 < values.size(); ++row) {
     const double leap = leaps[row];
@@ -128,12 +151,12 @@ void check_leaps(RunFile& run, std::size_t index, std::size_t column, Suspicions
         !(std::abs(leap) > leap_deviations_min * noise(leaps, bends, row, nearby)) ||
         others_leap(run, column, row, leap))
       continue;
-    made.finding.times_s.push_back(run.time_s()[row]);
-    if (std::abs(leap) > std::abs(made.finding.size)) made.finding.size = leap;
+    note(row, leap);
     leapt.push_back(row);
   }
   if (made.finding.times_s.empty()) return;
   for (const std::size_t row : leapt) values[row] = around[row];
+  std::sort(made.finding.times_s.begin(), made.finding.times_s.end());
   made.finding.at_s = made.finding.times_s.front();
   made.finding.until_s = made.finding.times_s.back();
   made.score = std::abs(made.finding.size) / std::max(least, 1e-12);

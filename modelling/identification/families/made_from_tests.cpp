@@ -50,10 +50,12 @@ Course course_of(const MeasuredTests& tests, const TestRun& run, const std::stri
 
 void fill_features(const MeasuredTests& tests, const MadeFrom& made_from, Feature& feature) {
   const std::size_t count = domain_features(made_from);
-  feature.rows.resize(tests.rows(), static_cast<Eigen::Index>(count));
+  Eigen::Index all = 0;
+  for (const TestRun& run : tests.between) all += run.time_s.size() - run.begin;
+  feature.rows.resize(all, static_cast<Eigen::Index>(count));
   feature.floor.resize(static_cast<Eigen::Index>(count));
   Eigen::Index begin = 0;
-  for (const TestRun& run : tests.runs) {
+  for (const TestRun& run : tests.between) {
     const Eigen::Index rows = run.time_s.size() - run.begin;
     Eigen::Index at = 0;
     for (const std::string& name : made_from.columns) {
@@ -84,7 +86,7 @@ void fill_ranges(const MeasuredTests& tests, MadeFrom& made_from) {
   for (const std::string& name : made_from.columns) {
     double low = std::numeric_limits<double>::infinity();
     double high = -low;
-    for (const TestRun& run : tests.runs) {
+    for (const TestRun& run : tests.between) {
       const Course course = course_of(tests, run, name);
       const auto selected = course.values.tail(run.time_s.size() - run.begin);
       low = std::min(low, selected.minCoeff() + course.reference);

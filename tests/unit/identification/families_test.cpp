@@ -216,6 +216,35 @@ TEST_CASE("three readings of 3276.7 degC are left out with a note", "[families]"
   CHECK(tests.runs[0].places_K.maxCoeff() < 50.0);
 }
 
+TEST_CASE("the domain contains the states between two probings", "[families]") {
+  RunFile run =
+      machine_run("probed", 3, [](double quick, double, double, double) { return 5.0 * quick; });
+  for (std::size_t row = 0; row < run.rows(); ++row)
+    if (row % 30 != 0) run.values[4][row] = std::nan("");
+  TestOptions options;
+  options.outputs = {"z_um"};
+  options.signals = true;
+  const FamiliesFit fit = fitted(measured_tests({run}, options));
+  const auto& [low, high] = std::minmax_element(run.values[1].begin(), run.values[1].end());
+  REQUIRE(fit.model.made_from->columns[0] == "t1_degC");
+  CHECK(fit.model.made_from->low[0] == Approx(*low));
+  CHECK(fit.model.made_from->high[0] == Approx(*high));
+}
+
+TEST_CASE("an open thermocouple is left out, and does not widen the domain", "[families]") {
+  const std::size_t last = GENERATE(150u, 360u);  // 360: to the end
+  RunFile run = machine_run("open", 3, [](double quick, double, double, double) { return quick; });
+  const std::size_t end = std::min(last, run.rows());
+  for (std::size_t row = 120; row < end; ++row) run.values[1][row] = 850.0;
+  TestOptions options;
+  options.outputs = {"z_um"};
+  const MeasuredTests tests = measured_tests({run}, options);
+  REQUIRE_FALSE(tests.notes.empty());
+  CHECK_THAT(tests.notes[0],
+             Catch::Contains("t1_degC: " + std::to_string(end - 120) + " readings"));
+  CHECK(tests.runs[0].places_K.maxCoeff() < 50.0);
+}
+
 TEST_CASE("a heater switched on after the first row is not a spike", "[families]") {
   RunFile run =
       machine_run("heater", 3, [](double quick, double, double, double) { return quick; });

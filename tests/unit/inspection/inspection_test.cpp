@@ -214,6 +214,26 @@ TEST_CASE("spikes are found one by one, and replaced", "[inspection]") {
         Approx(run.column("t2_degC")[299]).margin(0.3));
 }
 
+TEST_CASE("the values of an open thermocouple are spikes, however many, and no step",
+          "[inspection]") {
+  const std::size_t last = GENERATE(425U, rows);
+  RunFile run = recording();
+  std::fill_n(column(run, "t3_degC").begin() + 300, last - 300, 850.0);
+  const Inspection inspection = inspect({run});
+  INFO(inspection_text(inspection));
+  REQUIRE(find(inspection, "spikes") != nullptr);
+  CHECK(find(inspection, "spikes")->times_s.size() == last - 300);
+  CHECK(find(inspection, "sensor_step") == nullptr);
+  const double left = cleaned({run}, inspection).runs.front().column("t3_degC")[350];
+  CHECK(std::isnan(left));
+  // A setpoint has levels.
+  run = recording();
+  std::vector<double>& target = column(run, "t3_degC");
+  std::fill(target.begin(), target.end(), 20.0);
+  std::fill_n(target.begin() + 300, 50, 250.0);
+  CHECK(find(inspect({run}), "spikes") == nullptr);
+}
+
 TEST_CASE("a value during a jump, or in a noisy stretch, is not a spike", "[inspection]") {
   RunFile run = recording();
   std::mt19937 random(5);
