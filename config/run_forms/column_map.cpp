@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "config/run_forms/spelled_unit.hpp"
-#include "config/run_forms/text_table.hpp"
 #include "config/text/units.hpp"
 #include "config/toml/toml_reader.hpp"
 
@@ -28,6 +27,15 @@ void read_column(const TomlTable& table, const std::string& key, ColumnMap& map)
 }
 
 }  // namespace
+
+std::string unnamed(std::size_t column) {
+  return "column " + std::to_string(column + 1);
+}
+
+bool is_unnamed(std::string_view header) {
+  return header.starts_with("column ") &&
+         header.find_first_not_of("0123456789", 7) == std::string_view::npos;
+}
 
 bool ColumnMap::ignores(std::string_view header) const {
   const auto has = [&](std::string_view name) {

@@ -43,6 +43,10 @@ struct ColumnMap {
   [[nodiscard]] bool uses(std::string_view header) const;
 };
 
+/// "column 3": name of a column without one.
+[[nodiscard]] std::string unnamed(std::size_t column);
+[[nodiscard]] bool is_unnamed(std::string_view header);
+
 /// @throws ConfigurationError with every problem of the file
 [[nodiscard]] ColumnMap load_column_map(const std::filesystem::path& path);
 /// @param name  file name in problems

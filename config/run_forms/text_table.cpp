@@ -334,13 +334,4 @@ std::string separator_name(char separator) {
   return separator == '\t' ? "tab" : separator == ' ' ? "blank" : std::string(1, separator);
 }
 
-std::string unnamed(std::size_t column) {
-  return "column " + std::to_string(column + 1);
-}
-
-bool is_unnamed(std::string_view header) {
-  return header.starts_with("column ") &&
-         header.find_first_not_of("0123456789", 7) == std::string_view::npos;
-}
-
 }  // namespace thermocomp

@@ -43,8 +43,4 @@ struct TextTable {
 /// Name of a separator in a ColumnMap's file: "tab" or the character.
 [[nodiscard]] std::string separator_name(char separator);
 
-/// "column 3": name of a column without one.
-[[nodiscard]] std::string unnamed(std::size_t column);
-[[nodiscard]] bool is_unnamed(std::string_view header);
-
 }  // namespace thermocomp
