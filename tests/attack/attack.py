@@ -23,6 +23,10 @@ import threading
 import time
 import traceback
 
+# Servers, client of the status socket and service manager are those of the daemon's tests.
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / "integration" / "daemon"))
+
+# ruff: noqa: E402
 import attacks_daemon  # noqa: F401
 import attacks_link  # noqa: F401
 import attacks_read_back  # noqa: F401

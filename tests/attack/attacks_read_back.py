@@ -315,7 +315,7 @@ def controller_restarts(rig):
 def applied_cannot_be_read(rig):
     """Without a read-back nothing may be sent."""
     registers = rig.machine.controller.registers
-    registers.refused = lambda function, *_: 2 if function == 4 else 0
+    registers.refusal = lambda function, *_: 2 if function == 4 else 0
     if not rig.must(rig.daemon.start(), "the daemon does not start"):
         return
     rig.must(eventually(lambda: None not in rig.daemon.references()), "no reference is taken")
@@ -324,6 +324,6 @@ def applied_cannot_be_read(rig):
     rig.must(not rig.axis.writes, "driven without ever having been read")
     rig.must(rig.daemon.status()["mode"] != "compensating" or not rig.daemon.axis()["driven"],
              "reports that it compensates")
-    registers.refused = lambda function, *_: 0
+    registers.refusal = lambda function, *_: 0
     rig.daemon.wait_for("compensating")
     rig.follows_again()

@@ -4,7 +4,7 @@ import math
 import struct
 import time
 
-import watch
+from lab import Refused
 from process import eventually
 from registry import attack
 
@@ -78,7 +78,7 @@ def measured_without_end(rig):
         try:
             rig.daemon.call("measured", axis="z", value_um=value_um)
             rig.broke(f"measured z {value_um:g} is taken")
-        except (watch.Refused, OSError, ValueError):
+        except (Refused, OSError, ValueError):
             pass
         axis = rig.daemon.axis()
         if not rig.must(axis.get("target") is not None and axis.get("displacement") is not None,

@@ -8,9 +8,8 @@ import signal
 import subprocess
 import time
 
-import watch
+from lab import PATIENCE_S, Refused, call
 
-PATIENCE_S = float(os.environ.get("THERMOCOMP_PATIENCE_S", "30"))
 WATCHDOG_S = 5.0  # WatchdogSec of thermocompd.service
 
 
@@ -77,11 +76,11 @@ class Daemon:
         return self.process is not None and self.process.poll() is None
 
     def call(self, method, **params):
-        return watch.call(self.socket, method, **params)
+        return call(self.socket, method, **params)
 
     def status(self):
         """Status; empty if the daemon does not answer."""
-        with contextlib.suppress(OSError, ValueError, watch.Refused):
+        with contextlib.suppress(OSError, ValueError, Refused):
             return self.call("status")
         return {"mode": "", "reasons": [], "axes": [{"driven": False}], "enabled": None,
                 "inputs": [], "warnings": []}
@@ -100,7 +99,7 @@ class Daemon:
             params["force"] = True
         try:
             done = self.call(method, **params).get("done", False)
-        except (OSError, ValueError, watch.Refused):
+        except (OSError, ValueError, Refused):
             return False
         if done and method in ("enable", "disable"):
             self.rig.told_enabled = method == "enable"

@@ -18,8 +18,10 @@ import time
 import zlib
 
 import watch
+from lab import PATIENCE_S, Refused
 from machine import RESOLUTION_UM, Machine
-from process import PATIENCE_S, WATCHDOG_S, Daemon, eventually
+from process import WATCHDOG_S, Daemon, eventually
+from service_manager import Metronome, ServiceManager
 
 ANSWER_S = 2.0
 INVARIANTS = re.findall(r'\{"(\w+)",',
@@ -41,8 +43,8 @@ class Rig:
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="tca"))
         self.machine = Machine(self.folder, link, **choices)
         self.axis = self.machine.axis
-        self.metronome = watch.Metronome()
-        self.manager = watch.ServiceManager(self.folder / "notify")
+        self.metronome = Metronome()
+        self.manager = ServiceManager(self.folder / "notify")
         self.daemons = []
         self.client = None
         self.broken = []
@@ -162,7 +164,7 @@ class Rig:
                          "does not follow after the attack")
 
     def release(self):
-        with contextlib.suppress(OSError, ValueError, watch.Refused):
+        with contextlib.suppress(OSError, ValueError, Refused):
             self.daemon.call("release", axis="z")
 
     # ---- the verdict
@@ -197,9 +199,10 @@ class Rig:
     def longest_unfed_s(self):
         longest = 0.0
         for daemon in self.daemons[:1]:
+            fed_at_s = self.manager.times_of("WATCHDOG=1")
             for since, until in daemon.running:
                 until = until or time.monotonic()
-                fed = [since, *(at for at in self.manager.fed_at_s if since < at < until), until]
+                fed = [since, *(at for at in fed_at_s if since < at < until), until]
                 for earlier, later in zip(fed, fed[1:]):
                     late = self.metronome.lateness_s(earlier, later)
                     longest = max(longest, later - earlier - late)

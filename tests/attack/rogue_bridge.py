@@ -5,7 +5,7 @@ import math
 import threading
 import time
 
-import watch
+from lab import connect, request
 
 
 class RogueBridge:
@@ -50,7 +50,7 @@ class RogueBridge:
     def run(self):
         while not self.ending.wait(self.period_s):
             try:
-                with watch.connect(self.path, 10.0) as link, link.makefile("rb") as lines:
+                with connect(self.path, 10.0) as link, link.makefile("rb") as lines:
                     while not self.ending.wait(self.period_s):
                         if not self.silent:
                             self.exchange(link, lines)
@@ -64,7 +64,7 @@ class RogueBridge:
                 "signals": {}}
 
     def exchange(self, link, lines):
-        link.sendall(watch.request("controller_state", **(self.raw or self.params)()) + b"\n")
+        link.sendall(request("controller_state", **(self.raw or self.params)()) + b"\n")
         line = lines.readline()
         if not line:
             raise OSError("the daemon has closed the connection")

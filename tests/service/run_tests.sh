@@ -32,7 +32,7 @@ chmod 755 "$files"  # the service must read the planted hang
 mkdir "$files/packages" "$files/guest"
 cp "$folder"/packages/*.deb "$files/packages/"
 rm -f "$files"/packages/*-dbgsym_*
-cp "$here"/guest/*.py "$here"/../integration/daemon/{lab,plain_devices}.py "$files/guest/"
+cp "$here"/guest/*.py "$here"/../integration/daemon/{lab,modbus_server,plain_devices}.py "$files/guest/"
 cp "$here/../../systemd/site.conf" "$files/"
 cp "$planted_hang" "$files/planted_hang.so"
 "$here/run_in_systemd.sh" "$kind" "$folder/rootfs" "$files" \

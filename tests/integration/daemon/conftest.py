@@ -1,6 +1,7 @@
 import pytest
 
 from lab import Lab
+from plain_devices import Machine
 
 
 @pytest.fixture
@@ -10,3 +11,9 @@ def lab(tmp_path):
         yield opened
     finally:
         opened.end()
+
+
+@pytest.fixture
+def machine(lab):
+    """With a daemon that is not yet started."""
+    return Machine(lab)

@@ -81,12 +81,12 @@ class WatchedController(PlainController):
         self.read_log = []
         super().start()
 
-    def answer(self, pdu):
+    def answer(self, pdu, unit=1):
         if pdu[0] in self.asked_by:
             self.read_log.append(time.monotonic())
         if self.silent and pdu[0] == 3:
             return bytes([0x83, 2])
-        return super().answer(pdu)
+        return super().answer(pdu, unit)
 
 
 class KillRounds:

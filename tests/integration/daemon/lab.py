@@ -42,6 +42,35 @@ class Refused(Exception):
     """The daemon's answer was an error."""
 
 
+def connect(path, timeout_s=PATIENCE_S):
+    link = socket.socket(socket.AF_UNIX)
+    link.settimeout(timeout_s)
+    try:
+        link.connect(str(path))
+    except OSError:
+        link.close()
+        raise
+    return link
+
+
+def request(method, **params):
+    return json.dumps({"jsonrpc": "2.0", "id": 1, "method": method, "params": params}).encode()
+
+
+def call(path, method, timeout_s=PATIENCE_S, **params):
+    """Result of a call on its own connection. Raises OSError, Refused, ValueError (no JSON)."""
+    with connect(path, timeout_s) as link:
+        link.sendall(request(method, **params) + b"\n")
+        with link.makefile("rb") as lines:
+            line = lines.readline()
+    if not line:
+        raise ConnectionResetError("no answer")
+    answer = json.loads(line)
+    if "error" in answer:
+        raise Refused(answer["error"]["message"])
+    return answer["result"]
+
+
 class Daemon:
     def __init__(self, folder, sockets, config, name="thermocompd"):
         self.folder = folder
@@ -85,16 +114,7 @@ class Daemon:
         return False
 
     def call(self, method, **params):
-        with socket.socket(socket.AF_UNIX) as link:
-            link.settimeout(PATIENCE_S)
-            link.connect(str(self.socket))
-            request = {"jsonrpc": "2.0", "id": 1, "method": method, "params": params}
-            link.sendall(json.dumps(request).encode() + b"\n")
-            with link.makefile("r") as lines:
-                answer = json.loads(lines.readline())
-        if "error" in answer:
-            raise Refused(answer["error"]["message"])
-        return answer["result"]
+        return call(self.socket, method, **params)
 
     def status(self):
         return self.call("status")

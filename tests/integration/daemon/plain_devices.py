@@ -1,86 +1,34 @@
 """A thermocouple module and a controller on Modbus TCP, set by a test at any time, that record
 every write. Intentionally small and independent of the simulator."""
 
-import socket
 import struct
-import threading
 import time
 
+from modbus_server import Registers, TcpSlave
 
-class PlainDevice:
+
+class PlainDevice(Registers, TcpSlave):
     """Tables of one Modbus TCP device. Restarts keep the port; registers are then 0."""
 
     def __init__(self, port):
-        self.port = port
+        Registers.__init__(self)
         self.refused = set()  # functions answered with exception 1
-        self.lock = threading.Lock()
-        self.server = None
-        self.start()
+        self.refusal = lambda function, _address, _count: int(function in self.refused)
+        self.after_write = self.written
+        TcpSlave.__init__(self, self, "device", port)
 
     def start(self):
-        with self.lock:
-            self.tables = {1: {}, 2: {}, 3: {}, 4: {}}
-        self.links = []
-        self.server = socket.create_server(("127.0.0.1", self.port))
-        self.threads = [threading.Thread(target=self.accept, args=(self.server,))]
-        self.threads[0].start()
+        self.clear()
+        super().start()
 
     def stop(self):
         """Like a switched-off device: connections are closed, new ones refused."""
-        server, self.server = self.server, None
-        if server is None:
-            return
-        server.shutdown(socket.SHUT_RDWR)
-        server.close()
-        for link in list(self.links):
-            try:
-                link.shutdown(socket.SHUT_RDWR)
-            except OSError:
-                pass
-        for thread in self.threads:
+        super().stop()
+        threads, self.threads = self.threads, []
+        for thread in threads:
             thread.join(20)
 
     close = stop
-
-    def accept(self, server):
-        while True:
-            try:
-                link, _ = server.accept()
-            except OSError:
-                return
-            self.links.append(link)
-            self.threads.append(threading.Thread(target=self.serve, args=(link,)))
-            self.threads[-1].start()
-
-    def serve(self, link):
-        with link, link.makefile("rb") as stream:
-            try:
-                while len(head := stream.read(7)) == 7:
-                    transaction, _, length, unit = struct.unpack(">HHHB", head)
-                    answer = self.answer(stream.read(length - 1))
-                    link.sendall(struct.pack(">HHHB", transaction, 0, len(answer) + 1, unit) +
-                                 answer)
-            except OSError:
-                pass
-
-    def answer(self, pdu):
-        function, address, count = struct.unpack(">BHH", pdu[:5])
-        with self.lock:
-            if function in self.refused:
-                return bytes([function | 0x80, 1])
-            if function in (3, 4):
-                words = [self.tables[function].get(address + i, 0) for i in range(count)]
-                return struct.pack(f">BB{count}H", function, 2 * count, *words)
-            if function in (1, 2):
-                bits = sum(self.tables[function].get(address + i, 0) << i for i in range(count))
-                size = (count + 7) // 8
-                return struct.pack(">BB", function, size) + bits.to_bytes(size, "little")
-            if function == 16:
-                for i, word in enumerate(struct.unpack(f">{count}H", pdu[6:])):
-                    self.tables[3][address + i] = word
-                self.written()
-                return pdu[:5]
-        return bytes([function | 0x80, 1])
 
     def written(self):
         pass
@@ -264,24 +212,10 @@ class PlainAmplifier(PlainController):
     def start(self):
         self.volts = []  # without repetitions
         self.bent_V = 0.0  # voltage followed by the ceramic
-        self.obeys = True
         super().start()
 
     def written(self):
-        if self.obeys:
-            self.follow(0.01 * self.tables[3].get(0, 0))
-
-    def give(self, voltage):
-        """Keeps this voltage, whatever is written, until obey()."""
-        with self.lock:
-            self.obeys = False
-            self.follow(voltage)
-
-    def obey(self):
-        with self.lock:
-            self.obeys = True
-
-    def follow(self, voltage):
+        voltage = 0.01 * self.tables[3].get(0, 0)
         self.tables[4][10] = round(100 * voltage)
         if not self.volts or self.volts[-1] != voltage:
             self.volts.append(voltage)

@@ -4,7 +4,7 @@ import statistics
 import threading
 import time
 
-from lab import Refused, assert_replays_exactly
+from lab import Refused, assert_replays_exactly, eventually
 from plain_devices import MODEL, Machine
 from service_manager import WATCHDOG_S, ServiceManager, largest_gap_s
 
@@ -84,6 +84,8 @@ class ReloadRounds:
             for client in clients:
                 client.join()
         self.gap_s = largest_gap_s(self.manager.times_of("WATCHDOG=1"), begin, time.monotonic())
+        eventually(lambda: len(self.manager.times_of("READY=1")) ==
+                   1 + len(self.manager.times_of("RELOADING=1")), "each reload ends for systemd")
         enabled = self.daemon.status()["enabled"]
         self.daemon.kill()
         self.daemon.start()

@@ -1,5 +1,6 @@
 """Receives notifications in place of systemd and records them with their times."""
 
+import bisect
 import socket
 import threading
 import time
@@ -11,6 +12,8 @@ class ServiceManager:
     """Like systemd with WatchdogSec=6, for a daemon started with `environment`."""
 
     def __init__(self, path):
+        self.path = path
+        self.ready = threading.Event()
         self.environment = {"NOTIFY_SOCKET": str(path),
                             "WATCHDOG_USEC": str(round(1e6 * WATCHDOG_S))}
         self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
@@ -29,10 +32,12 @@ class ServiceManager:
                 return
             with self.lock:
                 self.messages.append((time.monotonic(), text))
+            if "READY=1" in text:
+                self.ready.set()
 
     def times_of(self, word):
         with self.lock:
-            return [at for at, text in self.messages if text.startswith(word)]
+            return [at for at, text in self.messages if word in text]
 
     def close(self):
         self.socket.shutdown(socket.SHUT_RDWR)
@@ -40,27 +45,41 @@ class ServiceManager:
 
 
 class Metronome:
-    """Latency of this computer, from a thread that wakes every 20 ms."""
+    """Wakes every few milliseconds and records its delays: the machine's latency, which is deducted
+    from the daemon's."""
 
-    PERIOD_S = 0.02
+    PERIOD_S = 0.005
+    NOTED_FROM_S = 0.002
 
     def __init__(self):
-        self.beats = [time.monotonic()]
-        self.running = True
-        threading.Thread(target=self.beat, daemon=True).start()
+        self.at_s = []
+        self.late_s = []
+        self.ending = threading.Event()
+        self.thread = threading.Thread(target=self.run, daemon=True)
+        self.thread.start()
 
-    def beat(self):
-        while self.running:
-            time.sleep(self.PERIOD_S)
-            self.beats.append(time.monotonic())
+    def run(self):
+        due = time.monotonic() + self.PERIOD_S
+        while not self.ending.is_set():
+            time.sleep(max(0.0, due - time.monotonic()))
+            now = time.monotonic()
+            if now - due > self.NOTED_FROM_S:
+                self.at_s.append(now)
+                self.late_s.append(now - due)
+            due = max(due + self.PERIOD_S, now)
 
-    def latest_s(self, begin, end):
-        beats = [at for at in list(self.beats) if begin - 1.0 < at < end]
-        return max((later - earlier - self.PERIOD_S for earlier, later in zip(beats, beats[1:])),
-                   default=0.0)
+    def lateness_s(self, since_s, until_s):
+        first = bisect.bisect_left(self.at_s, since_s)
+        late = 0.0
+        for at, lateness in zip(self.at_s[first:], self.late_s[first:]):
+            if at - lateness > until_s:
+                break
+            late = max(late, lateness)
+        return late
 
     def close(self):
-        self.running = False
+        self.ending.set()
+        self.thread.join(5)
 
 
 def largest_gap_s(times, begin, end):

@@ -49,10 +49,10 @@ def noting(kind):
             self.functions = getattr(self, "functions", [])  # kept over a restart
             super().start()
 
-        def answer(self, pdu):
+        def answer(self, pdu, unit=1):
             with self.lock:
                 self.functions.append(pdu[0])
-            return super().answer(pdu)
+            return super().answer(pdu, unit)
 
         def asked(self):
             with self.lock:

@@ -18,3 +18,4 @@ def test_reloads_with_clients_complete(lab, rate_hz):
     rounds.print_figures()
     assert rounds.wrong == []
     assert rounds.gap_s < 0.75 * WATCHDOG_S
+    assert max(rounds.answers_s) < 1.5

@@ -12,11 +12,6 @@ from plain_devices import Machine
 
 
 @pytest.fixture
-def machine(lab):
-    return Machine(lab)
-
-
-@pytest.fixture
 def other(lab, tmp_path_factory):
     """A second machine that shares only its name with the first."""
     from lab import Lab

@@ -21,7 +21,7 @@ ANSWERS_AGAIN_S = 0.02
 
 class Registers:
     """The tables of one unit. `before_read(function, address, count)` runs before a read is
-    answered, `after_write()` after a write, both with the lock held; `refused(...)` returns an
+    answered, `after_write()` after a write, both with the lock held; `refusal(...)` returns an
     exception code or 0."""
 
     def __init__(self):
@@ -29,7 +29,7 @@ class Registers:
         self.tables = {1: {}, 2: {}, 3: {}, 4: {}}
         self.before_read = lambda function, address, count: None
         self.after_write = lambda: None
-        self.refused = lambda function, address, count: 0
+        self.refusal = lambda function, address, count: 0
         self.writer = 1  # unit number of the current request
 
     def clear(self):
@@ -53,7 +53,7 @@ class Registers:
         function, address, count = struct.unpack(">BHH", pdu[:5])
         with self.lock:
             self.writer = unit
-            if code := self.refused(function, address, count):
+            if code := self.refusal(function, address, count):
                 return bytes([function | 0x80, code])
             if function in READ_WORDS:
                 self.before_read(function, address, count)
@@ -116,13 +116,14 @@ class TcpSlave:
     """One unit on 127.0.0.1. `spoil(frame_of, request, answer)` returns the bytes and Holds sent
     instead of `answer`; frame_of(pdu, transaction=None) builds other frames."""
 
-    def __init__(self, registers, name):
+    def __init__(self, registers, name, port=0):
         self.registers = registers
         self.name = name
         self.spoil = as_it_is
         self.greet = lambda link: None
-        self.port = 0
+        self.port = port
         self.links = []
+        self.threads = []
         self.server = None
         self.start()
 
@@ -132,7 +133,11 @@ class TcpSlave:
     def start(self):
         self.server = socket.create_server(("127.0.0.1", self.port), reuse_port=False)
         self.port = self.server.getsockname()[1]
-        threading.Thread(target=self.accept, args=(self.server,), daemon=True).start()
+        self.start_thread(self.accept, self.server)
+
+    def start_thread(self, body, argument):
+        self.threads.append(threading.Thread(target=body, args=(argument,), daemon=True))
+        self.threads[-1].start()
 
     def stop(self):
         """Like a device that is switched off."""
@@ -159,7 +164,7 @@ class TcpSlave:
                 return
             link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             self.links.append(link)
-            threading.Thread(target=self.serve, args=(link,), daemon=True).start()
+            self.start_thread(self.serve, link)
 
     def serve(self, link):
         with link, contextlib.suppress(OSError), link.makefile("rb") as stream:
