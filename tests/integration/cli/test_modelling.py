@@ -172,16 +172,6 @@ def test_probings_that_missed_are_left_out_by_diagnose_with_a_line(tmp_path):
     assert result["baseline"]["z_um"]["test_rms_um"] < 1.0, result["baseline"]
 
 
-def test_a_single_run_is_reported_as_its_own_test_and_repeated_rows_are_refused(tmp_path):
-    files = write_tests(tmp_path, 1)
-    model = tmp_path / "model.toml"
-    answer = run("fit", files[0], "--outputs", "z_um", "-o", model)
-    assert answer.returncode == 0, answer.stderr
-    assert "judged within one run: the error on other days is unknown" in answer.stdout
-    answer = run("fit", files[0], f"{files[0]}@0:6000", "--outputs", "z_um", "-o", model)
-    assert answer.returncode == 2 and "given twice" in answer.stderr
-
-
 def test_tiebar_gives_both_coefficients(tmp_path):
     answer = run("tiebar", EXAMPLES / "gate_machine.toml", "--json", "--ratio", "0.2",
                  "--curves", tmp_path / "curves.svg")

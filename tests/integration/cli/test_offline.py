@@ -76,21 +76,6 @@ def test_the_function_block_has_the_registers_that_the_command_prints():
     assert "frame 0x200" in run("check", "--registers", EXAMPLES / "can.toml").stdout
 
 
-def test_check_names_every_problem_with_file_line_key_value_and_rule(tmp_path):
-    text = (EXAMPLES / "small_machine.toml").read_text()
-    text = text.replace("rate_hz = 100 ", "rate_hz = 99999 ").replace("data_bits", "data_bitz")
-    (tmp_path / "broken.toml").write_text(text)
-    (tmp_path / "small_machine_model.toml").write_text(
-        (EXAMPLES / "small_machine_model.toml").read_text())
-    answer = run("check", "broken.toml", cwd=tmp_path)
-    assert answer.returncode == 2
-    lines = answer.stderr.splitlines()
-    assert any(line.startswith("broken.toml:") and "rate_hz" in line and "99999" in line
-               for line in lines)
-    assert any("data_bitz" in line for line in lines)
-    assert lines[-1].endswith("problems")
-
-
 def test_predict_writes_predicted_measured_and_residual(files):
     answer = predict(files)
     assert answer.returncode == 0, answer.stderr

@@ -85,13 +85,6 @@ def test_nothing_moves_before_an_operator_enables_it_and_the_switch_survives(day
     daemon.start().wait_for_mode("disabled")
 
 
-def test_the_key_makes_a_first_start_compensate_at_once(day):
-    day.show("0:1")
-    daemon = day.daemon("enabled_at_first_start = true\n")
-    assert "COMPENSATES AT ONCE" in run_tool("check", daemon.config)[1]
-    daemon.start().wait_for_mode("compensating")
-
-
 def reference(daemon):
     """Without what speaks against another one."""
     return {key: value for key, value in daemon.status()["reference"].items() if key != "objections"}

@@ -80,16 +80,6 @@ def test_after_a_restart_the_estimate_continues_until_it_is_too_uncertain(machin
     assert daemon.axis()["offset"] == held
 
 
-def test_configured_not_to_estimate_it_holds(machine):
-    machine.daemon.write_config(machine.config.replace(
-        "[compensation]\n", "[compensation]\nestimate_lost_blocks = false\n"))
-    daemon = machine.start()
-    machine.module.show(20.0, BROKEN_degC)
-    daemon.wait_for_mode("holding")
-    assert daemon.status()["reasons"] == ["block_lost"]
-    assert not daemon.status()["inputs"][1]["estimated"]
-
-
 def test_the_covariance_of_a_history_is_put_into_the_model_file(machine, lab):
     machine.model.write_text("# mine\n" + MODEL)
     daemon = machine.start()

@@ -7,7 +7,7 @@ import time
 import pytest
 
 from lab import assert_replays_exactly, eventually, run_tool
-from plain_devices import Machine, assert_slewed
+from plain_devices import assert_slewed
 
 STEP_UM = 2.5
 CORRECTION = f"""
@@ -30,11 +30,6 @@ address = 1
 def with_config(machine, edit):
     machine.daemon.write_config(edit(machine.config))
     return machine
-
-
-@pytest.fixture
-def machine(lab):
-    return Machine(lab)
 
 
 def gain(daemon):
@@ -77,18 +72,6 @@ def test_a_probing_moves_the_estimate_by_a_bounded_step_and_is_replayed(machine,
                      if not line.startswith("#")]
     column = header.split(",").index("z_measured_um")
     assert any(row.split(",")[column] not in ("", "nan") for row in rows)
-
-
-def test_without_a_correction_a_probing_is_only_noted(machine):
-    daemon = machine.start()
-    machine.warm_by(6.0)
-    daemon.wait_for_offset(6.0, 0.05)
-    assert daemon.cli("measured", "z", "3.0")[0] == 0
-    eventually(lambda: daemon.axis()["measured"] == 3.0, "the probing is noted")
-    time.sleep(0.5)
-    assert abs(daemon.axis()["offset"] - 6.0) < 0.05
-    assert "correction" not in daemon.axis()
-    assert "probe_due" not in daemon.status()  # the model claims no error
 
 
 def test_a_candidate_is_scored_promoted_and_taken_back(machine, lab):
@@ -195,56 +178,3 @@ def test_by_cycles_the_offset_changes_at_their_ends_only(machine, lab):
     assert abs(daemon.axis()["offset"] - 15.0) < 0.05
     daemon.end()
     assert_replays_exactly(daemon.history, lab.folder / "out.csv")
-
-
-def polled(machine):
-    """Waits for the daemon's next read of the controller."""
-    def beats():
-        with machine.controller.lock:
-            return machine.controller.tables[3].get(3)
-
-    for _ in range(2):
-        before = beats()
-        eventually(lambda: beats() != before, "the heartbeat goes on")
-
-
-def test_a_coil_and_a_counter_end_cycles_and_only_every_third_moves_the_offset(machine):
-    def by_thirds(text, place):
-        signal = f'[[controller.signal]]\n{place}\n'
-        text = text.replace("[[axis]]", signal + "[[axis]]")
-        name = place.split('"')[1]
-        return text.replace("[compensation]", '[compensation]\nupdate = "each_cycle"\n'
-                            f'cycles_per_update = 3\ncycle_end_signal = "{name}"')
-
-    coil = 'name = "cycle_end_on"\ntable = "coil"\naddress = 5'
-    counter = 'name = "cycles"\ntable = "holding"\naddress = 40\nencoding = "uint16"'
-    plain = machine.config
-
-    def set_register(table, address, value):
-        with machine.controller.lock:
-            machine.controller.tables[table][address] = value
-
-    def end_by_coil(_):
-        set_register(1, 5, 1)
-
-    def end_by_counter(number):
-        set_register(3, 40, 7 + number)
-
-    offset_um = 0.0
-    for place, end_cycle in ((coil, end_by_coil), (counter, end_by_counter)):
-        with_config(machine, lambda _: by_thirds(plain, place))
-        set_register(3, 40, 7)
-        daemon = machine.start()
-        polled(machine)
-        offset_um += 6.0
-        machine.warm_by(offset_um)
-        eventually(lambda: abs(daemon.axis()["displacement"] + offset_um) < 0.05,
-                   "the model sees it")
-        for number in (1, 2, 3):
-            assert abs(daemon.axis()["offset"] - offset_um + 6.0) < 0.05
-            end_cycle(number)
-            eventually(lambda: daemon.status()["cycle_ends"] == number, f"cycle end {number}")
-            set_register(1, 5, 0)
-            polled(machine)
-        daemon.wait_for_offset(offset_um, 0.05)
-        daemon.end()

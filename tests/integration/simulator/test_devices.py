@@ -337,30 +337,6 @@ def test_a_controller_that_was_off_has_forgotten_its_offset(simulate):
     assert applied(link) == 700
 
 
-def test_junk_and_vanishing_clients_do_not_disturb_others(simulate):
-    simulator = simulate(MACHINE)
-    good = simulator.connect("cabinet")
-    chance = random.Random(7)
-    for _ in range(300):
-        junk = simulator.connect("cabinet")
-        data = chance.randbytes(chance.randrange(1, 400))
-        if chance.random() < 0.7:  # beyond the header
-            data = request(chance.randrange(256), data[:250])
-        junk.sendall(data)
-        junk.close()
-    with open(simulator.folder / "line", "wb", buffering=0) as line:
-        for _ in range(50):
-            line.write(chance.randbytes(chance.randrange(1, 60)))
-    assert room_of(good) == 2125
-
-    def serial_line_works():
-        values, _ = mbpoll("-t", 3, *rtu_options(simulator, 8))
-        return values == {0: "213"}
-
-    eventually(serial_line_works, "the serial line recovered from junk")
-    assert simulator.alive()
-
-
 def test_many_clients_at_once_are_answered(simulate):
     simulator = simulate(MACHINE)
     links = [simulator.connect("cabinet") for _ in range(100)]

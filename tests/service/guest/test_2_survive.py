@@ -61,19 +61,6 @@ def test_a_restart_is_bumpless(running):
     assert stayed_at(running.orders_since(orders), 9.0)
 
 
-def test_a_restart_during_a_move_continues_from_the_present_offset(running):
-    orders = running.count()
-    running.warm_by(24.0)
-    for stop_um in (13.0, 18.0):
-        eventually(lambda: running.controller.applied_um() > stop_um, f"{stop_um} um")
-        run("systemctl", "restart", UNIT)
-    running.settled_at(24.0)
-    service.assert_slewed(running.orders_since(orders))
-    print(f"largest step {service.largest_step_um(running.orders_since(orders)):.3f} um, "
-          f"slew {service.SLEW_UM_PER_S} um/s, an order each {service.ORDER_PERIOD_S} s")
-    running.settled_at(9.0)
-
-
 def test_kill_9_leaves_the_operators_switch_as_it_was(running):
     run("thermocomp", "disable")
     os.kill(service.main_pid(), signal.SIGKILL)

@@ -24,8 +24,7 @@ SILENT_AFTER_S = 0.5
 # Limit of docs/operating.md. Not asserted, since a shared machine may stall for longer.
 RECOVERED_WITHIN_S = 2.0
 ENOUGH_FRAMES = 50
-BUS_OFF, CONTROLLER_PROBLEM, RESTARTED = 0x40, 0x04, 0x100
-PASSIVE_BITS, WARNING_BITS, ACTIVE_BITS = 0x20, 0x08, 0x40
+BUS_OFF, RESTARTED = 0x40, 0x100
 
 MODEL = """
 format = 1
@@ -118,10 +117,9 @@ def write_frame(interface, identifier, data=bytes(8)):
         bus.send(struct.pack("=IB3x8s", identifier, len(data), data))
 
 
-def write_error_frame(interface, error_class, controller_bits=0):
-    """Like the driver of a CAN controller: class in the identifier, detail in the data."""
-    write_frame(interface, socket.CAN_ERR_FLAG | error_class,
-                bytes([0, controller_bits, 0, 0, 0, 0, 0, 0]))
+def write_error_frame(interface, error_class):
+    """Like the driver of a CAN controller: the class is in the identifier."""
+    write_frame(interface, socket.CAN_ERR_FLAG | error_class)
 
 
 @dataclasses.dataclass

@@ -34,21 +34,6 @@ def rig(tmp_path_factory):
         lab.end()
 
 
-def test_error_passive_is_reported_and_changes_nothing(rig):
-    for bus, interface in INTERFACES.items():
-        write_error_frame(interface, rigs.CONTROLLER_PROBLEM, rigs.PASSIVE_BITS)
-        eventually(lambda: rig.bus(bus)["state"] == "passive", "the state is reported")
-        assert rig.bus(bus)["connected"]
-        assert rig.daemon.status()["mode"] == "compensating"
-        assert f"bus {bus}: error passive for " in rig.daemon.cli("status")[1]
-        write_error_frame(interface, rigs.CONTROLLER_PROBLEM, rigs.WARNING_BITS)
-        eventually(lambda: rig.bus(bus)["state"] == "warning", "the state is reported")
-        write_error_frame(interface, rigs.CONTROLLER_PROBLEM, rigs.ACTIVE_BITS)
-        eventually(lambda: rig.bus(bus)["state"] == "active", "the state is reported")
-        assert rig.bus(bus)["last_error"] == ""
-    assert "error state passive" in rig.daemon.log_text()
-
-
 @pytest.mark.parametrize("bus", BUSES)
 def test_bus_off_and_restart(rig, bus):
     interface, machine = INTERFACES[bus], rig.machines[bus]

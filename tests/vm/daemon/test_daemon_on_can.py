@@ -6,7 +6,6 @@ import re
 import struct
 import subprocess
 import threading
-import time
 
 import pytest
 
@@ -85,7 +84,6 @@ class Controller:
 
     def __init__(self):
         self.applied = 0
-        self.cycles = 0
         self.ending = threading.Event()
         self.thread = threading.Thread(target=self.run)
         self.thread.start()
@@ -101,8 +99,6 @@ class Controller:
                         self.applied = offset
                 bus.send(can.Message(arbitration_id=0x300, is_extended_id=False,
                                      data=struct.pack(">i", self.applied)))
-                bus.send(can.Message(arbitration_id=0x301, is_extended_id=False,
-                                     data=struct.pack("<H", self.cycles)))
 
     def close(self):
         self.ending.set()
@@ -147,37 +143,6 @@ def test_thermocouple_frames_become_offset_frames(lab):
     eventually(lambda: heartbeats.add(candump.newest_offset()[2]) or len(heartbeats) > 4,
                "the heartbeat beats")
     eventually(lambda: daemon.axis()["applied"] == daemon.axis()["offset"], "read back")
-    daemon.committed()
-    daemon.end()
-    assert_replays_exactly(daemon.history, lab.folder / "out.csv")
-
-
-def test_a_message_of_the_controller_ends_a_machining_cycle(lab):
-    pytest.importorskip("can")
-    (lab.folder / "model.toml").write_text(MODEL)
-    candump = lab.also_end(Candump(lab.folder / "candump.log"))
-    controller = lab.also_end(Controller())
-    config = CONFIG.replace("stale_after_s = 60.0", "stale_after_s = 600.0")
-    config = config.replace("[[axis]]", '[[controller.signal]]\nname = "cycles"\nid = 0x301\n'
-                            "start_bit = 0\nlength_bits = 16\n[[axis]]")
-    config = config.replace("[compensation]\n", '[compensation]\nupdate = "each_cycle"\n'
-                            'cycle_end_signal = "cycles"\n')
-    daemon = lab.daemon(config).start()
-    send_temperatures(20.0, 20.0)
-    daemon.wait_for_mode("compensating")
-    sent = 0.0
-    for number, column in enumerate((23.5, 21.0), start=1):
-        displacement = 3.0 * (column - 20.0)
-        send_temperatures(column, 20.0)
-        eventually(lambda: abs(daemon.axis()["displacement"] - displacement) < 0.01,
-                   "the model sees it")
-        time.sleep(0.3)
-        assert abs(daemon.axis()["offset"] - sent) < 0.02
-        controller.cycles = number
-        sent = -displacement
-        daemon.wait_for_offset(sent)
-        eventually(lambda: candump.newest_offset()[0] == round(100 * sent), "the frame")
-    assert daemon.status()["cycle_ends"] == 2
     daemon.committed()
     daemon.end()
     assert_replays_exactly(daemon.history, lab.folder / "out.csv")

@@ -15,8 +15,7 @@ import pytest
 import moving_slide
 import rig as rigs
 from lab import eventually
-from moving_slide import (LINE_DEVIATION_UM, NODES_MM, ROUNDING_UM, WARM_K, Moving,
-                          write_standing_run)
+from moving_slide import LINE_DEVIATION_UM, NODES_MM, ROUNDING_UM, WARM_K, Moving
 
 pytestmark = pytest.mark.skipif(not pathlib.Path("/sys/class/net/vcan1").exists(),
                                 reason="there is no vcan1 (tests/vm/run_with_can.sh makes one)")
@@ -253,48 +252,3 @@ def test_a_bus_that_loses_frames_never_makes_a_mixture(lab):
     mixtures = [(k0, slope) for k0, slope in shown
                 if not any(abs(k0 - a) <= 1 and abs(slope - b) <= 2 for a, b in sent)]
     assert not mixtures, mixtures[:5]
-
-
-def test_frames_of_two_sets_are_never_applied(lab):
-    machine = machine_text("line").replace("valid_bits", "heartbeat_timeout_s = 0.0\nvalid_bits")
-    lab.simulator(machine, "--replay", write_standing_run(lab.folder), "--stay", "--tick-ms", 5)
-    applied = lab.also_end(Listener("vcan1", K0_APPLIED, SLOPE_APPLIED))
-    bus = lab.also_end(open_bus("vcan1", 0x7FF))
-
-    def send(identifier, counts, number):
-        data = counts.to_bytes(3, "little", signed=True) + bytes([number])
-        bus.send(struct.pack("=IB3x8s", identifier, len(data), data))
-
-    def shown():
-        """The newest frames of the controller, after each has come twice."""
-        begun = len(applied.seen)
-        eventually(lambda: len(applied.seen) >= begun + 6, "frames of the controller")
-        newest = {identifier: rest for identifier, *rest in applied.seen[begun:]}
-        return newest[K0_APPLIED], newest[SLOPE_APPLIED]
-
-    rigs.write_frame("vcan1", ORDER, bytes([1, 0]))
-    send(K0, 1000, 7)
-    send(SLOPE, 2000, 7)
-    eventually(lambda: shown() == ([1000, 7], [2000, 7]), "the whole set")
-    # Only one frame of the next set, twice, in either order; then one of an older set.
-    for k0, slope in ((8, None), (None, 9), (10, 9), (6, None), (None, 255)):
-        if k0 is not None:
-            send(K0, -500, k0)
-        if slope is not None:
-            send(SLOPE, 9000, slope)
-        assert shown() == ([1000, 7], [2000, 7]), (k0, slope)
-    send(SLOPE, 9000, 20)
-    send(K0, -500, 20)
-    eventually(lambda: shown() == ([-500, 20], [9000, 20]), "the next whole set")
-    # A number that has wrapped around, with a frame older than a second.
-    send(K0, 777, 21)
-    time.sleep(1.3)
-    send(SLOPE, 888, 21)
-    assert shown() == ([-500, 20], [9000, 20])
-    # While the valid bit is 0 a complete set is not applied.
-    rigs.write_frame("vcan1", ORDER, bytes([0, 0]))
-    send(K0, 111, 22)
-    send(SLOPE, 222, 22)
-    assert shown() == ([-500, 20], [9000, 20])
-    rigs.write_frame("vcan1", ORDER, bytes([1, 0]))
-    eventually(lambda: shown() == ([111, 22], [222, 22]), "the set with its valid bit")

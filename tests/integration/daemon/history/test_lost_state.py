@@ -6,8 +6,7 @@ import sqlite3
 
 import pytest
 
-from lab import PATIENCE_S, Refused, eventually
-from plain_devices import Machine
+from lab import PATIENCE_S
 
 DAMAGE = {
     "empty": lambda file: file.write_text(""),
@@ -25,18 +24,6 @@ DAMAGE = {
     "missing": lambda file: file.unlink(),
     "dangling_link": lambda file: (file.unlink(), file.symlink_to(file.parent / "nowhere")),
 }
-
-
-@pytest.fixture
-def machine(lab):
-    return Machine(lab)
-
-
-def without_history(machine):
-    own = machine.daemon.config.read_text()
-    begin = own.index("[history]")
-    machine.daemon.config.write_text(own[:begin] + "[history]\nenabled = false\n" +
-                                     own[own.index("[socket]"):])
 
 
 def references(daemon):
@@ -88,45 +75,3 @@ def test_a_newer_history_is_refused_once_and_everything_stays_as_it_is(machine):
     daemon.wait_for_offset(9.0, 0.05)
     assert "newer thermocompd wrote it (format 9" in warnings(daemon)
     assert '"format": 9' in daemon.state.with_name("state.json.format-9").read_text()
-
-
-def test_a_commanded_reference_comes_from_the_history_too(machine):
-    daemon = machine.start()
-    machine.warm_by(9.0)
-    daemon.wait_for_offset(9.0, 0.05)
-    assert daemon.cli("reference", "--force")[0] == 0
-    daemon.end()
-    machine.warm_by(3.0)
-    DAMAGE["cut"](daemon.state)
-    daemon.start()
-    assert references(daemon) == [17.0, 20.0]
-
-
-@pytest.mark.parametrize("damage", [name for name in DAMAGE if name not in
-                                    ("missing", "dangling_link")])
-def test_without_a_history_it_stays_off_with_advice(machine, damage):
-    without_history(machine)
-    daemon = machine.start()
-    machine.warm_by(9.0)
-    daemon.wait_for_offset(9.0, 0.05)
-    daemon.kill()
-    machine.controller.force_applied_um(0.0)
-    DAMAGE[damage](daemon.state)
-    # Also at every later start.
-    for _ in range(2):
-        daemon.start()
-        daemon.wait_for_mode("disabled")
-        assert "thermocomp reference" in warnings(daemon)
-        with pytest.raises(Refused, match="reference is lost"):
-            daemon.call("enable")
-        daemon.kill()
-    daemon.start()
-    machine.warm_by(0.0)
-    eventually(lambda: daemon.status()["inputs"][0]["temp_degC"] == 20.0, "it is cold")
-    assert daemon.cli("reference", "--force")[0] == 0
-    assert daemon.cli("enable")[0] == 0
-    assert "reference is lost" not in warnings(daemon)
-    daemon.kill()
-    daemon.start()
-    machine.warm_by(5.0)
-    daemon.wait_for_offset(5.0, 0.05)

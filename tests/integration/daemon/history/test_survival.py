@@ -3,15 +3,8 @@
 import signal
 import time
 
-import pytest
-
 from lab import assert_replays_exactly, eventually
-from plain_devices import RATE_UM_PER_S, Machine, assert_slewed
-
-
-@pytest.fixture
-def machine(lab):
-    return Machine(lab)
+from plain_devices import assert_slewed
 
 
 def test_a_commanded_reference_survives_a_power_cut_right_after_the_answer(machine):
@@ -65,23 +58,6 @@ def test_a_second_sigterm_does_not_wait_for_zero(machine):
     daemon.end()
     assert machine.controller.applied_um() > 0.0
     assert "immediate stop requested" in daemon.log_text()
-
-
-def test_a_controller_that_restarts_from_zero_is_brought_back_slowly(machine, lab):
-    daemon = machine.start()
-    machine.warm_by(12.0)
-    daemon.wait_for_offset(12.0, 0.05)
-    machine.controller.stop()
-    daemon.wait_for_mode("holding")
-    machine.controller.start()  # its registers are zero
-    daemon.wait_for_mode("compensating")
-    eventually(lambda: abs(machine.controller.applied_um() - 12.0) < 0.01, "the offset is back")
-    orders = machine.controller.orders()
-    # From zero, not from the 12 um before.
-    assert abs(orders[0][1]) <= 0.7 * RATE_UM_PER_S
-    assert_slewed(orders)
-    daemon.end()
-    assert_replays_exactly(daemon.history, lab.folder / "out.csv")
 
 
 def test_a_sensor_outage_holds_and_ends_within_two_seconds_of_the_return(machine):
