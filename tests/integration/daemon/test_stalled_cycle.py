@@ -2,6 +2,8 @@
 true, also after a restart."""
 
 import json
+import threading
+import time
 
 import pytest
 
@@ -73,3 +75,25 @@ def test_a_disable_after_a_late_reload_survives_a_restart(machine, stall):
     daemon.start()
     assert answer == {"done": True} and was_disabled
     daemon.wait_for_mode("disabled")
+
+
+def test_others_are_answered_during_a_reload_and_a_second_reload_is_refused(machine, stall):
+    daemon = machine.start()
+    answers = []
+    with stall:
+        waiting = threading.Thread(target=lambda: answers.append(asked(daemon, "reload")))
+        waiting.start()
+        time.sleep(0.3)
+        took_s = []
+        for _ in range(20):
+            begun = time.monotonic()
+            daemon.status()
+            took_s.append(time.monotonic() - begun)
+        print(f"slowest status beside a waiting reload: {1000 * max(took_s):.1f} ms")
+        assert max(took_s) < 1.0
+        assert "a reload is in progress" in asked(daemon, "reload")
+        with pytest.raises(Refused, match="a reload is in progress"):
+            daemon.call("measured", axis="z", value_um=1.0)
+        waiting.join(10)
+    assert len(answers) == 1 and "withdrawn" in answers[0]
+    assert asked(daemon, "reload")["done"] is True
