@@ -87,6 +87,28 @@ def test_the_switch_at_the_controller_works_without_a_terminal(machine):
     assert_slewed(machine.controller.orders())
 
 
+def test_only_a_latched_axis_is_released(machine):
+    """What follows from a release: the attacks with a false read-back."""
+    daemon = machine.start()
+    status, _, output = daemon.cli("release", "z")
+    assert status == 1 and "no latched mismatch" in output
+    with pytest.raises(Refused, match="nosuch"):
+        daemon.call("release", axis="nosuch")
+
+
+def test_a_measured_displacement_that_cannot_be_is_refused(machine):
+    """The bound is 60 um; the model claims no error and expects no remainder."""
+    daemon = machine.start()
+    for value_um in (900.0, -900.0, 60.5, 1e9):
+        with pytest.raises(Refused, match="value refused: .*Check axis, sign"):
+            daemon.call("measured", axis="z", value_um=value_um)
+    status, _, output = daemon.cli("measured", "z", "60.5")
+    assert status == 2 and "60.0 um" in output, output
+    assert daemon.axis()["measured"] is None
+    daemon.call("measured", axis="z", value_um=-59.0)
+    assert daemon.axis()["measured"] == -59.0
+
+
 def test_a_value_beyond_the_claimed_error_needs_confirmation(machine, lab):
     """The model claims 1.5 um: a remainder of 12 um is a factor-of-ten mistake, 2 um are its error."""
     machine.model.write_text(MODEL + CLAIMS)
