@@ -158,6 +158,21 @@ interface = "no_such_can0"
     assert set(simulator.ready["ports"]) == {"cabinet", "spare", "cnc"}
 
 
+def test_the_same_seed_gives_the_same_truth(simulate, tmp_path):
+    noisy = MACHINE.replace('[[thermocouple]]\nname = "room"',
+                            '[[thermocouple]]\nname = "noisy"\nnode = "spindle"\nnoise_K = 1\n'
+                            '[[thermocouple]]\nname = "room"')
+    texts = []
+    for seed in (1, 1, 2):
+        truth = tmp_path / "truth.csv"
+        simulator = simulate(noisy, "--seed", seed, "--duration", 0.1, "--time-factor", 3600,
+                             "--truth", truth)
+        simulator.process.wait(timeout=PATIENCE_S)
+        texts.append(truth.read_text())
+    assert texts[0] == texts[1]
+    assert texts[0] != texts[2]
+
+
 @pytest.mark.parametrize("options, expected", [
     ([], "no [plant]"),
     (["--replay", "missing.csv"], "missing.csv"),
@@ -210,3 +225,5 @@ def test_help_suffices():
     assert done.returncode == 0
     for option in ("--time-factor", "--replay", "--row-log", "--truth", "--duration", "--seed"):
         assert option in done.stdout
+
+
