@@ -1,5 +1,5 @@
 """Modbus servers in plain bytes, over TCP and a pseudo-terminal: registers set by a test, and a
-hook that may falsify every answer."""
+hook that may falsify every answer. A client in plain bytes."""
 
 import contextlib
 import os
@@ -267,3 +267,36 @@ class RtuSlaves:
         frame_of.transaction = 0
         answer = frame_of(self.units[unit].answer(body[1:], unit))
         self.sender.put(self.spoil(frame_of, body[1:], answer))
+
+
+# ---- client
+
+def request(unit, pdu, transaction=1):
+    return struct.pack(">HHHB", transaction, 0, len(pdu) + 1, unit) + pdu
+
+
+def read_request(function, address, count):
+    return struct.pack(">BHH", function, address, count)
+
+
+def receive(link, count):
+    data = b""
+    while len(data) < count:
+        piece = link.recv(count - len(data))
+        if not piece:
+            raise EOFError
+        data += piece
+    return data
+
+
+def answer(link):
+    """(transaction, unit, PDU) of the next answer."""
+    transaction, _, length, unit = struct.unpack(">HHHB", receive(link, 7))
+    return transaction, unit, receive(link, length - 1)
+
+
+def ask(link, unit, pdu, transaction=1):
+    link.sendall(request(unit, pdu, transaction))
+    got, _, body = answer(link)
+    assert got == transaction
+    return body

@@ -1,12 +1,12 @@
 """A controller that interpolates its offset along the travel: real registers, a moving slide."""
 
-import socket
 import struct
 
 import pytest
 
 import moving_slide
 from lab import eventually, run_tool
+from modbus_server import ask, read_request
 from moving_slide import (LINE_DEVIATION_UM, MODEL, MOVING_S, NODES_MM, REST_S, WARM_K, WARM_S,
                           Moving, write_standing_run)
 
@@ -108,26 +108,6 @@ def test_a_killed_daemon_continues_along_the_travel(lab):
     daemon.end()
 
 
-class RawClient:
-    def __init__(self, port):
-        self.link = socket.create_connection(("127.0.0.1", port), 10)
-
-    def ask(self, pdu):
-        self.link.sendall(struct.pack(">HHHB", 1, 0, len(pdu) + 1, 1) + pdu)
-        with self.link.makefile("rb") as stream:
-            _, _, length, _ = struct.unpack(">HHHB", stream.read(7))
-            return stream.read(length - 1)
-
-    def write(self, address, *words):
-        answer = self.ask(struct.pack(f">BHHB{len(words)}H", 16, address, len(words),
-                                      2 * len(words), *words))
-        assert answer[0] == 16, answer
-
-    def applied(self):
-        """K0 and slope in counts."""
-        return struct.unpack(">2i", self.ask(struct.pack(">BHH", 4, 101, 4))[2:])
-
-
 def words_of(number):
     return struct.unpack(">2H", struct.pack(">i", number))
 
@@ -135,18 +115,27 @@ def words_of(number):
 def test_a_set_that_is_broken_off_is_never_applied(lab):
     machine = machine_text("line").replace("valid_bits", "heartbeat_timeout_s = 0.0\nvalid_bits")
     simulator = lab.simulator(machine, "--replay", write_standing_run(lab.folder), "--stay")
-    client = RawClient(simulator.ready["ports"]["cnc"])
+    link = simulator.connect("cnc")
+
+    def write(address, *words):
+        pdu = struct.pack(f">BHHB{len(words)}H", 16, address, len(words), 2 * len(words), *words)
+        assert ask(link, 1, pdu)[0] == 16
+
+    def applied():
+        """K0 and slope in counts."""
+        return struct.unpack(">2i", ask(link, 1, read_request(4, 101, 4))[2:])
+
     first = (7, *words_of(1000), *words_of(2000), 7)
-    client.write(10, 1)
-    client.write(100, *first)
-    eventually(lambda: client.applied() == (1000, 2000), "the whole set")
+    write(10, 1)
+    write(100, *first)
+    eventually(lambda: applied() == (1000, 2000), "the whole set")
     second = (8, *words_of(-500), *words_of(9000), 8)
     for end in range(1, len(second)):  # registers 100 to 105, interrupted after each
-        client.write(100, *second[:end])
-        client.write(11, end)
-        assert client.applied() == (1000, 2000), end
-    client.write(100, *second)
-    eventually(lambda: client.applied() == (-500, 9000), "the next whole set")
+        write(100, *second[:end])
+        write(11, end)
+        assert applied() == (1000, 2000), end
+    write(100, *second)
+    eventually(lambda: applied() == (-500, 9000), "the next whole set")
 
 
 def test_check_shows_the_deviation_of_a_line(lab):

@@ -12,6 +12,7 @@ import pytest
 sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / "daemon"))
 import lab  # noqa: E402
 from lab import BIN, eventually  # noqa: E402, F401
+from modbus_server import ask, read_request  # noqa: E402
 
 SOURCE = pathlib.Path(os.environ.get("THERMOCOMP_SOURCE", "."))
 PATIENCE_S = 60.0
@@ -53,22 +54,12 @@ class Simulator(lab.Simulator):
     def read(self, unit, function, address, count):
         """Words or bits of the answer, from an independent client."""
         with self.connect("net") as link:
-            link.sendall(struct.pack(">HHHBBHH", 1, 0, 6, unit, function, address, count))
-            head = receive(link, 9)
-            assert head[7] == function, f"exception {head[8]}"
-            body = receive(link, head[8])
+            head, *body = ask(link, unit, read_request(function, address, count))
+        assert head == function, f"exception {body}"
+        body = bytes(body[1:])
         if function in (1, 2):
             return [(body[i // 8] >> (i % 8)) & 1 for i in range(count)]
         return list(struct.unpack(f">{count}H", body))
-
-
-def receive(link, count):
-    data = b""
-    while len(data) < count:
-        piece = link.recv(count - len(data))
-        assert piece, "connection closed"
-        data += piece
-    return data
 
 
 @pytest.fixture

@@ -2,7 +2,6 @@
 
 import pathlib
 import re
-import struct
 import subprocess
 import sys
 
@@ -10,6 +9,7 @@ import pytest
 
 sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / "daemon"))
 from lab import BIN, PATIENCE_S, Simulator, eventually  # noqa: E402, F401
+from modbus_server import answer, ask, read_request, receive, request  # noqa: E402, F401
 
 
 @pytest.fixture
@@ -23,37 +23,6 @@ def simulate(tmp_path):
     yield start
     for simulator in running:
         simulator.kill()
-
-
-def request(unit, pdu, transaction=1):
-    return struct.pack(">HHHB", transaction, 0, len(pdu) + 1, unit) + pdu
-
-
-def read_request(function, address, count):
-    return struct.pack(">BHH", function, address, count)
-
-
-def receive(link, count):
-    data = b""
-    while len(data) < count:
-        piece = link.recv(count - len(data))
-        if not piece:
-            raise EOFError
-        data += piece
-    return data
-
-
-def answer(link):
-    """(transaction, unit, PDU) of the next answer."""
-    transaction, _, length, unit = struct.unpack(">HHHB", receive(link, 7))
-    return transaction, unit, receive(link, length - 1)
-
-
-def ask(link, unit, pdu, transaction=1):
-    link.sendall(request(unit, pdu, transaction))
-    got, _, body = answer(link)
-    assert got == transaction
-    return body
 
 
 def mbpoll(*arguments):

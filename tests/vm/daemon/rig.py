@@ -15,7 +15,7 @@ import subprocess
 import threading
 import time
 
-from lab import BIN, assert_replays_exactly, eventually, first_cycle_s
+from lab import Simulator, assert_replays_exactly, eventually, first_cycle_s
 
 RISE_K_PER_S = 0.05
 RATE_UM_PER_S_MAX = 1.5
@@ -246,18 +246,12 @@ class Rig:
         return [window.recovery(offsets, begin + window.held_until_s) for window in self.windows]
 
 
-class Simulated:
+class Simulated(Simulator):
     """thermocomp-sim that can be stopped and continued like a disconnected cable."""
 
     def __init__(self, folder, machine, run):
-        (folder / "machine.toml").write_text(machine)
-        self.log = (folder / "thermocomp-sim.log").open("a")
-        self.process = subprocess.Popen(
-            [str(BIN / "thermocomp-sim"), str(folder / "machine.toml"), "--replay", str(run),
-             "--row-period-ms", "100", "--stay"], stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE, stderr=self.log, text=True, cwd=folder)
-        line = self.process.stdout.readline()
-        assert '"unavailable":{}' in line, line + (folder / "thermocomp-sim.log").read_text()
+        super().__init__(folder, machine, "--replay", run, "--row-period-ms", 100, "--stay")
+        assert not self.ready["unavailable"], self.ready
 
     def cable_out(self):
         self.process.send_signal(signal.SIGSTOP)
