@@ -60,6 +60,16 @@ inline Bytes registers_pdu(int function, const std::vector<std::uint16_t>& words
   return pdu;
 }
 
+/// The lowest bit of each word.
+inline Bytes bits_pdu(int function, const std::vector<std::uint16_t>& words) {
+  Bytes pdu{static_cast<std::uint8_t>(function), static_cast<std::uint8_t>((words.size() + 7) / 8)};
+  pdu.resize(2 + pdu[1]);
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    pdu[2 + i / 8] = static_cast<std::uint8_t>(pdu[2 + i / 8] | ((words[i] & 1) << (i % 8)));
+  }
+  return pdu;
+}
+
 /// Every register holds unit * 1000 + address; every bit is the lowest bit of that number.
 inline Reply correct(const Request& request) {
   if (request.function == 16 || request.function == 5) {
@@ -70,13 +80,7 @@ inline Reply correct(const Request& request) {
     words.push_back(static_cast<std::uint16_t>(request.unit * 1000 + request.address + i));
   }
   if (request.function > 2) return {registers_pdu(request.function, words)};
-  Bytes pdu{static_cast<std::uint8_t>(request.function),
-            static_cast<std::uint8_t>((request.count + 7) / 8)};
-  pdu.resize(2 + pdu[1]);
-  for (std::size_t i = 0; i < words.size(); ++i) {
-    pdu[2 + i / 8] = static_cast<std::uint8_t>(pdu[2 + i / 8] | ((words[i] & 1) << (i % 8)));
-  }
-  return {pdu};
+  return {bits_pdu(request.function, words)};
 }
 
 inline Reply exception(const Request& request, int code) {
