@@ -128,6 +128,17 @@ bool may_be_factors(const TableFields& fields) {
   return !all_one;
 }
 
+/// "Scale,0.1,0.1" above the names.
+bool is_named_row_of_factors(const TableFields& fields) {
+  constexpr auto names = std::to_array<std::string_view>(
+      {"scale", "scaling", "factor", "gain", "multiplier", "skalierung", "faktor"});
+  if (fields.empty() || !is_one_of(names, fields[0])) return false;
+  return std::any_of(fields.begin() + 1, fields.end(), [](std::string_view field) {
+    const auto number = finite_number(field);
+    return number && *number != 1.0;
+  });
+}
+
 bool names_time_or_unit(const TableFields& fields) {
   return std::any_of(fields.begin(), fields.end(), [](std::string_view field) {
     return names_time(field) || !unit_of_time_name(field).empty() ||
@@ -201,6 +212,8 @@ TableHeader find_table_header(const std::vector<TableFields>& lines, std::size_t
       !is_all_words(lines[header.row_begin - 1]))
     header.unclear = header.row_begin - 1;
   if (!header.names) return header;
+  for (std::size_t i = 0; i < *header.names; ++i)
+    if (is_named_row_of_factors(lines[i])) header.unclear = i;
   for (std::size_t i = *header.names + 1; i < header.row_begin; ++i)
     if (!header.unclear && !is_all_words(lines[i]) && i != header.units &&
         !is_known_row_of_numbers(lines[i]))

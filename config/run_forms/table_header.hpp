@@ -20,7 +20,7 @@ struct TableHeader {
   std::size_t row_begin{0};            ///< first row of data
   std::optional<std::size_t> names;    ///< nullopt: none
   std::optional<std::size_t> units;    ///< a row of units below the names
-  std::optional<std::size_t> unclear;  ///< numbers below the names that are no row
+  std::optional<std::size_t> unclear;  ///< factors, or numbers below the names that are no row
 };
 
 /// The header is the lowest line above the first row that names the time or a unit, else the lowest

@@ -202,7 +202,8 @@ bool take_clock(std::string_view& text, TimeStamp& stamp) {
     if (rest.empty() || !is_digit(rest.front())) return false;
     for (; !rest.empty() && is_digit(rest.front()); rest.remove_prefix(1), unit /= 10) {
       fraction += unit * (rest.front() - '0');
-      stamp.may_count_ms = has_colon || (++stamp.fraction_digits > 1 && rest.front() == '0');
+      ++stamp.fraction_digits;
+      stamp.may_count_ms = has_colon || (stamp.fraction_digits > 1 && rest.front() == '0');
     }
     (stamp.clock_parts == 3 ? stamp.clock_c : stamp.clock_b) += fraction;
   }

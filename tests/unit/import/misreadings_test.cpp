@@ -345,6 +345,8 @@ TEST_CASE("a unit that may be another is asked for", "[import]") {
       {"tenths", "Time [s],Bed 0.1℃\n0,205\n60,206\n",
        "write \"Bed 0.1℃\" = { name = \"Bed_degC\", unit = \"0.1 ℃\" }", ""},
       {"ten times", "Time [s],Bed x10°C\n0,205\n60,206\n", "may be a multiple of its unit", ""},
+      {"factors above the names", "Name,Run\nScale,0.1\nTime [s],Bed [C]\n0,205\n60,206\n",
+       "log:2: Scale,0.1: is neither a row like those below nor names", ""},
       {"the number of a sensor is no factor", "Time [s],Bed 1 °C\n0,20\n60,21\n",
        "time_s,Bed_1_degC\n0,20\n60,21\n", ""},
       {"thousands", "Time [s],speed\n0,3.00 K\n60,4.50 K\n", "may be a unit or mean a thousand",
@@ -363,6 +365,9 @@ TEST_CASE("what may be a part of the time is asked for", "[import]") {
       {"counts of ms",
        "Time,T [C]\n2026-02-01 08:00:00.3,20\n2026-02-01 08:00:01.20,21\n2026-02-01 "
        "08:00:02.370,22\n",
+       "may end with a fraction of a second or with a number of ms", ""},
+      {"counts of ms behind a colon",
+       "Time;T [C]\n01.02.2026 8:0:0:3;20\n01.02.2026 8:0:1:44;21\n01.02.2026 8:0:2:185;22\n",
        "may end with a fraction of a second or with a number of ms", ""},
       {"a whole second without a fraction",
        "Time,T [C]\n2026-02-01T08:00:00,20\n2026-02-01T08:00:00.500,21\n",
