@@ -83,6 +83,7 @@ struct ScreeningConfig {
   double outage_K_max{10.0};     ///< largest change over an outage, plus 10 K/h
   double settle_s{10.0};         ///< time that a value must last before it counts; 0: at once
   double stuck_after_s{0.0};     ///< a value unchanged for longer is a fault; 0: never
+  double raw_0_degC{0.0};        ///< what a device's raw 0 means; no key, from the channel
 
   static constexpr auto numbers() {
     using Key = NumberKey<ScreeningConfig>;

@@ -1,8 +1,11 @@
 #include "report/command.hpp"
 
 #include <algorithm>
+#include <array>
 #include <csignal>
 #include <cstdio>
+#include <filesystem>
+#include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -12,6 +15,40 @@
 #include "config/toml/toml_reader.hpp"
 
 namespace thermocomp::cli {
+namespace {
+
+/// Options of files that a command writes.
+bool is_output(const CLI::Option& option) {
+  constexpr std::array names{"output", "report", "json", "page", "picture", "vtu", "curves"};
+  return std::any_of(names.begin(), names.end(),
+                     [&](const char* name) { return option.check_lname(name); });
+}
+
+/// `covariance` completes a model, `fit` one like another: they may write into it.
+bool may_be_replaced(const CLI::App& command, const CLI::Option& option) {
+  return (command.get_name() == "covariance" && option.check_lname("model")) ||
+         (command.get_name() == "fit" && option.check_lname("like"));
+}
+
+/// @throws Failure if a file to be written is one of those to be read, also by way of links
+void refuse_onto_input(const CLI::App& command) {
+  std::vector<std::pair<const CLI::Option*, std::string>> files;
+  for (const CLI::Option* option : command.get_options())
+    for (const std::string& file : option->results()) files.emplace_back(option, file);
+  for (const auto& [output, written] : files) {
+    if (!is_output(*output)) continue;
+    for (const auto& [input, read] : files) {
+      std::error_code error;
+      if (is_output(*input) || may_be_replaced(command, *input)) continue;
+      const std::string file = read.substr(0, read.find('@'));  // a selection of rows
+      if (std::filesystem::equivalent(file, written, error) && !error)
+        throw Failure(written + ": is the input; the output must be another file");
+    }
+  }
+  for (const CLI::App* each : command.get_subcommands()) refuse_onto_input(*each);
+}
+
+}  // namespace
 
 int run_program(int argc, char** argv, const char* name,
                 const std::function<void(CLI::App&, Action&)>& declare, int failed) {
@@ -26,6 +63,7 @@ int run_program(int argc, char** argv, const char* name,
     } catch (const CLI::ParseError& error) {
       return app.exit(error) == 0 ? exit_success : exit_error;
     }
+    refuse_onto_input(app);
     return action();
   } catch (const ConfigurationError& error) {
     std::fprintf(stderr, "%s\n", error.what());

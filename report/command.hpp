@@ -40,6 +40,7 @@ class Failure : public std::runtime_error {
 
 /// main() of a program: ignores SIGPIPE, so that a closed pipe is a write error; parses; runs the
 /// action; writes errors to stderr, with the program's name unless they name a place in a file.
+/// A command that would write onto one of its inputs is refused.
 /// @param declare  declares the command line; its references outlive the call
 /// @param failed   exit status after an error other than ConfigurationError and Failure
 /// @return the exit status; exit_error for a wrong command line or configuration

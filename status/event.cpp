@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "config/text/printable_text.hpp"
+#include "estimator/types.hpp"
 #include "status/codes.hpp"
 #include "status/figures.hpp"
 
@@ -125,6 +126,19 @@ std::string text_of_kind(const Event& event) {
 }
 
 }  // namespace
+
+void RecordedMode::take(const Event& event) {
+  if (event.kind == EventKind::mode) mode_ = event.code;
+  if (event.subject.kind != SubjectKind::axis) return;
+  if (event.kind == EventKind::fault && event.code == "mismatch_latched")
+    latched_axes_.insert(event.subject.name);
+  if (event.kind == EventKind::recovery) latched_axes_.erase(event.subject.name);
+}
+
+std::string RecordedMode::name() const {
+  const bool is_latched = mode_ == to_string(Mode::compensating) && !latched_axes_.empty();
+  return is_latched ? std::string(not_driven) : mode_;
+}
 
 std::string_view to_string(EventKind kind) noexcept {
   return kinds.at(static_cast<std::size_t>(kind));

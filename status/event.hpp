@@ -5,6 +5,7 @@
 #include <limits>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -101,6 +102,21 @@ struct Event {
 /// An event in a history, with its run of the daemon.
 struct RecordedEvent : Event {
   std::int64_t run{0};  ///< number of the daemon's start; set by the history
+};
+
+/// Mode of a run while it compensates and an axis is latched, hence not driven.
+inline constexpr std::string_view not_driven = "not_driven";
+
+/// What the offsets do, from the events of a run in their order.
+class RecordedMode {
+ public:
+  void take(const Event& event);
+  /// A mode's name, or `not_driven`; empty before the first one.
+  [[nodiscard]] std::string name() const;
+
+ private:
+  std::string mode_;
+  std::set<std::string> latched_axes_;
 };
 
 [[nodiscard]] std::string_view to_string(EventKind kind) noexcept;

@@ -33,9 +33,11 @@ std::vector<std::string> axes_not_driven(const Status& status) {
 std::string confirmation_text(const Confirmation& values) {
   return "new values are being confirmed: " + joined(values.sensors) +
          " count after settle_s = " + duration_text(values.settle_s) +
-         (values.one_value_of.empty() ? ""
-                                      : ", and not while all channels of " + values.one_value_of +
-                                            " show one value, as a module that is not ready");
+         (values.one_value_of.empty()
+              ? ""
+              : ", and not while all channels of " + values.one_value_of +
+                    " show one value, as a module that is not ready (if it is "
+                    "right: thermocomp accept SENSOR)");
 }
 
 /// Collects faults, one entry per cause.
@@ -245,8 +247,10 @@ class Causes {
                 fixed(axis.latched->read_um, 1) + " um is read back (" + axis.latched->likely + ")",
             "remove the cause, then release the axis", "thermocomp release " + axis.name, subject);
       else if (axis.disagrees)
-        add(name + ": the controller applies " + fixed(axis.applied, 1) + " " + axis.unit + ", " +
-                fixed(axis.offset, 1) + " was sent",
+        add(name + ": the controller " +
+                (std::isfinite(axis.applied) ? "applies " + fixed(axis.applied, 1) + " " + axis.unit
+                                             : "shows no number for what it applies") +
+                ", " + fixed(axis.offset, 1) + " was sent",
             code_text(Reason::mismatch).remedy, "", subject);
       if (axis.at_bound)
         add(name + " at its bound" + remaining_text(axis), code_text(Reason::at_bound).remedy, "",

@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cstdio>
-#include <filesystem>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -44,15 +43,7 @@ int report_damage(const std::string& history, const std::vector<HistoryDamage>& 
   return damage.empty() ? exit_success : exit_no;
 }
 
-/// Refuses to overwrite the history being exported.
-void refuse_onto_itself(const std::string& input, const std::string& output) {
-  std::error_code error;
-  if (output != "-" && std::filesystem::equivalent(input, output, error) && !error)
-    throw Failure(output + ": is the input; the output must be another file");
-}
-
 int run_export(const ExportOptions& options) {
-  refuse_onto_itself(options.history, options.output);
   const auto from = time_or_none(options.from);
   const auto to = time_or_none(options.to);
   OutputFile file(options.output);
@@ -86,7 +77,6 @@ struct ReplayOptions {
 };
 
 int run_history_replay(const ReplayOptions& options) {
-  refuse_onto_itself(options.input, options.output);
   OutputFile file(options.output);
   ReplaySummary summary;
   {
@@ -116,7 +106,6 @@ int run_history_replay(const ReplayOptions& options) {
 
 int run_file_replay(const ReplayOptions& options) {
   const DaemonConfig config = load_daemon_config(options.config);
-  refuse_onto_itself(options.input, options.output);
   const RunFile run = RunLoader(options.columns).load(options.input);
   OutputFile file(options.output);
   const RunReplaySummary summary = replay_run_file(config, run, file.stream());

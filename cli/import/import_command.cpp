@@ -1,6 +1,5 @@
 #include <cmath>
 #include <cstdio>
-#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -33,12 +32,6 @@ void print_lines(const std::string& name, const std::vector<std::string>& lines)
   for (const std::string& line : lines) std::fprintf(stderr, "  %s\n", line.c_str());
 }
 
-void refuse_onto(const std::string& input, const std::string& output) {
-  std::error_code error;
-  if (output != "-" && std::filesystem::equivalent(input, output, error) && !error)
-    throw Failure(output + ": is the input; the output must be another file");
-}
-
 /// Converts seconds since 1970 to seconds since the first row, since selections would be long.
 void count_from_first_row(RunFile& run) {
   constexpr double since_1970_s_min = 1e9;
@@ -67,8 +60,6 @@ int run_import(const ImportOptions& options) {
   map.takes_signals = true;
   if (!options.names.empty()) map.names = options.names;
   if (options.period_s) map.period_s = options.period_s;
-  for (const std::string& input : {options.log, options.join})
-    if (!input.empty()) refuse_onto(input, options.output);
   if (options.shift_s && options.join.empty())
     throw Failure("--shift-s is the shift of the file of --join, which is missing");
   RunFile run = read_log(options.log, map);

@@ -268,18 +268,21 @@ double MachineWeek::mode_s(const std::string& mode) const {
 std::vector<ModeSpell> mode_spells(const WeekEvents& events, const WallSpan& span) {
   std::vector<ModeSpell> spells;
   const auto& list = events.events;
+  RecordedMode mode;
   for (std::size_t i = 0; i < list.size(); ++i) {
-    if (list[i].kind != EventKind::mode) continue;
+    if (i > 0 && list[i].run != list[i - 1].run) mode = {};
+    mode.take(list[i]);
+    const bool is_last = i + 1 == list.size() || list[i + 1].run != list[i].run;
     const auto end = events.run_ends_s.find(list[i].run);
-    double until_s = end == events.run_ends_s.end() ? span.to_s : end->second;
-    for (std::size_t j = i + 1; j < list.size(); ++j) {
-      if (list[j].run != list[i].run) break;
-      if (list[j].kind != EventKind::mode) continue;
-      until_s = list[j].wall_s;
-      break;
-    }
-    const WallSpan within = WallSpan{list[i].wall_s, until_s}.within(span);
-    if (within.length_s() > 0.0) spells.push_back({within, list[i].code});
+    const double run_end_s = end == events.run_ends_s.end() ? span.to_s : end->second;
+    const WallSpan within =
+        WallSpan{list[i].wall_s, is_last ? run_end_s : list[i + 1].wall_s}.within(span);
+    if (mode.name().empty() || !(within.length_s() > 0.0)) continue;
+    if (!spells.empty() && spells.back().mode == mode.name() &&
+        spells.back().span.to_s == within.from_s)
+      spells.back().span.to_s = within.to_s;
+    else
+      spells.push_back({within, mode.name()});
   }
   return spells;
 }

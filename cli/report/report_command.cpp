@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cstdio>
-#include <filesystem>
 #include <memory>
 #include <string>
 
@@ -39,10 +38,6 @@ int run_report(const ReportOptions& options) {
                   ": a report is written as HTML; a browser prints it: chromium --headless "
                   "--print-to-pdf=" +
                   options.output + " REPORT.html");
-  std::error_code error;
-  if (options.output != "-" &&
-      std::filesystem::equivalent(options.history, options.output, error) && !error)
-    throw Failure(options.output + ": is the input; the output must be another file");
   const WallSpan recorded = recorded_span(options.history);
   WallSpan span;
   span.to_s = moment_of(options.to, recorded.to_s, recorded);

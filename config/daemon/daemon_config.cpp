@@ -178,6 +178,17 @@ SocketConfig read_socket(const TomlTable& table, const fs::path& folder) {
   return socket;
 }
 
+/// The temperatures that modules show for a raw 0, which they send while they are not ready.
+void note_raw_zeros(DaemonConfig& config) {
+  for (const BusConfig& bus : config.buses) {
+    const auto* const modbus = std::get_if<ModbusBusConfig>(&bus);
+    if (modbus == nullptr) continue;
+    for (const ModbusDeviceConfig& device : modbus->devices)
+      for (const ModbusChannel& channel : device.channels)
+        config.estimator.sensors[channel.sensor].screening.raw_0_degC = channel.offset_degC;
+  }
+}
+
 void check_controller_period(const TomlTable& compensation, const DaemonConfig& config,
                              double period_s) {
   if (config.estimator.compensation.controller_stale_after_s > period_s) return;
@@ -211,6 +222,7 @@ sections::BindingTables read_daemon(const TomlTable& root, const fs::path& folde
   config.estimator.axes = sections::read_axes(tables.axes);
   config.buses =
       sections::read_buses(root, {sensors, config.estimator.sensors}, presets, bus_files);
+  note_raw_zeros(config);
 
   sections::ControllerReading controller = sections::read_controller(
       root.table("controller"), tables.axes, config.estimator.axes, bus_files.serial_lines);

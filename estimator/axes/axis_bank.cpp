@@ -142,6 +142,9 @@ constexpr std::uint8_t read_backs_until_written = 3;
 /// from the slowest read-backs tested (0.5 s) and the pauses of a reconnection.
 constexpr nanoseconds lag_max = std::chrono::milliseconds(1500);
 
+/// The first link of a controller that was ready all the time is there by then.
+constexpr nanoseconds first_link_max = std::chrono::seconds(3);
+
 /// WriteGate::patience() of links with periods up to 0.6 s.
 constexpr nanoseconds unwritten_max = std::chrono::seconds(3);
 
@@ -167,6 +170,8 @@ AxisChannel::AxisChannel(const AxisConfig& config, const CompensationConfig& com
 
 void AxisChannel::observe(const AxisInput& input) noexcept {
   if (input.link_epoch != state_.epoch) take_epoch(input.link_epoch);
+  // Before the first report the controller was away since the first step.
+  if (state_.seen_at == nanoseconds{}) state_.seen_at = input.now;
   const nanoseconds seen_before = state_.seen_at;
   if (input.online) note_read_back(input);
   if (!state_.synced)
@@ -247,8 +252,9 @@ void AxisChannel::start_without_read_back(const AxisInput& input, nanoseconds aw
   const double register_um = input.applied_um;
   if (!std::isfinite(register_um)) {
     if (!start_.no_registers) begin_corridor(start_.by);
-    // It is unknown whether the controller restarted and what it applies since.
-    if (!is_same_link(state_.epoch, first_epoch) && away > lag_max)
+    // It is unknown whether the controller restarted and what it applies since. That also holds for
+    // one that could not be reached when the program began.
+    if (away > (is_same_link(state_.epoch, first_epoch) ? first_link_max : lag_max))
       start_.by = StartEvidence::unknown;
     start_.unknown = start_.by == StartEvidence::unknown;
     return start_from(input.now, limiter_.offset_um());
@@ -273,7 +279,7 @@ bool AxisChannel::can_be_ours(double register_um) const noexcept {
 }
 
 void AxisChannel::compare(const AxisInput& input) noexcept {
-  if (!std::isfinite(input.applied_um)) return;
+  if (!std::isfinite(input.applied_um)) return miss_read_back(input);
   state_.out_of_bound = is_out_of_bound(input.applied_um);
   const nanoseconds before = state_.read_back_at;
   const bool fresh = input.taken_at != before;
@@ -293,6 +299,16 @@ void AxisChannel::compare(const AxisInput& input) noexcept {
   } else {
     note_unexplained(input, fresh);
   }
+}
+
+/// A controller that answers without a number for longer than a read-back may take: what it applies
+/// is not known, and the axis pauses until it is.
+void AxisChannel::miss_read_back(const AxisInput& input) noexcept {
+  if (state_.starting || state_.latched || input.taken_at - state_.read_back_at <= mismatch_after_)
+    return;
+  state_.in_doubt = true;
+  state_.agreed_since = input.now;
+  state_.mismatch = true;
 }
 
 /// The axis is not driven until the read-back is within the bound. A controller that was away may

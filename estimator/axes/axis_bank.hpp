@@ -109,15 +109,16 @@ struct SentBefore {
 ///
 /// Unexplained is a read-back far from all offsets sent lately, and one that stands still while the
 /// offset sent moves. It pauses the axis; a second one within the next sixteen good ones latches
-/// the mismatch: the axis is not driven until release().
+/// the mismatch: the axis is not driven until release(). Reports without a number for longer than
+/// mismatch_after_s pause it too.
 ///
 /// Without read-back the offset continues, on each new link, from the one sent last. Its sources,
 /// in this order: the registers read when the link began (in place of the read-back), the offset
 /// sent until then, the last-sent record, the state file. If the registers contradict the other
-/// sources, or if the link was away for longer than a controller needs to restart and no registers
-/// can be read, the start is unknown: the axis is not driven until release(), which starts from 0.
-/// While no registers can be read, the offset stays within restart_leap_um_max of every offset that
-/// may be on disk, and waits for the disk.
+/// sources, or if the link was away (or, at the program's start, not there) for longer than a
+/// controller needs to restart and no registers can be read, the start is unknown: the axis is not
+/// driven until release(), which starts from 0. While no registers can be read, the offset stays
+/// within restart_leap_um_max of every offset that may be on disk, and waits for the disk.
 class AxisChannel {
  public:
   AxisChannel(const AxisConfig& config, const CompensationConfig& compensation, bool reads_back);
@@ -252,6 +253,7 @@ class AxisChannel {
   void note_read_back(const AxisInput& input) noexcept;
   void synchronise(const AxisInput& input, nanoseconds away) noexcept;
   void compare(const AxisInput& input) noexcept;
+  void miss_read_back(const AxisInput& input) noexcept;
   void start_without_read_back(const AxisInput& input, nanoseconds away) noexcept;
   [[nodiscard]] bool can_be_ours(double register_um) const noexcept;
   [[nodiscard]] double within_corridor(double target_um) noexcept;

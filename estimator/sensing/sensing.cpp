@@ -269,21 +269,26 @@ void BlockBank::surround(std::span<const double> expected_degC,
   }
 }
 
-/// All channels show the same value although their last good values differ, as from a module that
-/// answers before its first conversion.
+/// All channels that answer show one value, although their last good values differed, and one of
+/// them is not near its own: as from a module that answers before its first conversion.
 bool BlockBank::is_not_ready(const std::vector<std::size_t>& module) const noexcept {
-  if (module.size() < 2) return false;
   double least_degC = std::numeric_limits<double>::infinity();
   double most_degC = -least_degC;
-  const double shown_degC = sensors_[module.front()].screening.newest_degC();
+  double off_K = 0.0;
+  double shown_degC = not_a_number;
   for (const std::size_t i : module) {
     const Screening& screening = sensors_[i].screening;
-    if (!screening.waiting() || screening.newest_degC() != shown_degC) return false;
+    if (screening.usable(now_)) return false;
+    if (!screening.waiting()) continue;  // a fault of its own, such as an open circuit
+    if (std::isnan(shown_degC)) shown_degC = screening.newest_degC();
+    if (screening.newest_degC() != shown_degC) return false;
     if (!screening.has_good()) continue;
     least_degC = std::min(least_degC, screening.good_degC());
     most_degC = std::max(most_degC, screening.good_degC());
+    off_K = std::max(off_K, std::abs(shown_degC - screening.good_degC()));
   }
-  return most_degC - least_degC > sensors_[module.front()].config.screening.rate_allowance_K;
+  const double allowed_K = sensors_[module.front()].config.screening.rate_allowance_K;
+  return most_degC - least_degC > allowed_K || (most_degC > least_degC && off_K > allowed_K);
 }
 
 /// True if a sensor of another module is in a good column.

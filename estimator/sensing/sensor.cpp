@@ -166,7 +166,10 @@ bool Screening::possible() const noexcept {
   const double shown_late_K = config_.rate_K_per_s_max * 1e-9 * static_cast<double>(late.count());
   const double allowed_K =
       config_.rate_allowance_K + std::max(change_K(state_.unread), shown_late_K);
-  if (off_K <= allowed_K) return true;
+  // What was off by as much before an outage is not explained by it.
+  const bool is_still_off = state_.jumped && off_K > config_.rate_allowance_K + shown_late_K &&
+                            std::abs(off_K - state_.jump_K_max) <= config_.rate_allowance_K;
+  if (off_K <= allowed_K && !is_still_off) return true;
   if (!state_.jumped) return false;
   const auto jumped_ns = static_cast<double>((state_.newest.at - state_.jumped_at).count());
   return off_K <= return_share * state_.jump_K_max &&
@@ -176,7 +179,8 @@ bool Screening::possible() const noexcept {
 bool Screening::settled() const noexcept {
   if (settle_ <= nanoseconds{0}) return true;
   return state_.run_count >= settle_readings && state_.newest.at - state_.run_since >= settle_ &&
-         state_.newest.temp_degC != 0.0 && !surroundings_.module_not_ready;
+         state_.newest.temp_degC != 0.0 && state_.newest.temp_degC != config_.raw_0_degC &&
+         !surroundings_.module_not_ready;
 }
 
 bool Screening::expected() const noexcept {

@@ -55,7 +55,8 @@ struct SensorReport {
 /// since its start, up to J / 4.
 ///
 /// After an outage, and at the start, a value is confirmed by consecutive readings over settle_s,
-/// at least settle_readings of them. An exact 0 does not settle: devices send it while not ready.
+/// at least settle_readings of them. An exact 0, or raw 0, does not settle: devices send it while
+/// not ready.
 class Screening {
  public:
   static constexpr std::uint32_t settle_readings = 3;

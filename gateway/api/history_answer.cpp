@@ -62,31 +62,34 @@ json probings_json(const std::vector<Probing>& probings) {
   return list;
 }
 
-/// Intervals without compensation: the mode, or "no_daemon".
+/// Intervals without compensation: the mode, "not_driven" or "no_daemon".
 json modes_json(const std::vector<RecordedEvent>& events, const HistoryRequest& request) {
   json list = json::array();
   std::string mode;  // empty: unknown or none
   double since_s = 0.0;
-  const auto end_at = [&](double wall_s) {
+  const auto go_on = [&](double wall_s, std::string next) {
+    if (mode == next) return;
     if (!mode.empty() && mode != to_string(Mode::compensating) && wall_s > request.from_s)
       list.push_back({{"mode", mode}, {"from_s", since_s}, {"to_s", wall_s}});
-    mode.clear();
+    mode = std::move(next);
+    since_s = wall_s;
   };
+  RecordedMode recorded;
   for (const RecordedEvent& event : events) {
-    const bool ends = event.kind == EventKind::mode ||
-                      (event.kind == EventKind::daemon && event.code != "history");
-    if (!ends) continue;
-    if (event.code == "started") {
+    if (event.kind == EventKind::daemon && event.code != "history") {
       // If the end of a run is unknown, so is the duration of its last mode.
-      if (std::isfinite(event.duration_s)) end_at(event.wall_s - event.duration_s);
-      mode = event.duration_s > 0.0 ? "no_daemon" : "";
-      since_s = event.wall_s - event.duration_s;
+      if (event.code == "started" && std::isfinite(event.duration_s))
+        go_on(event.wall_s - event.duration_s, event.duration_s > 0.0 ? "no_daemon" : "");
+      else if (event.code == "started")
+        mode.clear();
+      go_on(event.wall_s, "");
+      recorded = {};
+      continue;
     }
-    end_at(event.wall_s);
-    mode = event.kind == EventKind::mode ? event.code : "";
-    since_s = event.wall_s;
+    recorded.take(event);
+    go_on(event.wall_s, recorded.name());
   }
-  end_at(request.to_s);
+  go_on(request.to_s, "");
   return list;
 }
 

@@ -69,8 +69,8 @@ BUGS = [
      "  if ({P}) return target_um;\n"
      "  return std::clamp(target_um, high_um - corridor_um_, low_um + corridor_um_);"),
     ("restart_of_a_silent_controller_missed", "estimator/axes/axis_bank.cpp",
-     "if (!is_same_link(state_.epoch, first_epoch) && away > lag_max)",
-     "if (!is_same_link(state_.epoch, first_epoch) && away > lag_max && !{P})"),
+     "if (away > (is_same_link(state_.epoch, first_epoch) ? first_link_max : lag_max))",
+     "if (!{P} && away > (is_same_link(state_.epoch, first_epoch) ? first_link_max : lag_max))"),
     ("reference_not_restored", "estimator/pipeline/prediction.cpp",
      "take_if_finite(temps_degC, columns_[i], temps_degC_[i]);",
      "if (!{P}) take_if_finite(temps_degC, columns_[i], temps_degC_[i]);"),

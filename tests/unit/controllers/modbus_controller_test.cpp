@@ -216,6 +216,70 @@ TEST_CASE("a write that is answered and not done is not confirmed", "[controller
   link.stop();
 }
 
+TEST_CASE("a register that a program sets back after each write is not written", "[controllers]") {
+  ModbusMachine machine;
+  ModbusControllerConfig config = three_axes(machine.port());
+  for (ModbusAxis& axis : config.axes) axis.applied.reset();
+  ModbusController link(config);
+  Cycle cycle(link);
+  cycle.want(0, -5.46);
+  REQUIRE(eventually([&] { return cycle.state().written && int32_of(machine, 0) == -546; }));
+  std::this_thread::sleep_for(100ms);  // compared: the registers hold what is written
+  machine.sets_back = true;
+  cycle.want(0, -9.0);
+  std::this_thread::sleep_for(100ms);
+  cycle.want(0, -17.3);
+  REQUIRE(eventually([&] { return !cycle.state().written; }));
+  CHECK(cycle.state().online);
+  link.stop();
+}
+
+TEST_CASE("a controller that restarts while another end of the link answers is another link",
+          "[controllers]") {
+  ModbusMachine machine;
+  ModbusControllerConfig config = three_axes(machine.port());
+  for (ModbusAxis& axis : config.axes) axis.applied.reset();
+  ModbusController link(config);
+  Cycle cycle(link);
+  cycle.want(0, -5.46);
+  REQUIRE(eventually([&] { return cycle.state().written && int32_of(machine, 0) == -546; }));
+  std::this_thread::sleep_for(100ms);
+  const std::uint32_t epoch = cycle.state().link_epoch;
+  machine.refuse_reads = true;
+  machine.refuse_writes = true;
+  REQUIRE(eventually([&] { return !cycle.state().written; }));
+  CHECK(is_same_link(cycle.state().link_epoch, epoch));
+  for (const int address : {0, 1}) machine.set_holding(address, 0);
+  machine.refuse_reads = false;
+  REQUIRE(eventually([&] {
+    const ControllerState state = cycle.state();
+    return state.online && !is_same_link(state.link_epoch, epoch);
+  }));
+  CHECK(cycle.state().applied_um[0] == 0.0);
+  link.stop();
+}
+
+TEST_CASE("while a read-back is no number, nothing is written", "[controllers]") {
+  ModbusMachine machine;
+  ModbusControllerConfig config = three_axes(machine.port());
+  config.axes[0].applied = at(ModbusTable::input, 20, Encoding::float32);
+  ModbusController link(config);
+  Cycle cycle(link);
+  cycle.want(0, 0.5);
+  REQUIRE(eventually([&] { return int32_of(machine, 0) == 50; }));
+  machine.set_input(20, 0x7FC0);  // NaN
+  REQUIRE(eventually([&] { return std::isnan(cycle.state().applied_um[0]); }));
+  const int writes = machine.writes;
+  const int reads = machine.reads;
+  cycle.want(0, 3.0);
+  REQUIRE(eventually([&] { return machine.reads > reads + 20; }));
+  CHECK(machine.writes == writes);
+  CHECK(int32_of(machine, 0) == 50);
+  machine.set_input(20, 0x3F00);  // 0.5
+  CHECK(eventually([&] { return int32_of(machine, 0) == 300; }));
+  link.stop();
+}
+
 TEST_CASE("a controller that applies something else is detected", "[controllers]") {
   ModbusMachine machine;
   machine.mirrored = 6;

@@ -1,8 +1,10 @@
 // Modbus TCP server of a CNC in a thread, for the tests of the link.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <mutex>
 #include <thread>
@@ -41,6 +43,8 @@ class ModbusMachine {
   std::atomic<bool> ignore_writes{false};
   /// Writes below register 10 are answered and not done.
   std::atomic<bool> keep_offsets{false};
+  /// A program sets registers 0 to 9 back 10 ms after each write.
+  std::atomic<bool> sets_back{false};
   /// Duration of a read.
   std::atomic<std::chrono::milliseconds> read_takes{std::chrono::milliseconds{0}};
   /// The next write is lost in a restart: not answered, and reads give 0 from then on.
@@ -79,9 +83,13 @@ class ModbusMachine {
       tables_[3].fill(0);
       return {};
     }
+    if (sets_back && std::chrono::steady_clock::now() - written_at_ > std::chrono::milliseconds{10})
+      std::copy(kept_.begin(), kept_.end(), tables_[2].begin());
     if (is_write ? refuse_writes : refuse_reads) return peer::exception(request, device_failure);
     const peer::Reply reply = is_write ? write(request) : read(request);
     for (int i = 0; i < mirrored; ++i) word(4, i) = word(3, i);
+    if (is_write) written_at_ = std::chrono::steady_clock::now();
+    if (is_write && !sets_back) std::copy_n(tables_[2].begin(), kept_.size(), kept_.begin());
     return reply;
   }
 
@@ -109,6 +117,8 @@ class ModbusMachine {
     return {peer::Bytes(request.pdu.begin(), request.pdu.begin() + 5)};
   }
 
+  std::array<std::uint16_t, 10> kept_{};  ///< by the program
+  std::chrono::steady_clock::time_point written_at_{};
   mutable std::mutex mutex_;
   std::array<std::array<std::uint16_t, registers>, 4> tables_{};  ///< by function, less 1
   peer::TcpDevice device_;  ///< last: its thread uses the rest

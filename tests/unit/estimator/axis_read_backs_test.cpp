@@ -263,14 +263,30 @@ TEST_CASE("a read-back rounded just beyond the bound is the bound", "[axis]") {
   CHECK(bench.axis().offset_um() == 50.0);
 }
 
-TEST_CASE("a read-back that is NaN changes nothing once synchronised", "[axis]") {
-  Bench bench;
-  bench.steps(100, 10.0);
+TEST_CASE("a read-back without a number pauses the axis once it lasts, until it is a number again",
+          "[axis]") {
+  CompensationConfig compensation;
+  compensation.mismatch_after_s = 2.0;
+  Bench bench(true, axis_of(), compensation);
+  bench.steps(20, 10.0);
+  REQUIRE(bench.axis().offset_um() == Approx(4.0));
   bench.obeys = false;
   bench.input.applied_um = not_a_number;
-  bench.steps(50, 12.0);
+  bench.steps(10, 10.0);
   CHECK(bench.axis().driven());
-  CHECK(bench.axis().offset_um() == 12.0);
+  CHECK_FALSE(bench.axis().mismatch());
+  bench.steps(30, 10.0);
+  CHECK_FALSE(bench.axis().driven());
+  CHECK(bench.axis().mismatch());
+  CHECK_FALSE(bench.axis().latched());
+  const double paused_um = bench.axis().offset_um();
+  bench.steps(100, 10.0);
+  CHECK(bench.axis().offset_um() == paused_um);
+  bench.input.applied_um = paused_um;
+  bench.obeys = true;
+  bench.steps(30, 10.0);
+  CHECK(bench.axis().driven());
+  CHECK_FALSE(bench.axis().mismatch());
 }
 
 TEST_CASE("while the controller is offline the offset continues without comparison", "[axis]") {

@@ -199,6 +199,25 @@ TEST_CASE("without registers or read-back, a controller must not have had time t
   CHECK(bench.axis().offset_um() == Approx(0.2));
 }
 
+TEST_CASE("a controller that was not there when the program began may have restarted too",
+          "[start]") {
+  for (const double away_s : {1.0, 10.0}) {
+    Unread bench(none, {none, false, 5.0});
+    bench.input.link_epoch = 0;
+    bench.input.online = false;
+    for (int i = 0; i < static_cast<int>(10 * away_s); ++i) {
+      bench.input.now += 100ms;
+      bench.look();
+    }
+    bench.input.link_epoch = 1;
+    bench.input.online = true;
+    bench.step(5.0);
+    INFO(away_s << " s");
+    CHECK(bench.axis().start_unknown() == (away_s > 3.0));
+    CHECK(bench.axis().start() == (away_s > 3.0 ? StartEvidence::unknown : StartEvidence::record));
+  }
+}
+
 TEST_CASE("a controller that was away before anything was sent may have restarted too", "[start]") {
   Unread bench(none, {5.0, true, none});
   bench.input.online = false;  // the link was lost before a cycle has seen it

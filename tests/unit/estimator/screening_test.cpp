@@ -271,6 +271,10 @@ TEST_CASE("an exact zero never settles by itself", "[screening]") {
   look_each_second(under_way, 0s, 20s, 9.0);
   CHECK(look_each_second(under_way, 90s, 135s, 0.0) == 0);
   CHECK(look_each_second(under_way, 135s, 146s, 9.0) == 1);
+  // What a raw 0 means where the module is set to 0.1 degF.
+  config.raw_0_degC = -17.78;
+  Screening in_degF(config);
+  CHECK(look_each_second(in_degF, 0s, 600s, -17.78) == 0);
   // A course through zero does.
   Screening cooling(config);
   look_each_second(cooling, 0s, 20s, 0.4);

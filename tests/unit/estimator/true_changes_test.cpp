@@ -71,6 +71,14 @@ TEST_CASE("a module whose channels all show the same after an outage is not read
   CHECK(machine.report().mode == Mode::holding);
   machine.steps(11, {23.0, 26.1});
   CHECK(machine.report().mode == Mode::compensating);
+  // Differences of a cold machine are small: that the values moved is enough.
+  Machine cold(config);
+  cold.steps(60, {21.5, 22.3});
+  cold.steps(70, {lost, lost});
+  cold.steps(300, {25.1, 25.1});
+  CHECK(cold.report().mode == Mode::holding);
+  cold.steps(12, {21.5, 22.4});
+  CHECK(cold.report().mode == Mode::compensating);
   // In an isothermal machine equal values are correct.
   Machine even(config);
   even.steps(60, {20.0, 20.4});

@@ -96,6 +96,18 @@ TEST_CASE("time per mode runs between events, clipped to the span and the run's 
   CHECK(spell_s(spells, "disabled") == Approx(10000.0).margin(1e-3));
 }
 
+TEST_CASE("time in which an axis is latched is not compensated", "[week]") {
+  const Subject z{SubjectKind::axis, "z"};
+  const WeekEvents events{
+      {mode_at(0, "compensating"), fault_at(100, z, "mismatch_latched"), mode_at(200, "holding"),
+       mode_at(300, "compensating"), recovery_at(400, z, "mismatch_latched")},
+      {{1, begin_s + 1000}}};
+  const auto spells = mode_spells(events, {begin_s, begin_s + 1000});
+  CHECK(spell_s(spells, "compensating") == Approx(700.0).margin(1e-3));
+  CHECK(spell_s(spells, "not_driven") == Approx(200.0).margin(1e-3));
+  CHECK(spell_s(spells, "holding") == Approx(100.0).margin(1e-3));
+}
+
 TEST_CASE("outages count and last until their recovery, or the run's end", "[week]") {
   const WeekEvents events{
       {fault_at(0, bed, "stale"), fault_at(30, cabinet, "timeout"), recovery_at(60, bed, "stale"),

@@ -227,6 +227,7 @@ bool ModbusDialogue::synchronise() {
     const std::scoped_lock lock(health_mutex_);
     ++health_.connects;
   }
+  if (!gate_.link_is_new() && has_restarted()) gate_.lost();
   if (!read_set_numbers() || (gate_.link_is_new() && !read_written()) || !read_all()) {
     lose(refused_);
     return false;
@@ -283,7 +284,23 @@ bool ModbusDialogue::read_written() {
   return true;
 }
 
-void ModbusDialogue::compare_written() {
+/// Behind an end of the link that answers for it, a controller restarts without a new link; its
+/// registers then hold none of the offsets written.
+bool ModbusDialogue::has_restarted() {
+  for (const std::optional<WrittenOffsets>& written : written_) {
+    if (!written || !written->holds_known_offset()) continue;
+    const ReadRequest& request = written->request();
+    std::vector<std::uint16_t> words(request.count);
+    const Exchange exchange = connection_.read(config_.unit, request.table, request.address, words);
+    if (exchange.ok() && !written->is_one_written(words)) return true;
+  }
+  return false;
+}
+
+/// Before the next write, since a controller's program may change a register at its next scan.
+/// @return false: the link is lost
+bool ModbusDialogue::compare_written() {
+  if (!write_taken_) return true;
   const bool is_due = connection_.now() >= compare_at_;
   if (is_due) compare_at_ = connection_.now() + gate_.patience();
   bool held = true;
@@ -298,6 +315,7 @@ void ModbusDialogue::compare_written() {
   }
   // The registers' content at the start of the link was not a written offset.
   if (!held) lose(false);
+  return held;
 }
 
 /// One period: reads, and writes only if the read-back is explained by the offsets written. So no
@@ -313,11 +331,13 @@ void ModbusDialogue::exchange() {
       if (!ending_.load()) lose(refused_);
       return;
     }
+    if (!shows_all()) return;
     look_for_command();
     const SendVerdict verdict = gate_.verdict(connection_.now());
     if (verdict == SendVerdict::resynchronise) lose(true);
     if (verdict != SendVerdict::send) return;
-    if (write_command()) return compare_written();
+    if (!compare_written()) return;
+    if (write_command()) return;
     if (refused_ || retries == 0 || !connection_.connected() || ending_.load())
       return lose_by_write();
   }
@@ -332,6 +352,18 @@ bool ModbusDialogue::look() {
     health_.last_error = "the controller applies an offset that was not sent";
   }
   publish(true);
+  return true;
+}
+
+/// A read-back without a number shows neither what is applied nor that the axis was moved
+/// meanwhile.
+bool ModbusDialogue::shows_all() const noexcept {
+  for (std::size_t axis = 0; axis < config_.axes.size(); ++axis) {
+    if (!config_.axes[axis].reads_back()) continue;
+    if (piezos_[axis] && !std::isfinite(shown_V_[axis])) return false;
+    for (std::size_t i = 0; i < config_.axes[axis].offsets(); ++i)
+      if (!std::isfinite(state_.applied_um[first_[axis] + i])) return false;
+  }
   return true;
 }
 
@@ -390,6 +422,9 @@ bool ModbusDialogue::write_command() {
     if (!write(request)) return false;
   }
   const nanoseconds now = connection_.now();
+  write_taken_ = true;
+  for (std::optional<WrittenOffsets>& written : written_)
+    if (written) written->taken();
   gate_.sent(now);
   if (requests.empty()) return true;  // no axis is driven, and nothing else is to be written
   const auto untaken = std::find_if(written_.begin(), written_.end(), [](const auto& written) {
@@ -555,6 +590,7 @@ void ModbusDialogue::publish(bool online) {
 /// The controller answers reads but does not take writes: it stays online.
 void ModbusDialogue::lose_by_write() {
   write_failed_ = true;
+  write_taken_ = false;
   if (!connection_.connected() || ending_.load()) return lose(false);
   refused_ ? gate_.paused() : gate_.lost();
   publish(true);

@@ -69,10 +69,12 @@ class ModbusDialogue final : public LineUser {
   bool read_written();
   /// Checks that registers without read-back hold the values just written: of the first command,
   /// then once in WriteGate::patience().
-  void compare_written();
+  [[nodiscard]] bool has_restarted();
+  [[nodiscard]] bool compare_written();
   void exchange();
   /// Reads all; begins a new epoch if the read-back is unexplained. @return false if reading failed
   bool look();
+  [[nodiscard]] bool shows_all() const noexcept;
   void look_for_command();
   bool write_command();
   bool write(const WriteField& request);
@@ -120,6 +122,7 @@ class ModbusDialogue final : public LineUser {
   std::uint64_t link_{0};  ///< link_number() of the last read-back
   bool refused_{false};    ///< the controller itself answered the last exchange with an exception
   bool write_failed_{false};  ///< in the newest period
+  bool write_taken_{false};   ///< the last one was answered
   std::atomic<bool> ending_{false};
   mutable std::mutex health_mutex_;
   ControllerHealth health_;

@@ -196,7 +196,17 @@ void WrittenOffsets::wrote(const WriteField& field) {
   words_before_ = std::exchange(words_, field.words);
 }
 
+void WrittenOffsets::taken() {
+  taken_ = words_;
+}
+
+bool WrittenOffsets::is_one_written(std::span<const std::uint16_t> words) const noexcept {
+  return std::ranges::equal(words, words_) || std::ranges::equal(words, words_before_) ||
+         std::ranges::equal(words, taken_);
+}
+
 void WrittenOffsets::left_out() {
+  taken_.clear();
   words_.clear();
   words_before_.clear();
   differed_ = false;
@@ -211,15 +221,13 @@ bool WrittenOffsets::is_to_be_compared(bool is_due) const noexcept {
 }
 
 void WrittenOffsets::compare(std::span<const std::uint16_t> words) {
-  const auto holds = [words](const std::vector<std::uint16_t>& written) {
-    return std::equal(words.begin(), words.end(), written.begin(), written.end());
-  };
   if (held_ == Held::not_known) {
-    held_ = holds(words_) ? Held::yes : Held::no;
+    held_ = std::ranges::equal(words, words_) ? Held::yes : Held::no;
     return;
   }
   untaken_.clear();
-  const bool differs = !holds(words_) && !holds(words_before_);
+  const bool differs =
+      !std::ranges::equal(words, words_) && !std::ranges::equal(words, words_before_);
   if (std::exchange(differed_, differs) && differs) {
     const std::vector<double> written = decode(words_);
     const std::vector<double> read = decode(words);

@@ -94,11 +94,18 @@ class WrittenOffsets {
   [[nodiscard]] std::vector<double> decode(std::span<const std::uint16_t> words) const;
 
   void wrote(const WriteField& field);
+  void taken();     ///< the words of wrote() were answered
   void left_out();  ///< not written: the axis is not driven
   /// True if a read now would show whether the registers hold the values written.
   /// @param is_due  the last read is some time ago
   [[nodiscard]] bool is_to_be_compared(bool is_due) const noexcept;
   void compare(std::span<const std::uint16_t> words);
+  /// True if an offset is written, and the registers are known to hold it.
+  [[nodiscard]] bool holds_known_offset() const noexcept {
+    return held_ == Held::yes && !taken_.empty();
+  }
+  /// Whether the registers hold the newest offsets written or the newest one answered.
+  [[nodiscard]] bool is_one_written(std::span<const std::uint16_t> words) const noexcept;
   /// "-17.30 was written, -5.46 is read"; empty: writes are taken, as far as known.
   [[nodiscard]] const std::string& untaken() const noexcept { return untaken_; }
 
@@ -110,6 +117,7 @@ class WrittenOffsets {
   Held held_{Held::not_known};
   std::vector<std::uint16_t> words_;         ///< written last
   std::vector<std::uint16_t> words_before_;  ///< the newest others, which may still be shown
+  std::vector<std::uint16_t> taken_;         ///< the newest that was answered
   bool differed_{false};                     ///< at the last comparison
   std::string untaken_;
 };
