@@ -20,8 +20,9 @@ namespace {
 /// Options of files that a command writes.
 bool is_output(const CLI::Option& option) {
   constexpr std::array names{"output", "report", "json", "page", "picture", "vtu", "curves"};
-  return std::any_of(names.begin(), names.end(),
-                     [&](const char* name) { return option.check_lname(name); });
+  return option.check_sname("o") || std::any_of(names.begin(), names.end(), [&](const char* name) {
+           return option.check_lname(name);
+         });
 }
 
 /// `covariance` completes a model, `fit` one like another: they may write into it.
