@@ -1,11 +1,14 @@
 #include "daemon/controller_lock.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <filesystem>
 #include <fmt/format.h>
 #include <set>
 
+#include <netdb.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/sysmacros.h>
 #include <system_error>
@@ -24,6 +27,24 @@ std::string line_name(const ModbusTcp& tcp, int unit) {
     return fmt::format("controller at S7 {}:{} DB{}", lower_case(tcp.host), tcp.port, tcp.s7->db);
   return fmt::format("controller at Modbus TCP {}:{} unit {}", lower_case(tcp.host), tcp.port,
                      unit);
+}
+
+/// Addresses of a host, so that "plc" and "10.0.0.5" are one controller; none if they are not
+/// known.
+std::vector<std::string> addresses_of(const std::string& host) {
+  addrinfo hints{};
+  hints.ai_socktype = SOCK_STREAM;
+  addrinfo* first = nullptr;
+  if (getaddrinfo(host.c_str(), nullptr, &hints, &first) != 0) return {};
+  std::vector<std::string> addresses;
+  for (const addrinfo* each = first; each != nullptr; each = each->ai_next) {
+    std::array<char, NI_MAXHOST> text{};
+    if (getnameinfo(each->ai_addr, each->ai_addrlen, text.data(), text.size(), nullptr, 0,
+                    NI_NUMERICHOST) == 0)
+      addresses.emplace_back(text.data());
+  }
+  freeaddrinfo(first);
+  return addresses;
 }
 
 std::string line_name(const ModbusRtu& rtu, int) {
@@ -73,8 +94,19 @@ std::string controller_identity(const ControllerConfig& config) {
 }
 
 std::vector<NameLock> lock_controller(const ControllerConfig& config, bool dry_run) {
+  const std::vector<std::string> spelled = controller_names(config, dry_run);
+  std::set<std::string> names(spelled.begin(), spelled.end());
+  const auto* modbus = std::get_if<ModbusControllerConfig>(&config);
+  const auto* tcp = modbus == nullptr ? nullptr : std::get_if<ModbusTcp>(&modbus->line.link);
+  if (!names.empty() && tcp != nullptr) {
+    ModbusTcp same = *tcp;
+    for (const std::string& address : addresses_of(tcp->host)) {
+      same.host = address;
+      names.insert(line_name(same, modbus->unit));
+    }
+  }
   std::vector<NameLock> locks;
-  for (const std::string& name : controller_names(config, dry_run)) locks.emplace_back(name);
+  for (const std::string& name : names) locks.emplace_back(name);
   return locks;
 }
 

@@ -45,9 +45,14 @@ bool ProveCourse::reads_back() const noexcept {
   return std::isfinite(began_.read_um);
 }
 
+/// The offset goes the other way where `sign` is -1.
+double ProveCourse::expected_um() const noexcept {
+  return std::copysign(move_um_, farthest_.sent_um);
+}
+
 bool ProveCourse::went() const noexcept {
   const double went_um = reads_back() ? farthest_.read_um : farthest_.sent_um;
-  return std::abs(went_um - move_um_) <= tolerance_um_;
+  return std::abs(went_um - expected_um()) <= tolerance_um_;
 }
 
 bool ProveCourse::is_back() const noexcept {
@@ -76,9 +81,9 @@ std::string ProveCourse::verdict(const std::string& axis) const {
            "shows whether it moved\n";
   if (passed()) return name + "moved and came back: " + ends + "\n";
   std::string what = went() ? "moved, but did NOT come back: " : "did NOT move as commanded: ";
-  if (!went() && std::abs(farthest_.sent_um - move_um_) > tolerance_um_)
+  if (!went() && std::abs(farthest_.sent_um - expected_um()) > tolerance_um_)
     what = "was NOT moved all the way by the daemon (its bound, or it was ended): ";
-  else if (!went() && std::abs(farthest_.read_um + move_um_) <= tolerance_um_)
+  else if (!went() && std::abs(farthest_.read_um + expected_um()) <= tolerance_um_)
     what = "moved the OTHER way, as read back: ";
   return name + what + ends + "\n";
 }

@@ -33,6 +33,7 @@ class ProveCourse {
     double sent_um{0.0};
     double read_um{0.0};
   };
+  [[nodiscard]] double expected_um() const noexcept;
   [[nodiscard]] bool went() const noexcept;
 
   double move_um_;

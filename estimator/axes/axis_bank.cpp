@@ -79,7 +79,7 @@ double AxisBank::compensated_um(std::size_t axis) const noexcept {
 void AxisBank::prove(std::size_t axis, double move_um) noexcept {
   const AxisSpan span = span_of_[axis];
   if (!driven(span)) return;
-  for (std::size_t i = span.first; i < span.end(); ++i) axes_[i].prove(move_um);
+  for (std::size_t i = span.first; i < span.end(); ++i) axes_[i].prove(signs_[i] * move_um);
 }
 
 void AxisBank::release(std::size_t axis) noexcept {

@@ -318,7 +318,8 @@ class AxisBank {
   /// Offset in effect as a displacement [um]: read back, or as sent where nothing is read back.
   [[nodiscard]] double compensated_um(std::size_t axis) const noexcept;
 
-  /// Moves all nodes of a travel, or none.
+  /// Moves the tool by `move_um`, hence the offset by `sign` times that. All nodes of a travel, or
+  /// none.
   void prove(std::size_t axis, double move_um) noexcept;
   void release(std::size_t axis) noexcept;
   void end_proves() noexcept;

@@ -57,9 +57,11 @@ def test_the_same_state_file_is_refused(machine, other):
     assert daemon.status()["mode"] == "compensating"
 
 
-def test_the_same_controller_is_refused(machine, other):
+@pytest.mark.parametrize("host", ["127.0.0.1", "localhost"])
+def test_the_same_controller_is_refused(machine, other, host):
     daemon = machine.start()
-    change(other, (f"port = {other.controller.port}", f"port = {machine.controller.port}"))
+    change(other, (f"port = {other.controller.port}", f"port = {machine.controller.port}"),
+           ("127.0.0.1", host))
     seen = len(machine.controller.orders())
     assert_refused(other.daemon, daemon, "controller", str(machine.controller.port))
     assert len(machine.controller.orders()) >= seen

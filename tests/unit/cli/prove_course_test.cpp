@@ -18,7 +18,8 @@ json axis(double offset_um, const json& applied_um, bool proving) {
 TEST_CASE("a move there and back passes from any start", "[cli][prove]") {
   const double began_um = GENERATE(0.0, 12.5, -3.0);
   const double move_um = GENERATE(5.0, -5.0);
-  ProveCourse course(move_um, axis(began_um, began_um + 0.1, false));
+  const double sign = GENERATE(1.0, -1.0);  // of the axis
+  ProveCourse course(sign * move_um, axis(began_um, began_um + 0.1, false));
   course.take(axis(began_um + 0.5 * move_um, began_um + 0.4 * move_um, true));
   CHECK_FALSE(course.over());
   CHECK_THAT(course.progress(), Contains("sent ") && Contains("read back "));

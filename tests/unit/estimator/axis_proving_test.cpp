@@ -33,6 +33,21 @@ TEST_CASE("a proving move goes out and back and ends where it began", "[axis]") 
   CHECK(bench.axis().offset_um() == Approx(3.8));
 }
 
+TEST_CASE("a proving move is one of the tool: the offset goes by the axis' sign", "[axis]") {
+  AxisConfig axis = axis_of();
+  axis.sign = -1.0;
+  Bench bench(true, axis);
+  bench.step(0.0);
+  double least_um = 0.0;
+  bench.prove(6.0);
+  while (bench.axis().proving()) {
+    bench.step(0.0);
+    least_um = std::min(least_um, bench.axis().offset_um());
+  }
+  CHECK(least_um == -6.0);
+  CHECK(bench.axis().offset_um() == 0.0);
+}
+
 TEST_CASE("a proving move stays within the bound", "[axis]") {
   Bench bench(true, axis_of(5, 10));
   bench.steps(20, 4.0);
