@@ -196,8 +196,11 @@ class ControllerScan {
  private:
   static void mark_all(std::vector<RegisterPlace>& read, std::vector<RegisterPlace>& written,
                        const std::string& why) {
-    for (RegisterPlace& place : read) place.shown.why = why;
-    for (RegisterPlace& place : written) place.shown.why = why;
+    for (std::vector<RegisterPlace>* places : {&read, &written})
+      for (RegisterPlace& place : *places) {
+        place.shown.why = why;
+        place.shown.is_needed = true;  // only an answer excuses what is written and not read
+      }
   }
 
   Exchange ask(ModbusTable table, std::uint16_t address, std::span<std::uint16_t> words) {
@@ -277,6 +280,8 @@ class ControllerScan {
       take(exchange, place);
     else
       place.shown.why = why_not(exchange) + elsewhere(place, exchange);
+    if (!exchange.ok() && exchange.outcome != ExchangeOutcome::exception)
+      place.shown.is_needed = true;
   }
 
   /// Hint at another table that answers where this one is refused.

@@ -105,16 +105,22 @@ void append(std::string& text, const ScanController& controller, bool colours) {
   if (!controller.writes.empty()) text.append("    ").append(controller.writes).append("\n");
 }
 
-/// "9 of 11 values of the controller are present; missing: x_mm, heartbeat"
+/// "8 of 11 values of the controller are present; missing: x_mm, heartbeat; not known: offset of
+/// axis z"
 std::string controller_summary(const ScanController& controller) {
   std::string missing;
+  std::string unknown;
   std::size_t there = 0;
   for (const ScanValue& value : controller.values) {
-    if (value.is_missing()) missing += (missing.empty() ? "; missing: " : ", ") + value.what;
-    if (!value.is_missing()) ++there;
+    if (value.is_there())
+      ++there;
+    else if (value.is_missing())
+      missing += (missing.empty() ? "; missing: " : ", ") + value.what;
+    else
+      unknown += (unknown.empty() ? "; not known: " : ", ") + value.what;
   }
   return std::to_string(there) + " of " + std::to_string(controller.values.size()) +
-         " values of the controller are present" + missing + "\n";
+         " values of the controller are present" + missing + unknown + "\n";
 }
 
 ordered_json optional_number(const std::optional<double>& value) {

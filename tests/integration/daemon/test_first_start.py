@@ -188,7 +188,7 @@ def test_a_sensor_that_jumps_counts_only_once_an_operator_accepts_it(day):
     status, out, _ = daemon.cli("status")
     assert status == 1 and "accept column" in out, out
     assert "+48" in out, out
-    assert daemon.cli("accept", "spindle")[0] != 0
+    eventually(lambda: daemon.cli("accept", "spindle")[0] != 0, "nothing of the spindle waits")
     assert daemon.axis()["offset"] == before_um
 
     daemon.end()
