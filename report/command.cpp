@@ -41,9 +41,10 @@ void refuse_onto_input(const CLI::App& command) {
     for (const auto& [input, read] : files) {
       std::error_code error;
       if (is_output(*input) || may_be_replaced(command, *input)) continue;
-      const std::string file = read.substr(0, read.find('@'));  // a selection of rows
-      if (std::filesystem::equivalent(file, written, error) && !error)
-        throw Failure(written + ": is the input; the output must be another file");
+      const std::string file = read.substr(0, read.rfind('@'));  // a selection of rows
+      const bool is_input = std::filesystem::equivalent(read, written, error) ||
+                            std::filesystem::equivalent(file, written, error);
+      if (is_input) throw Failure(written + ": is the input; the output must be another file");
     }
   }
   for (const CLI::App* each : command.get_subcommands()) refuse_onto_input(*each);

@@ -39,8 +39,8 @@ std::optional<std::uint64_t> code_of(std::string_view field) {
   return error == std::errc() && at == end ? std::optional(code) : std::nullopt;
 }
 
-/// In words or, by the column's name, as a number. Of OPC 192 to 255 are good and numbers below 64
-/// bad, of OPC UA those from 0x80000000 on.
+/// Reads words or, with `codes`, a number: OPC calls 192 to 255 good and numbers below 64 bad, OPC
+/// UA calls numbers from 0x80000000 on bad.
 Quality quality_of(std::string_view field, Codes codes) {
   const std::string word = small_letters(field);
   if (word.starts_with("good") || word == "valid") return Quality::good;
@@ -124,7 +124,7 @@ void join_units(TextTable& table, const ColumnMap* map) {
 }
 
 std::string leave_bad_values_out(TextTable& table, const TimeColumns& time, const ColumnMap* map) {
-  std::vector<std::vector<bool>> bad(table.columns());  // of columns of qualities
+  std::vector<std::vector<bool>> bad(table.columns());  // empty: the column holds no qualities
   std::optional<bool> is_before;                        // whether a quality precedes its values
   std::string names;
   for (std::size_t i = 0; i < table.columns(); ++i) {

@@ -25,8 +25,8 @@ namespace thermocomp {
 /// °F".
 void join_units(TextTable& table, const ColumnMap* map);
 
-/// Empties the values that a column of qualities calls bad. It is for the columns between it and
-/// the quality before it or, where a quality is the first column, behind it.
+/// Empties the values that a column of qualities calls bad. Each such column judges the columns
+/// between it and the one before it or, where the first column holds qualities, those behind it.
 /// @return what was done; empty: the table has no qualities
 [[nodiscard]] std::string leave_bad_values_out(TextTable& table, const TimeColumns& time,
                                                const ColumnMap* map);

@@ -73,7 +73,7 @@ struct Candidates {
   std::vector<std::size_t> counting;  ///< numbers with a unit of time, or called time
 };
 
-/// Of several columns keeps the one called time, if there is exactly one.
+/// Removes the other columns if exactly one is called time.
 void keep_named(const TextTable& table, std::vector<std::size_t>& columns) {
   std::vector<std::size_t> named;
   for (const std::size_t column : columns)

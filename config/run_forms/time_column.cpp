@@ -324,7 +324,7 @@ class TimeReader {
 
   /// Refuses 8:00:00.3, 8:00:00.20: the fractions may be of a second, or counts of ms.
   bool counts_ms(const std::vector<TimeStamp>& stamps) {
-    int digits = 0;  // of the first row with a fraction
+    int digits = 0;  // digits in the first fraction
     const auto other = std::find_if(stamps.begin(), stamps.end(), [&](const TimeStamp& stamp) {
       if (digits == 0) digits = stamp.fraction_digits;
       return stamp.fraction_digits != 0 && stamp.fraction_digits != digits;

@@ -27,8 +27,8 @@ struct TimeStamp {
   double clock_b{0.0};
   double clock_c{0.0};
   int fraction_digits{0};
-  /// Of fewer digits than others, the fraction is a count of ms: it follows a colon, or ends in 0,
-  /// as "20".
+  /// The fraction may be a number of ms (8:00:00:3, 8:00:00.20) if other rows have other numbers of
+  /// digits: it follows a colon, or ends in 0.
   bool may_count_ms{false};
   std::optional<double> zone_s;  ///< east of Greenwich
   [[nodiscard]] bool is_midnight() const noexcept {

@@ -49,6 +49,11 @@ ModbusControllerConfig three_axes(int port) {
   return config;
 }
 
+ModbusControllerConfig without_read_back(ModbusControllerConfig config) {
+  for (ModbusAxis& axis : config.axes) axis.applied.reset();
+  return config;
+}
+
 }  // namespace
 
 TEST_CASE("offsets are written to the controller's registers with sign and scale",
@@ -167,9 +172,7 @@ TEST_CASE("without read-back the written registers give the start", "[controller
 TEST_CASE("registers that do not hold the values written give no start", "[controllers]") {
   ModbusMachine machine;
   machine.shows = ModbusMachine::Shows::zeros;
-  ModbusControllerConfig config = three_axes(machine.port());
-  for (ModbusAxis& axis : config.axes) axis.applied.reset();
-  ModbusController link(config);
+  ModbusController link(without_read_back(three_axes(machine.port())));
   Cycle cycle(link);
   REQUIRE(eventually([&] { return cycle.state().online; }));
   CHECK(cycle.state().applied_um[0] == 0.0);
@@ -187,9 +190,7 @@ TEST_CASE("registers that do not hold the values written give no start", "[contr
 
 TEST_CASE("a write that is answered and not done is not confirmed", "[controllers]") {
   ModbusMachine machine;
-  ModbusControllerConfig config = three_axes(machine.port());
-  for (ModbusAxis& axis : config.axes) axis.applied.reset();
-  ModbusController link(config);
+  ModbusController link(without_read_back(three_axes(machine.port())));
   Cycle cycle(link);
   cycle.want(1, -5.46);
   REQUIRE(eventually([&] { return cycle.state().written && int32_of(machine, 2) == -546; }));
@@ -218,9 +219,7 @@ TEST_CASE("a write that is answered and not done is not confirmed", "[controller
 
 TEST_CASE("a register that a program sets back after each write is not written", "[controllers]") {
   ModbusMachine machine;
-  ModbusControllerConfig config = three_axes(machine.port());
-  for (ModbusAxis& axis : config.axes) axis.applied.reset();
-  ModbusController link(config);
+  ModbusController link(without_read_back(three_axes(machine.port())));
   Cycle cycle(link);
   cycle.want(0, -5.46);
   REQUIRE(eventually([&] { return cycle.state().written && int32_of(machine, 0) == -546; }));
@@ -237,9 +236,7 @@ TEST_CASE("a register that a program sets back after each write is not written",
 TEST_CASE("a controller that restarts while another end of the link answers is another link",
           "[controllers]") {
   ModbusMachine machine;
-  ModbusControllerConfig config = three_axes(machine.port());
-  for (ModbusAxis& axis : config.axes) axis.applied.reset();
-  ModbusController link(config);
+  ModbusController link(without_read_back(three_axes(machine.port())));
   Cycle cycle(link);
   cycle.want(0, -5.46);
   REQUIRE(eventually([&] { return cycle.state().written && int32_of(machine, 0) == -546; }));
