@@ -190,13 +190,24 @@ void AxisChannel::move(const AxisInput& input) noexcept {
   state_.driven_at = input.now;
   state_.target_um = input.target_um;
   if (proving()) state_.target_um = prove_target_um(input.now);
-  // Without read-back the offset moves only while writes are confirmed: the first offset sent on a
-  // new link must be the one applied last.
-  const bool reaches = (input.online && input.written) || reads_back_;
-  if (input.may_change && state_.read_backs_awaited == 0 && reaches)
-    limiter_.step(in_corridor() ? within_corridor(state_.target_um) : state_.target_um, input.dt_s);
+  if (input.may_change) follow(input);
   if (in_corridor()) widen_corridor();
   check_.sent(input.now, limiter_.offset_um());
+}
+
+/// Without read-back the offset moves only while writes are confirmed: the first offset sent on a
+/// new link must be the one applied last. A controller that refuses an offset, as beyond a limit of
+/// its own, may take the one in effect: the offset goes back to it, no further, if the target is
+/// on that side.
+void AxisChannel::follow(const AxisInput& input) noexcept {
+  const bool is_refused = input.online && !input.written;
+  const bool reaches = (input.online && input.written) || reads_back_;
+  if (is_refused && std::isfinite(input.applied_um)) {
+    const auto [low_um, high_um] = std::minmax({limiter_.offset_um(), input.applied_um});
+    limiter_.step(std::clamp(state_.target_um, low_um, high_um), input.dt_s);
+  } else if (state_.read_backs_awaited == 0 && reaches) {
+    limiter_.step(in_corridor() ? within_corridor(state_.target_um) : state_.target_um, input.dt_s);
+  }
 }
 
 double AxisChannel::within_corridor(double target_um) noexcept {

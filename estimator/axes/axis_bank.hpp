@@ -256,6 +256,7 @@ class AxisChannel {
   void miss_read_back(const AxisInput& input) noexcept;
   void start_without_read_back(const AxisInput& input, nanoseconds away) noexcept;
   [[nodiscard]] bool can_be_ours(double register_um) const noexcept;
+  void follow(const AxisInput& input) noexcept;
   [[nodiscard]] double within_corridor(double target_um) noexcept;
   void widen_corridor() noexcept;
   void begin_corridor(StartEvidence by) noexcept;

@@ -225,7 +225,8 @@ void Estimator::step(nanoseconds now, std::span<const Reading> readings,
   const std::span<const double> compensated_um =
       stages.cycle_update.step(now, displacement, mode == Mode::compensating, temps, reference,
                                signals, stages.prediction.model(), stages.learned);
-  const Targets targets = stages.targets.step(mode, compensated_um, displacement, signals);
+  const Targets targets =
+      stages.targets.step(stages.mode.targeted(), compensated_um, displacement, signals);
   stages.axes.step(time, targets, signals.online, controller, command);
 
   last = {last.cycle + 1,

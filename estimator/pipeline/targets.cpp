@@ -16,8 +16,10 @@ ModeDecision::ModeDecision(const CompensationConfig& config)
 
 Mode ModeDecision::step(const ModeInput& input) noexcept {
   if (input.time.first) state_.lost_since = input.time.now;
-  const bool works = input.displacement_known && input.controller_online && input.axes_synced &&
-                     input.controller_written;
+  const bool works_if_written =
+      input.displacement_known && input.controller_online && input.axes_synced;
+  const bool works = works_if_written && input.controller_written;
+  only_unwritten_ = works_if_written && !works;
   if (works) {
     state_.ever_worked = true;
     state_.lost_since = input.time.now;

@@ -58,6 +58,11 @@ class ModeDecision {
   void enable(bool enabled) noexcept { state_.enabled = enabled; }
   void stop() noexcept { state_.stopping = true; }
   [[nodiscard]] const State& state() const noexcept { return state_; }
+  /// Mode for the targets: while an axis holds only because the controller takes no offset, it
+  /// still has a target, towards which it may move back (AxisChannel).
+  [[nodiscard]] Mode targeted() const noexcept {
+    return state_.mode == Mode::holding && only_unwritten_ ? Mode::compensating : state_.mode;
+  }
 
   void adopt(const ModeDecision& previous) noexcept { state_ = previous.state_; }
   void visit_state(StateArchive& archive) {
@@ -71,6 +76,7 @@ class ModeDecision {
   const bool gives_up_;  ///< on_loss = "ramp_to_zero"
   const nanoseconds hold_;
   State state_;
+  bool only_unwritten_{false};
 };
 
 /// Counts cycle ends from commands and from a signal of the controller.

@@ -82,6 +82,7 @@ class SegmentExport {
   void take_offsets();
   void take_command();
   void take_measured();
+  [[nodiscard]] double read_back_um(std::size_t axis) const;
   [[nodiscard]] double effect_um(std::size_t axis) const;
   void follow(std::uint64_t cycle);
   void give_up_following(const std::string& why);

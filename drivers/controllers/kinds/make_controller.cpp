@@ -5,7 +5,7 @@
 #include "drivers/bus_thread.hpp"
 #include "drivers/controllers/kinds/bridge_controller.hpp"
 #include "drivers/controllers/kinds/can/can_controller.hpp"
-#include "drivers/controllers/kinds/modbus/modbus_dialogue.hpp"
+#include "drivers/controllers/kinds/modbus/modbus_controller.hpp"
 #include "estimator/checks.hpp"
 
 namespace thermocomp {

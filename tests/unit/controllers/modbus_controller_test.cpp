@@ -1,4 +1,6 @@
 // The Modbus link against a libmodbus server.
+#include "drivers/controllers/kinds/modbus/modbus_controller.hpp"
+
 #include <chrono>
 #include <cmath>
 #include <memory>
@@ -8,7 +10,6 @@
 #include <catch2/catch.hpp>
 
 #include "cycle_stub.hpp"
-#include "drivers/controllers/kinds/modbus/modbus_dialogue.hpp"
 #include "estimator/checks.hpp"
 #include "modbus_machine.hpp"
 
@@ -201,6 +202,7 @@ TEST_CASE("a write that is answered and not done is not confirmed", "[controller
   cycle.want(1, -17.3);
   REQUIRE(eventually([&] { return !cycle.state().written; }));
   CHECK(cycle.state().online);
+  CHECK(cycle.state().applied_um[1] == Approx(-5.46));
   CHECK(link.health().last_error ==
         "writes are answered, but register 2 keeps another value: -17.30 was written, "
         "-5.46 is read");

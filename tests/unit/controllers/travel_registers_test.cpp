@@ -7,7 +7,7 @@
 #include <catch2/catch.hpp>
 
 #include "cycle_stub.hpp"
-#include "drivers/controllers/kinds/modbus/modbus_dialogue.hpp"
+#include "drivers/controllers/kinds/modbus/modbus_controller.hpp"
 #include "drivers/controllers/kinds/modbus/modbus_layout.hpp"
 #include "drivers/controllers/travel_values.hpp"
 #include "drivers/modbus/modbus_codec.hpp"

@@ -132,6 +132,31 @@ TEST_CASE("a probing is exported as displacement, without the offset in effect",
   CHECK(probed > 3);
 }
 
+TEST_CASE("without read-back a probing is exported without the offset sent, not the registers'",
+          "[history][export]") {
+  const TempFolder folder;
+  const HistoryConfig config = recorded_history(folder / "h.db", 20000, 0, 12);
+  std::ostringstream out;
+  export_run(config.file, {}, {}, out, {}, [](const SegmentSetup& setup) {
+    ReplaySetup unread = parse_test_setup(setup);
+    unread.estimator.controller_reads_back = false;
+    return unread;
+  });
+  const RunFile run = parse_run(out.str(), "export");
+  const auto applied = run.column("z_applied_um");
+  const auto offset = run.column("z_offset_um");
+  const auto message = run.column("z_measured_um");
+  const auto displacement = run.column("z_um");
+  std::size_t probed = 0;
+  for (std::size_t row = 0; row < run.rows(); ++row) {
+    CHECK(std::isnan(applied[row]));
+    if (std::isnan(displacement[row])) continue;
+    CHECK(std::abs(message[row] - offset[row] - displacement[row]) < 0.2);
+    ++probed;
+  }
+  CHECK(probed > 0);
+}
+
 TEST_CASE("the next commit writes events, by run, and keeps the newest", "[history][events]") {
   const TempFolder folder;
   HistoryConfig config = history_config(folder / "h.db");

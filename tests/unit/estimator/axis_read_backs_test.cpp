@@ -312,3 +312,19 @@ TEST_CASE("hold_while_cutting keeps the offset while cutting", "[axis]") {
   bench.step(9.0);
   CHECK(bench.axis().offset_um() == Approx(1.2));
 }
+
+TEST_CASE("a refused offset goes back to the one in effect, no further, if the target is there",
+          "[axis]") {
+  Bench bench(GENERATE(true, false));
+  bench.steps(50, -8.2);
+  bench.obeys = false;  // -8.2 is beyond the controller's own limit
+  bench.input.applied_um = -8.0;
+  bench.input.written = false;
+  bench.steps(20, -16.0);
+  CHECK(bench.axis().offset_um() == Approx(-8.2));
+  bench.steps(20, -4.0);
+  CHECK(bench.axis().offset_um() == Approx(-8.0));
+  bench.input.written = bench.obeys = true;
+  bench.steps(50, -4.0);
+  CHECK(bench.axis().offset_um() == Approx(-4.0));
+}

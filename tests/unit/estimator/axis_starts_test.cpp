@@ -266,6 +266,7 @@ TEST_CASE("without read-back an offset does not move while nothing can be sent",
   const double sent_um = bench.axis().offset_um();
   bench.input.online = GENERATE(false, true);
   bench.input.written = false;
+  bench.input.applied_um = GENERATE_COPY(sent_um, none);
   bench.steps(20, 0.0);  // on_loss = "ramp_to_zero", or writes are refused
   CHECK(bench.axis().offset_um() == sent_um);
   bench.input.online = bench.input.written = true;

@@ -37,70 +37,6 @@ std::uint64_t counts_of(Encoding encoding) noexcept {
   return std::uint64_t{1} << 53;
 }
 
-void check_place(const ModbusValue& value, const char* key) {
-  const std::size_t end = value.address + words_of(value.table, value.encoding);
-  require(end <= 65536, key, value.address, "the value must end within address 65535");
-  require(std::isfinite(value.scale) && value.scale != 0.0, key, value.scale,
-          "the scale must be finite and not 0");
-}
-
-void check_written(const ModbusValue& value, const char* key) {
-  check_place(value, key);
-  require(value.table == ModbusTable::holding || value.table == ModbusTable::data_block, key,
-          value.address, "only holding registers can be written");
-}
-
-void check_config(const ModbusControllerConfig& config) {
-  require(config.period_s > 0.0 && std::isfinite(config.period_s), "period_s", config.period_s,
-          "must be finite and more than 0");
-  require(config.unit >= 0 && config.unit <= 255, "unit", config.unit, "must be in [0, 255]");
-  require(config.offsets() <= axes_max, "axes", static_cast<double>(config.offsets()),
-          "a controller has at most 16 axes, nodes of travels counted");
-  std::vector<std::pair<std::size_t, std::size_t>> written;
-  const auto note = [&written](const ModbusValue& value, const char* key) {
-    check_written(value, key);
-    written.emplace_back(value.address, value.address + registers_of(value.encoding));
-  };
-  for (const ModbusAxis& axis : config.axes) {
-    if (axis.travel) {
-      check_travel(*axis.travel);
-      note(axis.travel->begin, "begin");
-      for (const ModbusValue& value : axis.travel->values) note(value, "values");
-      note(axis.travel->end, "end");
-      for (const ModbusValue& value : axis.travel->applied) check_place(value, "applied");
-      continue;
-    }
-    note(axis.offset, "offset");
-    if (axis.applied) check_place(*axis.applied, "applied");
-    if (axis.piezo) axis.piezo->validate();
-  }
-  for (const ModbusSignal& signal : config.signals) {
-    require(signal.signal < signals_max, "signal", static_cast<double>(signal.signal),
-            "a controller has at most 48 signals");
-    check_place(signal.value, "signal");
-  }
-  if (config.valid_bits) note(*config.valid_bits, "valid_bits");
-  if (config.heartbeat) note(*config.heartbeat, "heartbeat");
-  std::sort(written.begin(), written.end());
-  for (std::size_t i = 1; i < written.size(); ++i) {
-    require(written[i - 1].second <= written[i].first, "address",
-            static_cast<double>(written[i].first), "registers that are written must not overlap");
-  }
-}
-
-std::vector<double> applied_resolution_um(const ModbusControllerConfig& config) {
-  std::vector<double> steps_um;
-  for (const ModbusAxis& axis : config.axes) {
-    for (std::size_t node = 0; node < axis.offsets(); ++node) {
-      if (axis.travel)
-        steps_um.push_back(shown_resolution_um(*axis.travel, node));
-      else
-        steps_um.push_back(axis.applied ? std::abs(axis.applied->scale) : 0.0);
-    }
-  }
-  return steps_um;
-}
-
 bool drivable(const OffsetCommand& command, std::size_t axis) noexcept {
   return command.valid[axis] && std::isfinite(command.offset_um[axis]);
 }
@@ -119,7 +55,7 @@ WriteField field_of(const ModbusValue& place, WriteStage stage, double value,
 }  // namespace
 
 ModbusDialogue::ModbusDialogue(ModbusControllerConfig config, ModbusConnection& connection)
-    : config_((check_config(config), std::move(config))),
+    : config_((check_layout(config), std::move(config))),
       connection_(connection),
       gate_(from_seconds(config_.period_s), applied_resolution_um(config_)),
       next_exchange_at_(connection.now()),
@@ -275,24 +211,31 @@ bool ModbusDialogue::read_written() {
       }
       if (!exchange.ok()) words.clear();
     }
-    std::vector<double> written_um = written_[axis]->decode(words);
-    if (piezos_[axis]) written_um = {resting_um(*config_.axes[axis].piezo, written_um.front())};
-    std::copy(written_um.begin(), written_um.end(),
-              state_.applied_um.begin() + static_cast<std::ptrdiff_t>(first_[axis]));
+    show_written(axis, words);
   }
   written_asked_ = 0;
   return true;
 }
 
+void ModbusDialogue::show_written(std::size_t axis, std::span<const std::uint16_t> words) {
+  std::vector<double> written_um = written_[axis]->decode(words);
+  if (piezos_[axis]) written_um = {resting_um(*config_.axes[axis].piezo, written_um.front())};
+  std::copy(written_um.begin(), written_um.end(),
+            state_.applied_um.begin() + static_cast<std::ptrdiff_t>(first_[axis]));
+}
+
 /// Behind an end of the link that answers for it, a controller restarts without a new link; its
 /// registers then hold none of the offsets written.
 bool ModbusDialogue::has_restarted() {
-  for (const std::optional<WrittenOffsets>& written : written_) {
+  for (std::size_t axis = 0; axis < written_.size(); ++axis) {
+    const std::optional<WrittenOffsets>& written = written_[axis];
     if (!written || !written->holds_known_offset()) continue;
     const ReadRequest& request = written->request();
     std::vector<std::uint16_t> words(request.count);
     const Exchange exchange = connection_.read(config_.unit, request.table, request.address, words);
-    if (exchange.ok() && !written->is_one_written(words)) return true;
+    if (!exchange.ok()) continue;
+    if (!written->is_one_written(words)) return true;
+    show_written(axis, words);
   }
   return false;
 }
@@ -304,13 +247,15 @@ bool ModbusDialogue::compare_written() {
   const bool is_due = connection_.now() >= compare_at_;
   if (is_due) compare_at_ = connection_.now() + gate_.patience();
   bool held = true;
-  for (std::optional<WrittenOffsets>& written : written_) {
+  for (std::size_t axis = 0; axis < written_.size(); ++axis) {
+    std::optional<WrittenOffsets>& written = written_[axis];
     if (!written || !written->is_to_be_compared(is_due)) continue;
     const ReadRequest& request = written->request();
     std::vector<std::uint16_t> words(request.count);
     const Exchange exchange = connection_.read(config_.unit, request.table, request.address, words);
     if (!exchange.ok()) continue;
     written->compare(words);
+    show_written(axis, words);
     held = held && written->count();
   }
   // The registers' content at the start of the link was not a written offset.
@@ -604,31 +549,6 @@ void ModbusDialogue::lose(bool same_link) {
   publish(false);
   const std::scoped_lock lock(health_mutex_);
   health_.connected = false;
-}
-
-namespace {
-
-/// Time for the present exchange and the last write in stop().
-constexpr std::chrono::milliseconds stop_patience{600};
-
-}  // namespace
-
-ModbusController::ModbusController(const ModbusControllerConfig& config)
-    : name_(config.name),
-      line_(SharedLine::of(config.line)),
-      dialogue_(config, line_->connection()) {}
-
-ModbusController::~ModbusController() {
-  stop();
-}
-
-void ModbusController::start() {
-  line_->join(dialogue_, name_);
-}
-
-void ModbusController::stop() noexcept {
-  dialogue_.end_soon();
-  line_->leave(dialogue_, stop_patience);
 }
 
 }  // namespace thermocomp

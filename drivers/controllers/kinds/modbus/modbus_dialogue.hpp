@@ -33,8 +33,8 @@ namespace thermocomp {
 /// is never taken for a complete one.
 ///
 /// For an axis without read-back, a new link reads the written registers instead (WrittenOffsets):
-/// applied_um is their content then, NaN if they cannot be read. While they keep another value than
-/// those written, no write counts as confirmed.
+/// applied_um is their content when they were read last, NaN if they cannot be read. While they
+/// keep another value than those written, no write counts as confirmed.
 ///
 /// The register of an axis whose command is not valid is not written; its valid bit is 0. The
 /// heartbeat is incremented with every command written and wraps around. Valid bits and heartbeat
@@ -67,6 +67,7 @@ class ModbusDialogue final : public LineUser {
   bool read_set_numbers();
   /// Reads the written registers of axes without read-back. @return false to try again
   bool read_written();
+  void show_written(std::size_t axis, std::span<const std::uint16_t> words);
   /// Checks that registers without read-back hold the values just written: of the first command,
   /// then once in WriteGate::patience().
   [[nodiscard]] bool has_restarted();
@@ -126,27 +127,6 @@ class ModbusDialogue final : public LineUser {
   std::atomic<bool> ending_{false};
   mutable std::mutex health_mutex_;
   ControllerHealth health_;
-};
-
-/// Link to a controller over Modbus.
-class ModbusController final : public ControllerLink {
- public:
-  /// @throws InvalidValue for impossible values, DriverError for an impossible line
-  explicit ModbusController(const ModbusControllerConfig& config);
-  ~ModbusController() override;
-
-  void start() override;
-  void stop() noexcept override;
-  void newest(ControllerState& state) noexcept override { dialogue_.newest(state); }
-  void offer(const OffsetCommand& command) noexcept override {
-    dialogue_.offer(command, monotonic_now());
-  }
-  [[nodiscard]] ControllerHealth health() const override { return dialogue_.health(); }
-
- private:
-  std::string name_;
-  std::shared_ptr<SharedLine> line_;
-  ModbusDialogue dialogue_;
 };
 
 }  // namespace thermocomp

@@ -93,7 +93,10 @@ std::string write_error(const ModbusControllerConfig& config, const WriteField& 
                             exchange.exception_code == illegal_function;
   return begins + " (function " + std::to_string(config.write_function) + ", register " +
          std::to_string(request.address) + "): " + exchange.detail +
-         (may_take_one ? "; if it takes single registers only, write_function = 6" : "");
+         (may_take_one ? "; if it takes single registers only, write_function = 6" : "") +
+         (exchange.exception_code == illegal_value ? "; if the offset is beyond a limit of the "
+                                                     "controller, offset_um_max must be below it"
+                                                   : "");
 }
 
 namespace {
@@ -247,6 +250,74 @@ std::string untaken_error(const ModbusControllerConfig& config, const WrittenOff
          (s7 != nullptr ? s7_place(*s7, request.address, request.count)
                         : "register " + std::to_string(request.address)) +
          " keeps another value: " + written.untaken();
+}
+
+namespace {
+
+void check_place(const ModbusValue& value, const char* key) {
+  const std::size_t end = value.address + words_of(value.table, value.encoding);
+  require(end <= 65536, key, value.address, "the value must end within address 65535");
+  require(std::isfinite(value.scale) && value.scale != 0.0, key, value.scale,
+          "the scale must be finite and not 0");
+}
+
+void check_written(const ModbusValue& value, const char* key) {
+  check_place(value, key);
+  require(value.table == ModbusTable::holding || value.table == ModbusTable::data_block, key,
+          value.address, "only holding registers can be written");
+}
+
+}  // namespace
+
+void check_layout(const ModbusControllerConfig& config) {
+  require(config.period_s > 0.0 && std::isfinite(config.period_s), "period_s", config.period_s,
+          "must be finite and more than 0");
+  require(config.unit >= 0 && config.unit <= 255, "unit", config.unit, "must be in [0, 255]");
+  require(config.offsets() <= axes_max, "axes", static_cast<double>(config.offsets()),
+          "a controller has at most 16 axes, nodes of travels counted");
+  std::vector<std::pair<std::size_t, std::size_t>> written;
+  const auto note = [&written](const ModbusValue& value, const char* key) {
+    check_written(value, key);
+    written.emplace_back(value.address, value.address + registers_of(value.encoding));
+  };
+  for (const ModbusAxis& axis : config.axes) {
+    if (axis.travel) {
+      check_travel(*axis.travel);
+      note(axis.travel->begin, "begin");
+      for (const ModbusValue& value : axis.travel->values) note(value, "values");
+      note(axis.travel->end, "end");
+      for (const ModbusValue& value : axis.travel->applied) check_place(value, "applied");
+      continue;
+    }
+    note(axis.offset, "offset");
+    if (axis.applied) check_place(*axis.applied, "applied");
+    if (axis.piezo) axis.piezo->validate();
+  }
+  for (const ModbusSignal& signal : config.signals) {
+    require(signal.signal < signals_max, "signal", static_cast<double>(signal.signal),
+            "a controller has at most 48 signals");
+    check_place(signal.value, "signal");
+  }
+  if (config.valid_bits) note(*config.valid_bits, "valid_bits");
+  if (config.heartbeat) note(*config.heartbeat, "heartbeat");
+  std::sort(written.begin(), written.end());
+  for (std::size_t i = 1; i < written.size(); ++i) {
+    require(written[i - 1].second <= written[i].first, "address",
+            static_cast<double>(written[i].first), "registers that are written must not overlap");
+  }
+}
+
+std::vector<double> applied_resolution_um(const ModbusControllerConfig& config) {
+  std::vector<double> steps_um;
+  for (const ModbusAxis& axis : config.axes) {
+    for (std::size_t node = 0; node < axis.offsets(); ++node) {
+      if (axis.travel)
+        steps_um.push_back(shown_resolution_um(*axis.travel, node));
+      else
+        steps_um.push_back(axis.applied ? std::abs(axis.applied->scale) : 0.0);
+    }
+  }
+  return steps_um;
 }
 
 }  // namespace thermocomp

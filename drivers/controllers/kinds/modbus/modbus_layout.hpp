@@ -75,6 +75,12 @@ void check_travel(const ModbusTravel& travel);
 /// Number of set numbers before they wrap around.
 [[nodiscard]] std::uint64_t travel_numbers(const ModbusTravel& travel) noexcept;
 
+/// @throws InvalidValue for impossible values, and for registers that are written twice
+void check_layout(const ModbusControllerConfig& config);
+
+/// Step of each read-back, nodes of travels counted [um]; 0: not read back.
+[[nodiscard]] std::vector<double> applied_resolution_um(const ModbusControllerConfig& config);
+
 /// Change of a node's offset with one count of each value that shows it [um].
 [[nodiscard]] double shown_resolution_um(const ModbusTravel& travel, std::size_t node);
 
