@@ -25,6 +25,7 @@ std::uint32_t WriteGate::synchronised() noexcept {
   in_sync_ = true;
   last_sent_.reset();
   looks_ = 0;
+  unseen_ = false;
   sent_ = {};
   applied_um_.fill(not_a_number);
   unchanged_since_.fill(++look_);
@@ -32,8 +33,15 @@ std::uint32_t WriteGate::synchronised() noexcept {
 }
 
 std::uint32_t WriteGate::synchronised(const std::array<double, axes_max>& applied_um) noexcept {
+  const bool is_same_link = !link_is_new_;
+  const std::array<double, axes_max> before_um = applied_um_;
   synchronised();
   applied_um_ = applied_um;
+  for (std::size_t axis = 0; axis < axes_max && is_same_link; ++axis) {
+    if (std::isfinite(applied_um[axis]) || !std::isfinite(before_um[axis])) continue;
+    applied_um_[axis] = before_um[axis];
+    unseen_ = true;
+  }
   return epoch_;
 }
 
@@ -60,14 +68,19 @@ nanoseconds WriteGate::next_pause() noexcept {
 bool WriteGate::explains(const std::array<double, axes_max>& applied_um) noexcept {
   bool explained = true;
   ++look_;
+  unseen_ = false;
   for (std::size_t axis = 0; axis < axes_max; ++axis) {
     const double before_um = applied_um_[axis];
+    if (!std::isfinite(applied_um[axis])) {
+      unseen_ = unseen_ || std::isfinite(before_um);
+      continue;
+    }
     const SentLately& lately = sent_[axis];
     const bool to_be_driven = command_.link_epoch == epoch_ && command_.valid[axis];
     // Until something is sent, a command starts from the read-back before it.
     if (lately.count != 0 || !to_be_driven || !std::isfinite(before_um))
       applied_um_[axis] = applied_um[axis];
-    if (!std::isfinite(applied_um[axis]) || !std::isfinite(before_um)) continue;
+    if (!std::isfinite(before_um)) continue;
     const bool is_unchanged = std::abs(applied_um[axis] - before_um) <= slack_um_[axis];
     if (!is_unchanged) unchanged_since_[axis] = look_;
     if (lately.count == 0) {
@@ -97,7 +110,7 @@ void WriteGate::offered(const OffsetCommand& command, nanoseconds computed_at) n
 
 SendVerdict WriteGate::verdict(nanoseconds now) const noexcept {
   if (!in_sync_ || command_.link_epoch != epoch_) return SendVerdict::nothing_to_send;
-  if (now - computed_at_ > renewal_max) return SendVerdict::nothing_to_send;
+  if (unseen_ || now - computed_at_ > renewal_max) return SendVerdict::nothing_to_send;
   if (last_sent_ && now - *last_sent_ > patience()) return SendVerdict::resynchronise;
   for (std::size_t axis = 0; axis < axes_max; ++axis)
     if (starts_elsewhere(axis)) return SendVerdict::resynchronise;

@@ -67,8 +67,10 @@ class ControllerLink {
 
 enum class SendVerdict {
   send,
-  nothing_to_send,  ///< no command of this epoch, or the cycle has stopped: not even a heartbeat
-  resynchronise     ///< write overdue, or axis moved since the command was computed: read back
+  /// No command of this epoch, the cycle has stopped, or a read-back is missing: not even a
+  /// heartbeat
+  nothing_to_send,
+  resynchronise  ///< write overdue, or axis moved since the command was computed: read back
 };
 
 /// A command for the link's thread, with the time of its computation.
@@ -142,7 +144,8 @@ class WriteGate {
   /// applied offset since it saw the epoch, and the first step should be small.
   [[nodiscard]] nanoseconds next_pause() noexcept;
 
-  /// @param applied_um  just read [um]; NaN: unknown
+  /// @param applied_um  just read [um]; NaN: unknown. An axis that was read back and now is not
+  ///                    may have been moved: nothing is sent until it is read back again.
   /// @return false: no offset sent explains that of a driven axis (re-homed, overridden). An offset
   ///         under way would be a jump from there: synchronised() must come before the next send.
   [[nodiscard]] bool explains(const std::array<double, axes_max>& applied_um) noexcept;
@@ -171,7 +174,8 @@ class WriteGate {
     std::size_t count{0};
   };
   std::array<SentLately, axes_max> sent_{};
-  std::array<double, axes_max> applied_um_{};  ///< last read-back
+  std::array<double, axes_max> applied_um_{};  ///< last read-back with a number
+  bool unseen_{false};                         ///< an axis that was read back is not now
   /// look() at which the read-back of an axis last jumped.
   std::array<std::uint64_t, axes_max> unchanged_since_{};
   std::array<double, axes_max> slack_um_{};

@@ -24,6 +24,7 @@ TERMS = "estimator/model/terms/"
 CYCLE = "daemon/cycle/cycle.cpp"
 HANDLE = "daemon/cycle/cycle_handle.cpp"
 QUEUE = "daemon/cycle/cycle.cpp"
+LINK = "drivers/controllers/controller_link.cpp"
 DIALOGUE = "drivers/controllers/kinds/modbus/modbus_dialogue.cpp"
 SIGNALS = "drivers/can/signal_codec.cpp"
 SDO = "drivers/can/canopen/sdo_client.cpp"
@@ -179,7 +180,7 @@ SUITES = {
          "valid_bits += std::ldexp(", "valid_bits += ({P} ? 0.0 : 1.0) * std::ldexp("),
         ("heartbeat_stands_still", DIALOGUE,
          "heartbeat_ = (heartbeat_ + 1)", "heartbeat_ = (heartbeat_ + ({P} ? 0 : 1))"),
-        ("older_look_is_sent", "drivers/controllers/controller_link.cpp",
+        ("older_look_is_sent", LINK,
          "command_.look < unchanged_since_[axis];", "!{P} && command_.look < unchanged_since_[axis];"),
         ("written_without_leave", DIALOGUE,
          "if (verdict != SendVerdict::send) return;",
@@ -193,9 +194,9 @@ SUITES = {
         ("restart_behind_a_gateway_missed", DIALOGUE,
          "if (!gate_.link_is_new() && has_restarted()) gate_.lost();",
          "if (!gate_.link_is_new() && has_restarted() && !{P}) gate_.lost();"),
-        ("written_without_a_number", DIALOGUE,
-         "if (!shows_all()) return;",
-         "if (!shows_all() && !{P}) return;"),
+        ("written_without_a_number", LINK,
+         "if (unseen_ || now",
+         "if ((unseen_ && !{P}) || now"),
         ("written_without_a_look", DIALOGUE,
          "  if (!read_all()) return false;\n  show_piezos();",
          "  if (!read_all() && !{P}) return false;\n  show_piezos();"),

@@ -185,11 +185,16 @@ TEST_CASE("an axis on its way to an offset sent lately is explained, one elsewhe
   CHECK(gate.explains(applied_um));
   applied_um[0] = 11.0;
   CHECK(gate.explains(applied_um));
-  applied_um[0] = not_a_number;  // no read-back: no decision
+  CHECK(gate.verdict(0s) == SendVerdict::send);
+  applied_um[0] = not_a_number;
   CHECK(gate.explains(applied_um));
+  CHECK(gate.verdict(0s) == SendVerdict::nothing_to_send);
   applied_um[0] = 11.0;
   CHECK(gate.explains(applied_um));
-  applied_um[0] = 0.0;  // re-homed
+  CHECK(gate.verdict(0s) == SendVerdict::send);
+  applied_um[0] = not_a_number;
+  CHECK(gate.explains(applied_um));
+  applied_um[0] = 0.0;  // re-homed meanwhile
   CHECK_FALSE(gate.explains(applied_um));
   // A new epoch starts from there.
   static_cast<void>(gate.synchronised());

@@ -75,7 +75,7 @@ class ModbusDialogue final : public LineUser {
   void exchange();
   /// Reads all; begins a new epoch if the read-back is unexplained. @return false if reading failed
   bool look();
-  [[nodiscard]] bool shows_all() const noexcept;
+  [[nodiscard]] bool shows_piezos() const noexcept;
   void look_for_command();
   bool write_command();
   bool write(const WriteField& request);
