@@ -5,7 +5,9 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <functional>
 #include <string_view>
+#include <unordered_set>
 
 #include <system_error>
 
@@ -24,23 +26,66 @@ bool same_file(const std::string& a, const std::string& b) {
 }
 
 [[noreturn]] void refuse(const RunFile& run, const RunFile& other, const char* rule) {
-  // The other one is named only if it is the same file by another path.
+  // The other one is named only if it has another path.
   throw ConfigurationError(
       {Problem{run.name, 0, "", other.name == run.name ? "" : other.name, rule}});
+}
+
+/// Rows in succession with the same values in both runs are the same rows: two measurements agree
+/// in some of their rows, but not while the values change.
+constexpr std::size_t same_rows_min = 10;
+constexpr double same_share_min = 0.25;  ///< of the shorter run
+
+/// One number for each stretch of same_rows_min rows that differ from the row before.
+std::vector<std::size_t> stretches_of(const RunFile& run, const std::vector<std::string>& columns) {
+  const auto combine = [](std::size_t hash, std::size_t next) {
+    return hash * 0x9E3779B97F4A7C15U + next;
+  };
+  std::vector<std::size_t> rows;
+  for (std::size_t row = 0; row < run.rows(); ++row) {
+    std::size_t hash = 0;
+    for (const std::string& column : columns)
+      hash = combine(hash, std::hash<double>{}(run.column(column)[row]));
+    if (rows.empty() || rows.back() != hash) rows.push_back(hash);
+  }
+  std::vector<std::size_t> stretches;
+  for (std::size_t begin = 0; begin + same_rows_min <= rows.size(); ++begin) {
+    std::size_t hash = 0;
+    for (std::size_t row = begin; row < begin + same_rows_min; ++row)
+      hash = combine(hash, rows[row]);
+    stretches.push_back(hash);
+  }
+  return stretches;
+}
+
+/// A copy, or exports of one history that overlap.
+bool are_of_one_measurement(const RunFile& a, const RunFile& b) {
+  std::vector<std::string> columns;
+  for (const std::string& column : a.columns)
+    if (column != "time_s" && b.find(column)) columns.push_back(column);
+  const std::vector<std::size_t> first = stretches_of(a, columns);
+  const std::vector<std::size_t> second = stretches_of(b, columns);
+  const std::unordered_set<std::size_t> known(first.begin(), first.end());
+  const auto same = std::count_if(second.begin(), second.end(),
+                                  [&](std::size_t stretch) { return known.contains(stretch); });
+  const auto shorter = static_cast<double>(std::min(first.size(), second.size()));
+  return same > 0 && static_cast<double>(same) >= same_share_min * shorter;
 }
 
 }  // namespace
 
 bool share_rows(const RunFile& a, const RunFile& b) {
-  return same_file(a.name, b.name) &&
-         std::max(a.selected_begin, b.selected_begin) < std::min(a.selected_end, b.selected_end);
+  if (same_file(a.name, b.name))
+    return std::max(a.selected_begin, b.selected_begin) < std::min(a.selected_end, b.selected_end);
+  return are_of_one_measurement(a, b);
 }
 
 void refuse_overlap(std::span<const RunFile> runs) {
   for (std::size_t i = 0; i < runs.size(); ++i)
     for (std::size_t j = 0; j < i; ++j)
       if (share_rows(runs[i], runs[j]))
-        refuse(runs[i], runs[j], "is given twice: rows that are left out would be fitted");
+        refuse(runs[i], runs[j],
+               "is given twice, or has rows of the other: rows that are left out would be fitted");
 }
 
 void refuse_overlap(std::span<const RunFile> train, std::span<const RunFile> test) {

@@ -13,7 +13,8 @@
 
 namespace thermocomp {
 
-/// Whether both are of the same file (resolved path) and have a selected row in common.
+/// Whether both have a selected row of one file in common (by its resolved path), or a quarter of
+/// the shorter one is in the other: a copy, or exports of one history that overlap.
 [[nodiscard]] bool share_rows(const RunFile& a, const RunFile& b);
 
 /// Refuses common rows of runs that are left out in turn or judge one another.

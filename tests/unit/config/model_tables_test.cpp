@@ -145,6 +145,27 @@ TEST_CASE("the commented example of a bank of lags loads", "[config][model]") {
   CHECK(model.made_from->columns.size() == 3);
 }
 
+TEST_CASE("a copy, and an export that overlaps another, are of one measurement", "[config][run]") {
+  const auto course = [](int begin, int end, double shift_s, int seed) {
+    std::string text = "time_s,a_degC,z_um\n";
+    for (int row = begin; row < end; ++row)
+      text += std::to_string(row + shift_s) + "," + std::to_string(20.0 + 0.1 * (row / 2 + seed)) +
+              "," + std::to_string((row * 7 + seed) % 5) + "\n";
+    return text;
+  };
+  const auto run = [&](const char* name, int begin, int end, double shift_s, int seed = 0) {
+    return parse_run(course(begin, end, shift_s, seed), name);
+  };
+  const RunFile day = run("a.csv", 0, 100, 0.0);
+  CHECK(share_rows(day, run("copy.csv", 0, 100, 0.0)));
+  CHECK(share_rows(day, run("later.csv", 60, 200, -60.0)));
+  CHECK(share_rows(run("later.csv", 60, 200, -60.0), day));
+  CHECK_FALSE(share_rows(day, run("next.csv", 100, 200, 0.0)));
+  CHECK_FALSE(share_rows(day, run("other.csv", 0, 100, 0.0, 3)));
+  CHECK_THROWS_WITH(refuse_overlap(std::vector<RunFile>{day, run("copy.csv", 0, 100, 0.0)}),
+                    Catch::Contains("copy.csv") && Catch::Contains("a.csv"));
+}
+
 TEST_CASE("runs of the same file overlap if they have common rows", "[config][run]") {
   const std::string text = "time_s,a_degC\n0,1\n1,1\n2,1\n3,1\n";
   const auto run = [&](const char* name, double from_s, double to_s) {
