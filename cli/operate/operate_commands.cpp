@@ -49,6 +49,9 @@ int run_plain(const GlobalOptions& global, const PlainCommand& command) {
   std::cout << command.done;
   if (!checksum.empty()) std::cout << ", model SHA-256 " << checksum.substr(0, 16);
   std::cout << '\n';
+  if (flag_of(answer, "controller_disabled"))
+    std::cout << "The offsets stay at zero while the controller's own switch is off "
+                 "(disable_signal)\n";
   if (flag_of(answer, "dry_run"))
     std::cout << "DRY RUN: nothing is written to the controller. The switch outlives the dry run:\n"
                  "thermocomp disable before you end it, so that no axis moves unwatched\n";
@@ -158,7 +161,9 @@ void add_measured_command(CLI::App& app, const GlobalOptions& global, Action& ac
       "measured", "gives the daemon a displacement that was measured at the tool or on a part");
   const auto given = std::make_shared<MeasuredValue>();
   sub->add_option("AXIS", given->axis, "name of the axis in the configuration")->required();
-  sub->add_option("UM", given->value_um, "measured displacement in um, positive as the axis counts")
+  sub->add_option("UM", given->value_um,
+                  "measured displacement in um, positive where the tool moves in the axis' "
+                  "positive direction")
       ->required();
   sub->add_option(
          "--sd", given->sd_um,

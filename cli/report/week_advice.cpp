@@ -96,14 +96,13 @@ void add_reasons(const MachineWeek& week, std::vector<std::string>& lines) {
 }
 
 void add_devices(const MachineWeek& week, std::initializer_list<SubjectKind> kinds,
-                 std::vector<std::string>& lines) {
+                 const char* what_to_do, std::vector<std::string>& lines) {
   for (const Outages& outages : week.outages) {
     if (std::find(kinds.begin(), kinds.end(), outages.subject.kind) == kinds.end()) continue;
     const Outages::Kind all{outages.count, outages.lasted_s, outages.lasts};
     if (is_listed(all))
       lines.push_back(as_a_sentence(subject_text(outages.subject)) + ": " +
-                      what_text(outages.last) + ", " + how_often(all) +
-                      " Look at its cable, its supply and its address.");
+                      what_text(outages.last) + ", " + how_often(all) + what_to_do);
   }
 }
 
@@ -197,9 +196,13 @@ void add_axes(const MachineWeek& week, std::vector<std::string>& lines) {
 std::vector<std::string> advice(const MachineWeek& week) {
   std::vector<std::string> lines;
   add_reasons(week, lines);
-  add_devices(week, {SubjectKind::axis}, lines);
-  add_devices(week, {SubjectKind::controller, SubjectKind::controller_errors}, lines);
-  add_devices(week, {SubjectKind::bus, SubjectKind::bus_errors}, lines);
+  constexpr const char* to_device = " Look at its cable, its supply and its address.";
+  add_devices(week, {SubjectKind::axis},
+              " Compare the offset with the controller's read-back and remove the cause before "
+              "thermocomp release.",
+              lines);
+  add_devices(week, {SubjectKind::controller, SubjectKind::controller_errors}, to_device, lines);
+  add_devices(week, {SubjectKind::bus, SubjectKind::bus_errors}, to_device, lines);
   add_sensor_faults(week, lines);
   add_suspicions(week, lines);
   add_axes(week, lines);

@@ -80,6 +80,15 @@ bool share_rows(const RunFile& a, const RunFile& b) {
   return are_of_one_measurement(a, b);
 }
 
+bool is_made_from(std::span<const std::string> runs, const std::string& run) {
+  const RunSelection of = parse_selection(run);
+  return std::any_of(runs.begin(), runs.end(), [&](const std::string& each) {
+    const RunSelection known = parse_selection(each);
+    return known.file.filename() == of.file.filename() && known.from_s < of.to_s &&
+           of.from_s < known.to_s;
+  });
+}
+
 void refuse_overlap(std::span<const RunFile> runs) {
   for (std::size_t i = 0; i < runs.size(); ++i)
     for (std::size_t j = 0; j < i; ++j)

@@ -17,6 +17,10 @@ namespace thermocomp {
 /// the shorter one is in the other: a copy, or exports of one history that overlap.
 [[nodiscard]] bool share_rows(const RunFile& a, const RunFile& b);
 
+/// Whether a model was made from rows of the run, by name; folders are ignored.
+/// @param runs  MadeFrom::runs
+[[nodiscard]] bool is_made_from(std::span<const std::string> runs, const std::string& run);
+
 /// Refuses common rows of runs that are left out in turn or judge one another.
 /// @throws ConfigurationError naming the file
 void refuse_overlap(std::span<const RunFile> runs);

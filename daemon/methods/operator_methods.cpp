@@ -224,6 +224,7 @@ RpcPending prove(const DaemonActions& actions, const json& params) {
                 "a dry run writes nothing: no axis would move. Take dry_run out of [controller] "
                 "and restart first");
   const double most_um = view.config.estimator.compensation.prove_um_max;
+  refuse_unless(command.value_um != 0.0, "a proving move of 0 shows nothing");
   refuse_unless(
       std::abs(command.value_um) <= most_um,
       "a proving move is at most " + json(most_um).dump() + " um (compensation.prove_um_max)");
@@ -233,6 +234,8 @@ RpcPending prove(const DaemonActions& actions, const json& params) {
                 "the axis is being proved already");
   refuse_unless(!has_reason(view.report.reasons, Reason::cutting),
                 "not while the controller reports cutting");
+  refuse_unless(!has_reason(view.report.reasons, Reason::controller_disabled),
+                "not while the controller has switched the compensation off (disable_signal)");
   const double rate_um_per_s = view.config.estimator.axes[command.axis].limiter.rate_um_per_s_max;
   const double takes_s = 2.0 * std::abs(command.value_um) / rate_um_per_s +
                          view.config.estimator.compensation.prove_hold_s;
@@ -318,9 +321,12 @@ void add_operator_methods(StatusServer& server, const DaemonActions& actions) {
     add(name, [actions, kind](const json&) { return actions.command({kind, 0, 0.0}); });
   };
   add("enable", [actions](const json&) {
-    RpcPending pending = actions.command({CommandKind::enable, 0, 0.0});
-    if (!actions.view().config.dry_run) return pending;
-    return then(std::move(pending), [] { return json{{"done", true}, {"dry_run", true}}; });
+    const auto view = actions.view();
+    json answer{{"done", true}};
+    if (view.config.dry_run) answer["dry_run"] = true;
+    if (has_reason(view.report.reasons, Reason::controller_disabled))
+      answer["controller_disabled"] = true;
+    return then(actions.command({CommandKind::enable, 0, 0.0}), [answer] { return answer; });
   });
   simple("disable", CommandKind::disable);
   simple("cycle_end", CommandKind::cycle_end);

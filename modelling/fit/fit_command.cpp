@@ -142,6 +142,12 @@ int run_prior(const Options& options, const std::vector<RunFile>& runs, const Me
               const FitOptions& fit_options) {
   const series::Series prior =
       series::load_prior(options.prior, options.drift_percent / 100.0, options.years);
+  for (const RunFile& run : runs)
+    if (is_made_from(prior.runs, run.name))
+      std::fprintf(stderr,
+                   "warning: %s was fitted to a run called %s: if it is this one, its rows count "
+                   "twice, and the error with the prior is that of rows that it was fitted to\n",
+                   options.prior.c_str(), run.name.c_str());
   std::vector<std::string> notes;  // those of tests
   const series::Statistics machine =
       series::statistics_of(runs, "the machine", tests.outputs, prior.columns.taus_s, notes);

@@ -413,6 +413,7 @@ Series series_of_model(const ThermalModel& model, const std::string& file, doubl
     throw std::runtime_error(file + ": has no [made_from], so its error is unknown");
   Series series;
   series.machines = {file};
+  series.runs = model.made_from->runs;
   series.hours = model.made_from->hours;
   series.columns.taus_s = {0.0};
   for (const TermSpec& term : model.terms) {

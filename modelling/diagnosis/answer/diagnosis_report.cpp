@@ -67,18 +67,6 @@ std::vector<std::size_t> places_shown(const Diagnosis& diagnosis, const Measured
   return shown;
 }
 
-/// Whether the model was made from rows of the run; folders are ignored.
-bool is_of_the_model(const ThermalModel& model, const std::string& run) {
-  if (!model.made_from) return false;
-  const RunSelection of = parse_selection(run);
-  return std::any_of(model.made_from->runs.begin(), model.made_from->runs.end(),
-                     [&](const std::string& each) {
-                       const RunSelection known = parse_selection(each);
-                       return known.file.filename() == of.file.filename() &&
-                              known.from_s < of.to_s && of.from_s < known.to_s;
-                     });
-}
-
 }  // namespace
 
 void add_runs(ReportData& report, const Diagnosis& diagnosis, const MeasuredData& data,
@@ -93,7 +81,7 @@ void add_runs(ReportData& report, const Diagnosis& diagnosis, const MeasuredData
     const MeasuredRun& run = data.runs[i];
     const Eigen::Index rows = run.rows() - run.begin;
     ReportRun added{run.name, test, run.time_s.tail(rows), phases_of(run, data)};
-    added.of_the_model = is_of_the_model(data.model, run.name);
+    added.of_the_model = data.model.made_from && is_made_from(data.model.made_from->runs, run.name);
     for (const Column& measured : run.measured_um)
       added.measured_um.emplace_back(measured.tail(rows));
     for (const Column& signal : run.signals) added.signals.emplace_back(signal.tail(rows));
