@@ -21,7 +21,7 @@ RISE_K_PER_S = 0.05
 RATE_UM_PER_S_MAX = 1.5
 STALE_AFTER_S = 1.0
 SILENT_AFTER_S = 0.5
-# Limit of docs/operating.md. Not asserted, since a shared machine may stall for longer.
+# Aim of docs/measurements.md. Not asserted, since a shared machine may stall for longer.
 RECOVERED_WITHIN_S = 2.0
 ENOUGH_FRAMES = 50
 BUS_OFF, RESTARTED = 0x40, 0x100
