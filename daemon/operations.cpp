@@ -299,8 +299,7 @@ void Operations::carried_out(const Command& done) {
 void Operations::note_reference(const PersistentState& state, ReferenceOrigin origin) {
   if (state.reference_degC == parts_.reference_before_degC) return;
   parts_.reference_before_degC = state.reference_degC;
-  const std::chrono::duration<double> wall = std::chrono::system_clock::now().time_since_epoch();
-  parts_.keeper.note_reference({wall.count(), origin});
+  parts_.keeper.note_reference({wall_now_s(), origin});
 }
 
 void Operations::note_asked(const Command& asked, const CycleHandle::Tracked& outcome) {
@@ -335,6 +334,8 @@ void Operations::save_state(bool at_once) {
   note_reference(state, ReferenceOrigin::first_values);
   if (const auto& candidate = parts_.cycle.parts().candidate) candidate->add_to(state.correction);
   state.controller = controller_identity(parts_.config.controller);
+  state.good.wall_s = wall_now_s();
+  state.good.config = parts_.config.checksum;
   if (parts_.config.dry_run) {
     // A dry run sends nothing: the saved offsets stay valid.
     const PersistentState& before = parts_.keeper.on_disk().state;

@@ -19,6 +19,7 @@
 #include <sys/signalfd.h>
 
 #include "daemon/cycle/real_time_thread.hpp"
+#include "daemon/state/state_file.hpp"
 #include "daemon/system/log_setup.hpp"
 #include "status/figures.hpp"
 
@@ -245,27 +246,26 @@ StatusView Supervisor::view() {
   std::vector<FrozenModule> frozen;
   for (const auto& [module, same_s] : frozen_modules_.frozen_s())
     frozen.push_back({module, same_s});
-  StatusView view{
-      parts_.config,
-      parts_.cycle.report(),
-      parts_.cycle.controller(),
-      parts_.cycle.timing(),
-      buses_,
-      controller_health_,
-      statistics,
-      std::move(all),
-      std::move(frozen),
-      std::chrono::duration<double>(Clock::now() - started_).count(),
-      real_time_,
-      parts_.server.statistics(),
-      parts_.journal.ended_within(recent, recent_max),
-      &trend_,
-      &warm_up_,
-      &since_probing_,
-      parts_.keeper.reference(),
-      parts_.keeper.is_reference_lost(),
-      std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count(),
-      std::chrono::duration<double>(Clock::now() - idle_until_).count()};
+  StatusView view{parts_.config,
+                  parts_.cycle.report(),
+                  parts_.cycle.controller(),
+                  parts_.cycle.timing(),
+                  buses_,
+                  controller_health_,
+                  statistics,
+                  std::move(all),
+                  std::move(frozen),
+                  std::chrono::duration<double>(Clock::now() - started_).count(),
+                  real_time_,
+                  parts_.server.statistics(),
+                  parts_.journal.ended_within(recent, recent_max),
+                  &trend_,
+                  &warm_up_,
+                  &since_probing_,
+                  parts_.keeper.reference(),
+                  parts_.keeper.is_reference_lost(),
+                  wall_now_s(),
+                  std::chrono::duration<double>(Clock::now() - idle_until_).count()};
   if (const auto& candidate = parts_.cycle.parts().candidate) view.contest = &candidate->score();
   return view;
 }

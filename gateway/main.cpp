@@ -13,6 +13,7 @@
 #include <vector>
 
 #include <nlohmann/json.hpp>
+#include <spdlog/async.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/sinks/systemd_sink.h>
 #include <spdlog/spdlog.h>
@@ -81,6 +82,7 @@ class Gateway {
     if (shdr_) ready["shdr"] = shdr_->port();
     return ready.dump();
   }
+  [[nodiscard]] bool follows() const { return feed_.follows(); }
   /// Called every second.
   void tick() {
     if (http_) http_->end_slow_connections();
@@ -104,7 +106,7 @@ class Gateway {
       return alarm;
     };
     std::vector<AlarmChange> changes =
-        alarms_.update(now_s, active_conditions(snapshot), snapshot.is_here);
+        alarms_.update(now_s, active_conditions(snapshot), is_judged(snapshot));
     if (changes.empty() && alarms_published_) return;
     std::vector<Alarm> active = alarms_.active();
     for (Alarm& alarm : active) alarm = with_time_of_day(alarm);
@@ -155,7 +157,7 @@ void run_gateway(const GatewaySettings& settings) {
   for (;;) {
     if (sigtimedwait(&signals, nullptr, &second) > 0) break;
     gateway.tick();
-    sd_notify(0, "WATCHDOG=1");
+    if (gateway.follows()) sd_notify(0, "WATCHDOG=1");
   }
   sd_notify(0, "STOPPING=1");
   spdlog::info("stopped on request");
@@ -163,17 +165,19 @@ void run_gateway(const GatewaySettings& settings) {
   end_within(end_max);
 }
 
-/// Logs to the journal under systemd, else to standard error.
+/// Logs to the journal under systemd, else to standard error, from a thread of its own: a pipe that
+/// nobody reads must not stop the feed.
 void set_up_log(const std::string& level) {
+  constexpr std::size_t lines_max = 1024;
   const char* name = "thermocomp-gateway";
-  std::shared_ptr<spdlog::logger> logger;
+  spdlog::init_thread_pool(lines_max, 1);
+  spdlog::sink_ptr sink;
   if (std::getenv("JOURNAL_STREAM") != nullptr)
-    logger = std::make_shared<spdlog::logger>(
-        name, std::make_shared<spdlog::sinks::systemd_sink_mt>(name));
+    sink = std::make_shared<spdlog::sinks::systemd_sink_mt>(name);
   else
-    logger = std::make_shared<spdlog::logger>(
-        name, std::make_shared<spdlog::sinks::stderr_color_sink_mt>());
-  spdlog::set_default_logger(logger);
+    sink = std::make_shared<spdlog::sinks::stderr_color_sink_mt>();
+  spdlog::set_default_logger(std::make_shared<spdlog::async_logger>(
+      name, sink, spdlog::thread_pool(), spdlog::async_overflow_policy::overrun_oldest));
   spdlog::set_level(spdlog::level::from_str(level));
 }
 

@@ -35,6 +35,20 @@ std::vector<WallSpan> recorded_spans(const std::vector<SegmentInfo>& segments) {
   return spans;
 }
 
+/// Between them lies time without a daemon, or time that the clock passed over when it was set.
+std::vector<WallSpan> merged(std::vector<WallSpan> spans) {
+  std::sort(spans.begin(), spans.end(),
+            [](const WallSpan& a, const WallSpan& b) { return a.from_s < b.from_s; });
+  std::vector<WallSpan> joined;
+  for (const WallSpan& span : spans) {
+    if (!joined.empty() && span.from_s - joined.back().to_s < apart_s)
+      joined.back().to_s = std::max(joined.back().to_s, span.to_s);
+    else
+      joined.push_back(span);
+  }
+  return joined;
+}
+
 const std::vector<double>* column_of(const ThinnedHistory& course, const std::string& name) {
   for (const ThinnedColumn& column : course.columns)
     if (column.name == name) return &column.values;
@@ -419,8 +433,7 @@ MachineWeek machine_week(const std::filesystem::path& history, const WallSpan& s
   week.damage = reader.damage();
   WeekEvents events{read_events(history), {}};
   for (const SegmentInfo& segment : reader.segments()) {
-    double& end = events.run_ends_s[segment.run];
-    end = std::max(end, end_s(segment));
+    events.run_ends_s[segment.run] = end_s(segment);  // the last one's, however the clock was set
   }
   const auto points = static_cast<std::size_t>(
       std::clamp(span.length_s() / point_s_min, 60.0, static_cast<double>(points_max)));
@@ -428,7 +441,11 @@ MachineWeek machine_week(const std::filesystem::path& history, const WallSpan& s
   week.modes = daemon_pauses(events, recorded_spans(reader.segments()), span);
   week.recorded_s = span.length_s();
   for (const ModeSpell& pause : week.modes) week.recorded_s -= pause.span.length_s();
-  for (ModeSpell& spell : mode_spells(events, span)) week.modes.push_back(std::move(spell));
+  const std::vector<WallSpan> recorded = merged(recorded_spans(reader.segments()));
+  for (const ModeSpell& spell : mode_spells(events, span))
+    for (const WallSpan& there : recorded)
+      if (const WallSpan part = spell.span.within(there); part.length_s() > 0.0)
+        week.modes.push_back({part, spell.mode});
   week.outages = outages_of(events, span);
   week.sensors = sensors_of(week.course);
   const Setups setups(reader, parser, week.damage);

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cstdio>
+#include <ctime>
 #include <memory>
 #include <string>
 
@@ -10,6 +11,7 @@
 #include "cli/report/week_page.hpp"
 #include "daemon/history/format/history_time.hpp"
 #include "report/files.hpp"
+#include "status/figures.hpp"
 
 namespace thermocomp::cli {
 namespace {
@@ -45,6 +47,13 @@ int run_report(const ReportOptions& options) {
   if (!(span.to_s > span.from_s)) throw Failure("--from must be before --to");
   if (!(span.within(recorded).length_s() > 0.0))
     throw Failure(options.history + ": nothing was recorded in this period");
+  constexpr double worth_saying_s = 3600.0;
+  const double silent_s = static_cast<double>(std::time(nullptr)) - recorded.to_s;
+  if (options.to.empty() && silent_s > worth_saying_s)
+    std::fprintf(stderr,
+                 "the page ends with the last record, %s ago; --to \"1 min ago\" counts the time "
+                 "since then, in which no daemon ran\n",
+                 duration_text(silent_s).c_str());
   MachineWeek week = machine_week(options.history, span);
   week.machine = options.machine;
   cli::write_file(options.output, week_html(week));

@@ -38,6 +38,11 @@ enum class ReferenceOrigin : std::uint8_t {
   return "";
 }
 
+/// Seconds since 1970 by the wall clock, which may be wrong or set.
+[[nodiscard]] inline double wall_now_s() {
+  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
 /// Time and origin of the reference; informative only.
 struct ReferenceRecord {
   double wall_s{not_a_number};  ///< seconds since 1970, by the clock at that time; NaN: unknown

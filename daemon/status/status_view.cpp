@@ -246,8 +246,10 @@ ControllerStatus controller_of(const StatusView& view) {
                           .write = write_of(view)};
   // While it is online, the text is one of Status::warnings.
   if (!status.online && status.last_error.empty()) status.last_error = slow_link_text(view);
+  const bool is_absent = has_reason(view.report.reasons, Reason::controller_offline);
   for (std::size_t i = 0; i < view.config.estimator.signals.size(); ++i)
-    status.signals[view.config.estimator.signals[i]] = view.controller.signals[i];
+    status.signals[view.config.estimator.signals[i]] =
+        is_absent ? not_a_number : view.controller.signals[i];
   if (health.shown_um) {
     status.shown.emplace();
     for (std::size_t i = 0; i < view.config.estimator.axes.size(); ++i)

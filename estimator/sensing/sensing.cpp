@@ -107,9 +107,7 @@ bool Sensing::all_good() const noexcept {
   return std::all_of(good.begin(), good.end(), [](std::uint8_t each) { return each != 0; });
 }
 
-void Sensing::restore(const std::map<std::string, double>& temps_degC,
-                      const std::map<std::string, double>& jumped_from_degC) {
-  for (const auto& [sensor, from_degC] : jumped_from_degC) blocks_.restore_jump(sensor, from_degC);
+void Sensing::restore(const std::map<std::string, double>& temps_degC) {
   for (std::size_t i = 0; i < columns_.size(); ++i) {
     double temp_degC = not_a_number;
     take_if_finite(temps_degC, columns_[i], temp_degC);
@@ -279,7 +277,7 @@ bool BlockBank::is_not_ready(const std::vector<std::size_t>& module) const noexc
   for (const std::size_t i : module) {
     const Screening& screening = sensors_[i].screening;
     if (screening.usable(now_)) return false;
-    if (!screening.waiting()) continue;  // a fault of its own, such as an open circuit
+    if (!screening.shows_unconfirmed()) continue;  // a fault of its own, such as an open circuit
     if (std::isnan(shown_degC)) shown_degC = screening.newest_degC();
     if (screening.newest_degC() != shown_degC) return false;
     if (!screening.has_good()) continue;
@@ -298,9 +296,9 @@ bool BlockBank::has_other_witness(std::size_t module) const noexcept {
   return false;
 }
 
-void BlockBank::restore_jump(const std::string& name, double from_degC) {
+void BlockBank::restore(const std::string& name, double good_degC, nanoseconds unread) {
   for (Sensor& sensor : sensors_)
-    if (sensor.config.name == name) sensor.screening.restore_jump(from_degC);
+    if (sensor.config.name == name) sensor.screening.restore(good_degC, unread);
 }
 
 bool BlockBank::accept(std::size_t index) noexcept {

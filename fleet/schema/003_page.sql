@@ -29,7 +29,9 @@ CREATE FUNCTION fleet.page_machines() RETURNS json LANGUAGE sql STABLE AS $$
       WHEN departs THEN 'departs from its sisters'
       WHEN abs(remainder_um) > 3 * claimed_um THEN 'probed further off than claimed'
       WHEN outside_days >= 3 THEN 'often outside of its model'
+      WHEN newest IS NULL OR newest < now() - interval '1 day' THEN 'records nothing'
       WHEN departs IS NULL THEN 'not compared yet'
+      WHEN night < current_date - 2 THEN 'not compared lately'
       ELSE 'as its sisters' END AS verdict
     FROM shown)
   SELECT coalesce(json_agg(json_build_object('name', name, 'type', type, 'hall', hall, 'verdict', verdict,

@@ -58,6 +58,9 @@ int add(const std::string& conninfo, const NewMachine& machine, const fs::path& 
   return cli::exit_success;
 }
 
+/// A night is computed in the morning after it.
+constexpr int night_days_max = 2;
+
 /// "3 min", "2 d"; NULL: "never".
 std::string age_text(const pqxx::field& age_s) {
   if (age_s.is_null()) return "never";
@@ -78,6 +81,9 @@ std::string age_text(const pqxx::field& age_s) {
 
 std::string uplink_text(const pqxx::row& row) {
   std::string text = age_text(row["seen_s"]);
+  constexpr double day_s = 86400.0;
+  if (row["newest_s"].as<double>(0.0) > day_s)
+    text.append(", newest row ").append(age_text(row["newest_s"]));
   const auto count = [&](const char* column, const char* what) {
     const auto number = row[column].as<std::uint64_t>(0);
     if (number > 0) text.append(", ").append(std::to_string(number)).append(" ").append(what);
@@ -96,6 +102,7 @@ std::string night_text(const pqxx::row& row) {
   if (state == "failed") return text.append(" failed: ").append(row["error"].c_str());
   if (state == "empty") return text.append(" no probings");
   if (row["departs"].is_null()) return text.append(" no series yet");
+  if (row["night_days"].as<int>(0) > night_days_max) text.append(" (old)");
   text.append(row["departs"].as<bool>() ? " DEPARTS" : " like its sisters");
   return text.append(", p ").append(row["probability"].c_str());
 }
@@ -116,21 +123,26 @@ void print_releases(pqxx::read_transaction& work) {
                 row[4].c_str());
 }
 
-/// @return exit status 1: a machine departs, a night failed, or an uplink was not seen for a day
+/// @return exit status 1: a machine departs, a night failed or is more than two days old, an uplink
+///         was not seen for a day, or nothing was recorded in a day
 int status(const std::string& conninfo) {
   pqxx::connection store = open_store(conninfo);
   pqxx::read_transaction work(store);
   bool is_well = true;
   std::printf("%-16s %-12s %-12s %-44s %s\n", "machine", "type", "hall", "uplink", "newest night");
   for (const pqxx::row& row :
-       work.exec("SELECT *, extract(epoch FROM now() - seen) AS seen_s FROM fleet.machine_state"
+       work.exec("SELECT *, extract(epoch FROM now() - seen) AS seen_s,"
+                 " extract(epoch FROM now() - newest) AS newest_s,"
+                 " current_date - night AS night_days FROM fleet.machine_state"
                  " ORDER BY type, hall, name")) {
     std::printf("%-16s %-12s %-12s %-44s %s\n", row["name"].c_str(), row["type"].c_str(),
                 row["hall"].c_str(), uplink_text(row).c_str(), night_text(row).c_str());
     constexpr double day_s = 86400.0;
     is_well = is_well && !row["departs"].as<bool>(false) &&
               std::string(row["night_state"].as<std::string>("")) != "failed" &&
-              row["seen_s"].as<double>(2 * day_s) < day_s;
+              row["seen_s"].as<double>(2 * day_s) < day_s &&
+              row["newest_s"].as<double>(2 * day_s) < day_s &&
+              row["night_days"].as<int>(0) <= night_days_max;
   }
   print_releases(work);
   return is_well ? cli::exit_success : cli::exit_no;
@@ -143,11 +155,19 @@ struct LoadOptions {
   std::string model;
 };
 
+/// Whether the column is measured displacement: of an export, not the offsets of each row nor the
+/// values as entered.
+bool is_probed(const std::string& column) {
+  return is_output(column) && !column.ends_with("_offset_um") && !column.ends_with("_applied_um") &&
+         !column.ends_with("_measured_um");
+}
+
 /// Means over 10 s of a run file; each measured displacement is a probing.
 MeansBatch batch_of(const RunFile& run, std::int64_t begin_ns) {
   MeansBatch batch;
   for (const std::string& column : run.columns)
-    if (column != "time_s" && !is_output(column)) batch.columns.push_back(column);
+    if (column != "time_s" && !is_probed(column) && !column.ends_with("_measured_um"))
+      batch.columns.push_back(column);
   constexpr double ns_per_s = 1e9;
   std::vector<int> counts;
   for (std::size_t row = run.selected_begin; row < run.selected_end; ++row) {
@@ -164,7 +184,7 @@ MeansBatch batch_of(const RunFile& run, std::int64_t begin_ns) {
       mean = counts[i]++ == 0 ? value : mean + (value - mean) / static_cast<float>(counts[i]);
     }
     for (const std::string& column : run.columns) {
-      const double value_um = is_output(column) ? run.column(column)[row] : not_a_number;
+      const double value_um = is_probed(column) ? run.column(column)[row] : not_a_number;
       if (std::isnan(value_um)) continue;
       batch.probings.push_back({.output = column,
                                 .wall_ns = wall_ns,
@@ -241,8 +261,10 @@ void add_store_commands(CLI::App& app, const std::string& store, cli::Action& ac
                                                 "lists machines with last contact, result of the "
                                                 "newest night, and releases in progress");
   status_command->footer(
-      "Exit status: 0 no problem; 1 a machine departs, a night failed, or an uplink was silent for "
-      "a day; 2 usage error, or the store is unreachable.");
+      "Exit status: 0 no problem; 1 a machine departs, its night failed or is older than two days, "
+      "or "
+      "its uplink was silent or sent no new row for a day; 2 usage error, or the store is "
+      "unreachable.");
   status_command->callback([&] { action = [&store] { return status(store); }; });
 }
 

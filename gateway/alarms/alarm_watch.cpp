@@ -1,5 +1,6 @@
 #include "gateway/alarms/alarm_watch.hpp"
 
+#include <algorithm>
 #include <set>
 
 #include "status/codes.hpp"
@@ -9,11 +10,22 @@
 namespace thermocomp::gateway {
 namespace {
 
+/// Values are confirmed and the link is made within this, with the default settle_s.
+constexpr double beginning_s = 60.0;
+
+/// Normal at start-up, while the values are not yet valid for long enough.
+bool begins(const Status& status) {
+  double settle_s = 0.0;
+  for (const Confirmation& values : status.confirming)
+    settle_s = std::max(settle_s, values.settle_s);
+  return status.mode == Mode::starting && status.sensors_bad.empty() &&
+         !(status.mode_since_s > std::max(beginning_s, 2.0 * settle_s));
+}
+
 void add_compensation(const Status& status, std::vector<AlarmCondition>& wrong) {
   const Verdict now = verdict(status);
   if (now.compensating) return;
-  // Normal at start-up, while the values are not yet valid for long enough.
-  if (status.mode == Mode::starting && status.sensors_bad.empty()) return;
+  if (begins(status)) return;
   // A dry run that computes is intended and may last for days.
   if (status.dry_run && status.mode == Mode::compensating) return;
   AlarmCondition condition{"compensation", "compensating: " + verdict_text(now), ""};
@@ -86,6 +98,10 @@ std::vector<AlarmCondition> active_conditions(const Snapshot& snapshot) {
   if (status.model.outside.value_or(false))
     wrong.push_back({"domain", std::string(domain.meaning), std::string(domain.remedy)});
   return wrong;
+}
+
+bool is_judged(const Snapshot& snapshot) {
+  return snapshot.is_here && !begins(snapshot.status);
 }
 
 std::vector<AlarmChange> AlarmWatch::update(double now_s, const std::vector<AlarmCondition>& wrong,

@@ -21,6 +21,9 @@ struct AlarmCondition {
 /// Conditions present in a snapshot. While the daemon is away: that condition only.
 [[nodiscard]] std::vector<AlarmCondition> active_conditions(const Snapshot& snapshot);
 
+/// False while the daemon is away or begins: an alarm raised before is neither over nor not.
+[[nodiscard]] bool is_judged(const Snapshot& snapshot);
+
 struct Alarm {
   AlarmCondition condition;
   double since_s{0.0};  ///< on the clock of update()

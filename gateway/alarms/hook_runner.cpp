@@ -69,7 +69,9 @@ pid_t spawn(const std::vector<std::string>& command, std::vector<std::string> en
 
 struct HookRunner::Parts {
   explicit Parts(const GatewaySettings& settings_in)
-      : settings(settings_in), limit(settings_in.alarm.per_hour_max) {}
+      : settings(settings_in),
+        limit(settings_in.alarm.per_hour_max),
+        limit_of_loss(settings_in.alarm.per_hour_max) {}
 
   void run();
   void begin(const AlarmChange& change);
@@ -78,7 +80,8 @@ struct HookRunner::Parts {
 
   const GatewaySettings& settings;
   HookLimit limit;
-  std::size_t dropped{0};  ///< since the limit was reached
+  HookLimit limit_of_loss;  ///< a flapping bus must not use up what tells of the compensation's end
+  std::size_t dropped{0};   ///< since the limit was reached
   std::mutex mutex;
   std::condition_variable changed;
   std::deque<AlarmChange> waiting;
@@ -110,7 +113,9 @@ std::vector<std::string> HookRunner::Parts::environment(const AlarmChange& chang
 }
 
 void HookRunner::Parts::begin(const AlarmChange& change) {
-  if (!limit.take(std::chrono::duration<double>(Clock::now().time_since_epoch()).count())) {
+  const std::string& name = change.alarm.condition.name;
+  HookLimit& budget = name == "compensation" || name == "daemon" ? limit_of_loss : limit;
+  if (!budget.take(std::chrono::duration<double>(Clock::now().time_since_epoch()).count())) {
     if (dropped++ == 0)
       spdlog::warn("alarm commands: more than {} in an hour; dropped until the limit allows more",
                    settings.alarm.per_hour_max);

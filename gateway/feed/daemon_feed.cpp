@@ -80,8 +80,9 @@ struct DaemonFeed::Parts {
   std::mutex stop_mutex;
   std::condition_variable stop_changed;
 
-  mutable std::mutex mutex;  ///< guards newest
+  mutable std::mutex mutex;  ///< guards the next two
   SnapshotPointer newest{std::make_shared<Snapshot>()};
+  Clock::time_point newest_at{Clock::now()};
 
   // Feed's thread only.
   Snapshot next;
@@ -208,6 +209,7 @@ void DaemonFeed::Parts::publish() {
   {
     const std::lock_guard lock(mutex);
     newest = made;
+    newest_at = Clock::now();
   }
   for (const Listener& listener : listeners) listener(made);
 }
@@ -252,8 +254,21 @@ void DaemonFeed::stop() noexcept {
 }
 
 SnapshotPointer DaemonFeed::newest() const {
+  SnapshotPointer newest;
+  {
+    const std::lock_guard lock(parts_->mutex);
+    newest = parts_->newest;
+  }
+  if (!newest->is_here || follows()) return newest;
+  Snapshot away = *newest;
+  away.is_here = false;
+  away.why = "the gateway does not follow it any more";
+  return std::make_shared<const Snapshot>(std::move(away));
+}
+
+bool DaemonFeed::follows() const {
   const std::lock_guard lock(parts_->mutex);
-  return parts_->newest;
+  return Clock::now() - parts_->newest_at < follows_within;
 }
 
 std::filesystem::path DaemonFeed::history_file() const {

@@ -1,6 +1,7 @@
 /// Follows the daemon over its status socket on its own thread, and reconnects.
 #pragma once
 
+#include <chrono>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -26,7 +27,11 @@ class DaemonFeed {
   void start();
   void stop() noexcept;
 
+  /// The daemon counts as away if there was no snapshot for follows_within.
   [[nodiscard]] SnapshotPointer newest() const;
+  /// False if the feed's thread stands still.
+  [[nodiscard]] bool follows() const;
+  static constexpr std::chrono::seconds follows_within{4};
   /// History file from the configuration, else from the daemon; empty: unknown.
   [[nodiscard]] std::filesystem::path history_file() const;
 

@@ -26,6 +26,7 @@ using std::chrono::milliseconds;
 constexpr int keepalive_s = 10;
 constexpr int quality = 1;
 constexpr int unacknowledged_max = 20;
+constexpr double status_every_s = 30.0;
 constexpr milliseconds again_after_min(1000);
 constexpr milliseconds again_after_max(30000);
 
@@ -58,6 +59,7 @@ struct MqttPublisher::Parts {
   void run();
   void send_waiting();
   void publish_offline();
+  void retire(const std::vector<TopicState>& present, const Snapshot& snapshot);
   void sleep(milliseconds time) const;
 
   const GatewaySettings& settings;
@@ -66,10 +68,11 @@ struct MqttPublisher::Parts {
   std::atomic<bool> stops{false};
   std::atomic<bool> is_connected{false};
 
-  mutable std::mutex mutex;  ///< guards the next three
+  mutable std::mutex mutex;  ///< guards the next four
   MessageBuffer buffer;
   std::map<std::string, nlohmann::json> last_state;  ///< last state, by topic
   double published_at_s{0.0};
+  double status_at_s{0.0};
 
   // Publisher's thread only.
   int unacknowledged{0};
@@ -196,9 +199,32 @@ MqttPublisher::MqttPublisher(const GatewaySettings& settings)
 }
 MqttPublisher::~MqttPublisher() = default;
 
+/// A broker keeps the newest of each topic: while the daemon is away nothing is known of sensors
+/// and axes, and of one that is gone nothing stays.
+void MqttPublisher::Parts::retire(const std::vector<TopicState>& present,
+                                  const Snapshot& snapshot) {
+  static const nlohmann::json unknown = {{"known", false}};
+  const auto is_present = [&](const std::string& topic) {
+    return std::any_of(present.begin(), present.end(),
+                       [&](const TopicState& each) { return each.topic == topic; });
+  };
+  std::erase_if(last_state, [&](auto& last) {
+    auto& [topic, state] = last;
+    if (is_present(topic)) return false;
+    if (snapshot.is_here) {
+      buffer.push({topic, ""});  // clears it at the broker
+    } else if (state != unknown) {
+      buffer.push({topic, payload_of(unknown, snapshot.wall_s)});
+      state = unknown;
+    }
+    return snapshot.is_here;
+  });
+}
+
 void MqttPublisher::show(const SnapshotPointer& snapshot) {
   std::vector<TopicState> states = topic_states(*snapshot, parts_->settings.machine);
   const std::lock_guard lock(parts_->mutex);
+  parts_->retire(states, *snapshot);
   constexpr double early_s = 0.1;  // tolerance of the snapshots' period
   const double passed_s = snapshot->wall_s - parts_->published_at_s;
   const bool is_due = !(passed_s >= 0.0 && passed_s < parts_->settings.mqtt.period_s - early_s);
@@ -207,7 +233,12 @@ void MqttPublisher::show(const SnapshotPointer& snapshot) {
     // The status (first) is sent at once, the others once per period.
     if (i > 0 && !is_due) return;
     nlohmann::json& last_state = parts_->last_state[states[i].topic];
-    if (last_state == states[i].state) continue;
+    // A broker keeps the newest status for as long as it likes: its time must show that it is old.
+    const double status_age_s = snapshot->wall_s - parts_->status_at_s;
+    const bool repeats = i == 0 && parts_->is_connected &&
+                         !(status_age_s >= 0.0 && status_age_s < status_every_s - early_s);
+    if (last_state == states[i].state && !repeats) continue;
+    if (i == 0) parts_->status_at_s = snapshot->wall_s;
     parts_->buffer.push({states[i].topic, payload_of(states[i].state, snapshot->wall_s)});
     last_state = std::move(states[i].state);
   }

@@ -76,8 +76,12 @@ Database::Database(const std::filesystem::path& file, DatabaseMode mode) : file_
   const int flags = SQLITE_OPEN_NOMUTEX | SQLITE_OPEN_URI |
                     (read_only ? SQLITE_OPEN_READONLY : SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
   int code = sqlite3_open_v2(real.c_str(), &handle_, flags, nullptr);
-  if (code == SQLITE_OK && read_only && !can_read(handle_) &&
-      sqlite3_errcode(handle_) == SQLITE_CANTOPEN &&
+  // On a read-only mount, or without the right to write the folder, SQLite cannot make its files.
+  const auto is_for_lack_of_files = [this] {
+    const int error = sqlite3_errcode(handle_);
+    return error == SQLITE_CANTOPEN || error == SQLITE_READONLY;
+  };
+  if (code == SQLITE_OK && read_only && !can_read(handle_) && is_for_lack_of_files() &&
       !std::filesystem::exists(real.string() + "-wal")) {
     sqlite3_close(handle_);
     handle_ = nullptr;

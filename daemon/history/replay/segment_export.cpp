@@ -136,12 +136,13 @@ void SegmentExport::fill(std::vector<double>& row, std::uint64_t cycle) {
   for (std::size_t i = 0; i < places_.sensors.size(); ++i)
     if (places_.sensors[i] != none) row[places_.sensors[i]] = good_value(inputs_.readings[i]);
   write_faults();
+  const bool is_read = reads_controller(cycle);
   for (std::size_t i = 0; i < places_.signals.size(); ++i)
-    row[places_.signals[i]] = inputs_.controller.signals[i];
+    row[places_.signals[i]] = is_read ? inputs_.controller.signals[i] : not_a_number;
   for (std::size_t i = 0; i < places_.offsets.size(); ++i) {
     row[places_.offsets[i]] = offset_um_[i];
     // The offset shown in a dry run was not applied.
-    row[places_.applied[i]] = dry_run_ ? not_a_number : read_back_um(i);
+    row[places_.applied[i]] = dry_run_ ? not_a_number : read_back_um(i, cycle);
     row[places_.measured[i]] = measured_um_[i];
     if (places_.displacement[i] != none) row[places_.displacement[i]] = displacement_um_[i];
   }
@@ -274,9 +275,19 @@ void SegmentExport::take_measured() {
                        .source = command.source});
 }
 
-/// NaN without read-back: the registers' content, which the record has then, can be an older offset.
-double SegmentExport::read_back_um(std::size_t axis) const {
-  return config_.controller_reads_back ? inputs_.controller.applied_um[axis] : not_a_number;
+/// As in the cycle: what an absent controller reported last is not what it does now.
+bool SegmentExport::reads_controller(std::uint64_t cycle) const {
+  const ControllerState& controller = inputs_.controller;
+  const double age_s = to_seconds(segment_.grid.time_of(cycle) - controller.taken_at);
+  return controller.online && age_s <= config_.compensation.controller_stale_after_s;
+}
+
+/// NaN without read-back: the registers' content, which the record has then, can be an older
+/// offset.
+double SegmentExport::read_back_um(std::size_t axis, std::uint64_t cycle) const {
+  return config_.controller_reads_back && reads_controller(cycle)
+             ? inputs_.controller.applied_um[axis]
+             : not_a_number;
 }
 
 /// Offset in effect; with nodes, interpolated at the slide's position.
@@ -284,7 +295,7 @@ double SegmentExport::effect_um(std::size_t axis) const {
   const AxisSpan span = span_of(config_.axes, axis);
   std::array<double, axes_max> nodes_um{};
   for (std::size_t i = 0; i < span.count; ++i) {
-    const double applied_um = read_back_um(span.first + i);
+    const double applied_um = read_back_um(span.first + i, record_.cycle);
     nodes_um[i] = std::isfinite(applied_um) ? applied_um : offset_um_[span.first + i];
   }
   if (span.count == 1) return nodes_um[0];

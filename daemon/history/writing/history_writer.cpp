@@ -4,6 +4,7 @@
 #include <array>
 #include <atomic>
 #include <condition_variable>
+#include <cstdlib>
 #include <iterator>
 #include <mutex>
 #include <optional>
@@ -54,8 +55,12 @@ struct OpenSegment {
   std::int64_t chunk_through{-1};  ///< ... at the last chunk
   std::int64_t next_chunk{0};
   std::uint64_t bytes{0};
+  std::int64_t wall_minus_monotonic_ns{0};  ///< at its begin
   ChunkEncoder encoder;
 };
+
+/// More than a clock that is slewed drifts in a segment's time.
+constexpr std::int64_t clock_set_ns = 30'000'000'000;
 
 struct KnownSession {
   std::shared_ptr<RecordingSession> session;
@@ -190,6 +195,7 @@ void HistoryWriter::Parts::begin_segment(const Record& record) {
   snapshot.taken.store(false, std::memory_order_release);
 
   segment.emplace();
+  segment->wall_minus_monotonic_ns = wall_minus_monotonic_ns();
   segment->token = row.token;
   segment->first_cycle = row.first_cycle;
   segment->through_cycle = static_cast<std::int64_t>(row.first_cycle) - 1;
@@ -342,7 +348,10 @@ void HistoryWriter::Parts::request_if_due() {
   const auto cycles = segment->through_cycle - static_cast<std::int64_t>(segment->first_cycle) + 1;
   const bool old = grid.period * cycles >= as_duration(config.segment_h * 3600.0);
   const bool large = static_cast<double>(segment->bytes) > config.size_MB_max * 1e6 / 8.0;
-  if (old || large) request(SegmentReason::periodic);
+  // A segment has the wall time of its begin: a clock that is set later needs another one.
+  const std::int64_t set_by_ns = wall_minus_monotonic_ns() - segment->wall_minus_monotonic_ns;
+  const bool was_set = std::abs(set_by_ns) > clock_set_ns;
+  if (old || large || was_set) request(SegmentReason::periodic);
 }
 
 KnownSession HistoryWriter::Parts::find_session(std::uint16_t id) {

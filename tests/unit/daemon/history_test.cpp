@@ -287,3 +287,28 @@ TEST_CASE("a segment of damaged length does not age the others", "[history]") {
   CHECK(machine.writer().statistics().deleted == 0);
   CHECK(machine.writer().statistics().segments == 4);
 }
+
+TEST_CASE("a wall clock that is set begins a segment with the new time", "[history]") {
+  const TempFolder folder;
+  const HistoryConfig config = history_config(folder / "h.db");
+  const double set_by_s = GENERATE(7200.0, -3600.0);
+  nanoseconds set_by{0};
+  WriterClocks clocks = system_clocks();
+  clocks.wall = [&set_by, system = clocks.wall] { return system() + set_by; };
+  RecordedMachine machine(config, 1, 65536, clocks);
+  machine.open();
+  machine.run(200);
+  machine.writer().work();
+  set_by = to_nanoseconds(set_by_s);
+  for (int i = 0; i < 3; ++i) {
+    machine.run(200);
+    machine.writer().work();
+  }
+  machine.stop();
+  const HistoryReader reader(config.file);
+  REQUIRE(reader.segments().size() == 2);
+  const auto& [before, after] = std::pair(reader.segments()[0], reader.segments()[1]);
+  const double passed_s = 1e-9 * static_cast<double>(after.wall_ns - before.wall_ns);
+  CHECK(passed_s > set_by_s);
+  CHECK(passed_s < set_by_s + 60.0);
+}

@@ -119,6 +119,23 @@ TEST_CASE("values not yet confirmed at start-up raise no alarm", "[gateway][alar
   CHECK(names(active_conditions(snapshot)) == std::vector<std::string>{"compensation", "sensor/a"});
 }
 
+TEST_CASE("a start that does not end raises an alarm, and one that begins clears none",
+          "[gateway][alarm]") {
+  Snapshot snapshot = good_snapshot();
+  snapshot.status.mode = Mode::starting;
+  snapshot.status.reasons = {Reason::controller_offline};
+  snapshot.status.mode_since_s = 50.0;
+  CHECK(active_conditions(snapshot).empty());
+  CHECK_FALSE(is_judged(snapshot));
+  snapshot.status.mode_since_s = 61.0;
+  CHECK(names(active_conditions(snapshot)) == std::vector<std::string>{"compensation"});
+  CHECK(is_judged(snapshot));
+  Confirmation slow;
+  slow.settle_s = 120.0;
+  snapshot.status.confirming = {slow};
+  CHECK(active_conditions(snapshot).empty());
+}
+
 TEST_CASE("alarm commands are limited per hour", "[gateway][alarm]") {
   HookLimit limit(2);
   CHECK(limit.take(0.0));
