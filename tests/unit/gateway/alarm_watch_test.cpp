@@ -123,7 +123,7 @@ TEST_CASE("a start that does not end raises an alarm, and one that begins clears
           "[gateway][alarm]") {
   Snapshot snapshot = good_snapshot();
   snapshot.status.mode = Mode::starting;
-  snapshot.status.reasons = {Reason::controller_offline};
+  snapshot.status.reasons = static_cast<std::uint32_t>(Reason::controller_offline);
   snapshot.status.mode_since_s = 50.0;
   CHECK(active_conditions(snapshot).empty());
   CHECK_FALSE(is_judged(snapshot));
