@@ -20,6 +20,7 @@
 
 #include "daemon/cycle/real_time_thread.hpp"
 #include "daemon/state/state_file.hpp"
+#include "daemon/status/reference_rules.hpp"
 #include "daemon/system/log_setup.hpp"
 #include "status/figures.hpp"
 
@@ -138,6 +139,20 @@ bool Supervisor::take_signals() {
   return asked.stop != 0;
 }
 
+/// A reference from the first values of this start is only as good as the machine was even then:
+/// judged once, when a change can be told from the resolution of a module.
+void Supervisor::judge_reference(const Report& report) {
+  constexpr double judged_after_s = 120.0;
+  const double uptime_s = std::chrono::duration<double>(Clock::now() - started_).count();
+  if (reference_judged_ || uptime_s < judged_after_s) return;
+  reference_judged_ = true;
+  ReferenceRecord record = parts_.keeper.reference();
+  const bool is_of_this_start = wall_now_s() - record.wall_s < uptime_s;
+  if (record.origin != ReferenceOrigin::first_values || !is_of_this_start) return;
+  record.changed = change_since_start(parts_.config.model, report, trend_);
+  if (!record.changed.empty()) parts_.keeper.note_reference(record);
+}
+
 void Supervisor::note_report() {
   next_note_ = Clock::now() + note_period_max;
   events_.note_report(parts_.cycle.report(), parts_.config.estimator, parts_.config.dry_run);
@@ -149,6 +164,7 @@ void Supervisor::note_report() {
   if (report.mode != Mode::compensating || !all_driven) idle_until_ = Clock::now();
   if (trend_.is_due(report.now))
     trend_.note(report.now, parts_.config.model.temperature_columns(), report.inputs);
+  judge_reference(report);
   frozen_modules_.note(report, parts_.config.estimator);
   events_.note_frozen(frozen_modules_.frozen_s());
   since_probing_.note(report.axes, parts_.config.model_checksum);

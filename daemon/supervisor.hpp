@@ -83,6 +83,7 @@ class Supervisor {
   [[nodiscard]] bool turn();
   [[nodiscard]] bool take_signals();
   void note_report();
+  void judge_reference(const Report& report);
   void tick();
   void look_at_health();
   void ramp_to_zero();
@@ -101,6 +102,7 @@ class Supervisor {
   Clock::time_point next_health_{};
   Clock::time_point next_note_{};
   Clock::time_point idle_until_{Clock::now()};
+  bool reference_judged_{false};
   std::uint64_t cycles_seen_{0};
   std::vector<BusHealth> buses_;
   ControllerHealth controller_health_;

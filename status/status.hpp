@@ -517,6 +517,7 @@ struct ReferenceStatus {
   std::optional<std::string> by{};  ///< "model_file", "operator", "first_values", "reload"
   double wall_s{not_a_number};      ///< time when it was taken, s since 1970
   bool lost{false};
+  std::string changed{};  ///< "bed_degC +12.0 K/h": the machine was not even when it was taken
   std::map<std::string, double> temps_degC{};
   std::vector<std::string> objections{};  ///< why none should be taken now, one sentence each
 
@@ -525,6 +526,7 @@ struct ReferenceStatus {
     visit("by", self.by);
     visit("wall_s", self.wall_s);
     visit("lost", self.lost);
+    visit("changed", self.changed);
     visit("temps_degC", self.temps_degC);
     visit("objections", self.objections);
   }

@@ -61,6 +61,10 @@ class Causes {
       add_reasons(severity);
     if (status_.mode == Mode::compensating && !status_.model.moves)
       add(std::string(moves_nothing), "fit one to measured runs", "thermocomp fit");
+    if (!status_.reference.changed.empty())
+      add("the reference was taken by itself while the machine was not even (" +
+              status_.reference.changed + "): displacement is counted from there",
+          "take another when the machine is cold and even", "thermocomp reference");
     for (const Confirmation& each : status_.confirming) add(confirmation_text(each));
     for (const FrozenModule& module : status_.modules_frozen)
       add("device " + module.name + ": " + frozen_text(module), frozen_remedy, "",

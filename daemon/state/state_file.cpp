@@ -66,10 +66,13 @@ ReferenceRecord record_in(const json& file) {
   const json& wall_s = found->value("wall_s", json());
   const json& by = found->value("by", json());
   if (!wall_s.is_number() || !by.is_string()) return {};
-  ReferenceRecord record{wall_s.get<double>()};
+  ReferenceRecord record;
+  record.wall_s = wall_s.get<double>();
   for (const ReferenceOrigin origin :
        {ReferenceOrigin::first_values, ReferenceOrigin::command, ReferenceOrigin::reload})
     if (by.get<std::string>() == to_string(origin)) record.origin = origin;
+  if (const json& changed = found->value("changed", json()); changed.is_string())
+    record.changed = changed.get<std::string>();
   return record.is_known() ? record : ReferenceRecord{};
 }
 
@@ -82,7 +85,9 @@ std::string to_text(const PersistentState& state, bool reference_lost,
   if (reference_lost) file["reference_lost"] = true;
   file["reference_degC"] = numbers(state.reference_degC);
   if (reference.is_known())
-    file["reference_taken"] = {{"wall_s", reference.wall_s}, {"by", to_string(reference.origin)}};
+    file["reference_taken"] = {{"wall_s", reference.wall_s},
+                               {"by", to_string(reference.origin)},
+                               {"changed", reference.changed}};
   file["model_reference_degC"] = numbers(state.model_reference_degC);
   file["reference_signals"] = numbers(state.reference_signals);
   file["offset_um"] = numbers(state.offset_um);

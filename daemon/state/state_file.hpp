@@ -47,6 +47,8 @@ enum class ReferenceOrigin : std::uint8_t {
 struct ReferenceRecord {
   double wall_s{not_a_number};  ///< seconds since 1970, by the clock at that time; NaN: unknown
   ReferenceOrigin origin{ReferenceOrigin::unknown};
+  /// Change that speaks against it, seen after it was taken by itself: "bed_degC +12.0 K/h".
+  std::string changed{};
   [[nodiscard]] bool is_known() const noexcept {
     return std::isfinite(wall_s) && origin != ReferenceOrigin::unknown;
   }

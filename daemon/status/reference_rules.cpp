@@ -55,20 +55,31 @@ void add_axes(const DaemonConfig& config, const Report& report, const Controller
       largest, largest_um, more));
 }
 
-/// Names the column that changes fastest; the others mostly follow it.
+struct NamedChange {
+  std::string column;  ///< empty: the machine is even, as far as known
+  TemperatureTrend::Change change;
+};
+
+/// The column that changes fastest; the others mostly follow it.
+NamedChange fastest_change(const ThermalModel& model, const Report& report,
+                           const TemperatureTrend& trend) {
+  const auto columns = model.temperature_columns();
+  NamedChange fastest;
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    const auto change = trend.change(i, report.now, report.inputs[i].temp_degC);
+    if (!change.is_uneven()) continue;
+    if (!fastest.column.empty() &&
+        std::abs(change.rate_K_per_h) <= std::abs(fastest.change.rate_K_per_h))
+      continue;
+    fastest = {columns[i], change};
+  }
+  return fastest;
+}
+
 void add_warming(const ThermalModel& model, const Report& report, const TemperatureTrend* trend,
                  std::vector<std::string>& why) {
   if (trend == nullptr) return;
-  const auto columns = model.temperature_columns();
-  TemperatureTrend::Change fastest;
-  std::string name;
-  for (std::size_t i = 0; i < columns.size(); ++i) {
-    const auto change = trend->change(i, report.now, report.inputs[i].temp_degC);
-    if (!change.is_uneven()) continue;
-    if (!name.empty() && std::abs(change.rate_K_per_h) <= std::abs(fastest.rate_K_per_h)) continue;
-    fastest = change;
-    name = columns[i];
-  }
+  const auto& [name, fastest] = fastest_change(model, report, *trend);
   if (name.empty()) return;
   why.push_back(fmt::format(
       "{} changes by {:+.1f} K/h (over {}), more than {:.0f} K/h: the machine is {}; wait until it "
@@ -78,6 +89,12 @@ void add_warming(const ThermalModel& model, const Report& report, const Temperat
 }
 
 }  // namespace
+
+std::string change_since_start(const ThermalModel& model, const Report& report,
+                               const TemperatureTrend& trend) {
+  const auto& [name, fastest] = fastest_change(model, report, trend);
+  return name.empty() ? "" : fmt::format("{} {:+.1f} K/h", name, fastest.rate_K_per_h);
+}
 
 std::vector<std::string> lost_for_reference(const ThermalModel& model, const Report& report) {
   std::vector<std::string> lost;

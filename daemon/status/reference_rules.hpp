@@ -24,6 +24,11 @@ namespace thermocomp {
                                                          const ControllerHealth& controller,
                                                          const TemperatureTrend* trend);
 
+/// The fastest change since the temperatures have been watched, "bed_degC +12.0 K/h"; empty: the
+/// machine is even.
+[[nodiscard]] std::string change_since_start(const ThermalModel& model, const Report& report,
+                                             const TemperatureTrend& trend);
+
 /// Time for which all temperatures have been watched [s]; slow warming needs half an hour.
 [[nodiscard]] double watched_s(const Report& report, const TemperatureTrend* trend);
 

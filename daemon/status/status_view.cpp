@@ -311,6 +311,7 @@ ReferenceStatus reference_of(const StatusView& view) {
   } else if (view.reference.is_known()) {
     status.by = to_string(view.reference.origin);
     status.wall_s = view.reference.wall_s;
+    status.changed = view.reference.changed;
   }
   return status;
 }

@@ -172,3 +172,13 @@ TEST_CASE("unknown quantities do not prevent a reference", "[reference]") {
   CHECK(std::isnan(machine.trend.change(0, machine.now, 20.0).rate_K_per_h));
   CHECK(against_reference(machine.config, machine.report, machine.health, nullptr).empty());
 }
+
+TEST_CASE("a machine that warmed while a start took its reference is named", "[reference]") {
+  Machine machine;
+  machine.warm(1.0, 60.0, 2min);
+  CHECK(change_since_start(machine.config.model, machine.report, machine.trend) ==
+        "spindle_degC +60.0 K/h");
+  Machine even;
+  even.warm(1.0, -2.0, 2min);
+  CHECK(change_since_start(even.config.model, even.report, even.trend).empty());
+}

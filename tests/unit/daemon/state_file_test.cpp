@@ -124,11 +124,12 @@ TEST_CASE("a state that cannot be written is an error and leaves the old file", 
 TEST_CASE("the reference's origin is loaded, and an unreadable one is ignored", "[state]") {
   const TempFolder folder;
   const auto file = folder / "state.json";
-  REQUIRE(save_state_file(file, sample_state(), false, {1772350211.5, ReferenceOrigin::command})
-              .empty());
+  const ReferenceRecord taken{1772350211.5, ReferenceOrigin::command, "bed_degC +12.0 K/h"};
+  REQUIRE(save_state_file(file, sample_state(), false, taken).empty());
   LoadedState loaded = load_state_file(file, {});
   CHECK(loaded.reference.wall_s == 1772350211.5);
   CHECK(loaded.reference.origin == ReferenceOrigin::command);
+  CHECK(loaded.reference.changed == taken.changed);
   REQUIRE(save_state_file(file, sample_state()).empty());
   CHECK_FALSE(load_state_file(file, {}).reference.is_known());
   const auto* record = GENERATE("7", "{}", R"({"wall_s": "noon", "by": "operator"})",
