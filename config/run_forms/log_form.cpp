@@ -52,6 +52,7 @@ std::vector<std::string> fields_of(std::string_view line, char separator) {
   static_cast<void>(split_line(line, separator, parts));
   std::vector<std::string> fields;
   for (const std::string_view part : parts) fields.push_back(unquoted(part));
+  if (fields.empty()) fields.emplace_back();  // an empty line, between blanks
   return fields;
 }
 

@@ -71,7 +71,7 @@ PlainTable plain_labelled(const Log& log);
 /// Takes the first line off `text`; returned without its line end.
 std::string_view take_line(std::string_view& text);
 
-/// Splits at separators; removes quotes and blanks.
+/// Splits at separators; removes quotes and blanks. At least one field.
 std::vector<std::string> fields_of(std::string_view line, char separator = ',');
 
 /// Quotes a field of a comma-separated line.
