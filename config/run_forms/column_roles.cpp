@@ -52,38 +52,19 @@ Quality quality_of(std::string_view field, Codes codes) {
   return code && (*code < 64 || *code >= 0x80000000) ? Quality::bad : Quality::other;
 }
 
-Codes codes_of(const TextTable& table, std::size_t column) {
-  const std::string name = small_letters(table.header[column]);
+Codes codes_of(const TextColumn& column) {
+  const std::string name = small_letters(column.header);
   const auto has = [&](std::string_view part) { return name.find(part) != std::string::npos; };
   if (has("valid")) return Codes::validity;
   if (has("qualit") || has("status")) return Codes::opc;
   // Under another name if most are OPC's "good".
   std::size_t good = 0;
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    const auto code = code_of(table.field(row, column));
+  for (const std::string_view field : column.fields) {
+    const auto code = code_of(field);
     if (!code || *code > 255) return Codes::none;
     if (*code == 192) ++good;
   }
-  return 2 * good >= table.rows() ? Codes::opc : Codes::none;
-}
-
-bool has_one_value(const TextTable& table, std::size_t column) {
-  for (std::size_t row = 1; row < table.rows(); ++row)
-    if (table.field(row, column) != table.field(0, column)) return false;
-  return true;
-}
-
-bool numbers_rise(const TextTable& table, std::size_t column) {
-  for (std::size_t row = 1; row < table.rows(); ++row)
-    if (!(finite_number(table.field(row, column)) > finite_number(table.field(row - 1, column))))
-      return false;
-  return true;
-}
-
-bool are_numbers(const TextTable& table, std::size_t column) {
-  for (std::size_t row = 0; row < table.rows(); ++row)
-    if (!finite_number(table.field(row, column))) return false;
-  return true;
+  return 2 * good >= column.fields.size() ? Codes::opc : Codes::none;
 }
 
 }  // namespace
@@ -96,70 +77,79 @@ bool names_series(std::string_view header) {
   return is_one_of(series_names, header);
 }
 
-std::vector<bool> bad_rows(const TextTable& table, std::size_t column) {
-  const Codes codes = codes_of(table, column);
-  std::vector<bool> bad(table.rows());
-  bool has_good = false;
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    const Quality quality = quality_of(table.field(row, column), codes);
-    has_good = has_good || quality == Quality::good;
-    bad[row] = quality == Quality::bad;
-  }
-  if (!has_good) bad.clear();
-  return bad;
+bool is_text(const TextColumn& column) {
+  return std::ranges::none_of(column.fields, [](std::string_view field) {
+    return looks_like_number(field) || switch_word(field);
+  });
 }
 
-void join_units(TextTable& table, const ColumnMap* map) {
-  for (std::size_t i = 1; i < table.columns(); ++i) {
-    if (!names_units(table.header[i]) || (map != nullptr && map->uses(table.header[i]))) continue;
+std::vector<bool> bad_rows(const TextColumn& column) {
+  const Codes codes = codes_of(column);
+  std::vector<bool> bad;
+  bool has_good = false;
+  for (const std::string_view field : column.fields) {
+    const Quality quality = quality_of(field, codes);
+    has_good = has_good || quality == Quality::good;
+    bad.push_back(quality == Quality::bad);
+  }
+  return has_good ? bad : std::vector<bool>();
+}
+
+void join_units(TextTable& table) {
+  for (std::size_t i = 1; i < table.columns.size(); ++i) {
+    const TextColumn& units = table.columns[i];
+    if (!names_units(units.header) || table.map.uses(units.header)) continue;
     for (std::size_t row = 0; row < table.rows(); ++row) {
-      const std::string_view unit = table.field(row, i);
-      std::string_view& value = table.fields[row * table.columns() + i - 1];
-      if (spelled_unit(unit) == nullptr || !looks_like_number(value) ||
-          number_text_of(value).unit != nullptr)
-        continue;
-      value = table.joined.emplace_back(std::string(value) + ' ' + std::string(unit));
+      const std::string_view unit = units.fields[row];
+      std::string_view& value = table.columns[i - 1].fields[row];
+      if (spelled_unit(unit) != nullptr && looks_like_number(value) &&
+          number_text_of(value).unit == nullptr)
+        value = table.joined.emplace_back(std::string(value) + ' ' + std::string(unit));
     }
   }
 }
 
-std::string leave_bad_values_out(TextTable& table, const TimeColumns& time, const ColumnMap* map) {
-  std::vector<std::vector<bool>> bad(table.columns());  // empty: the column holds no qualities
-  std::optional<bool> is_before;                        // whether a quality precedes its values
+void leave_bad_values_out(TextTable& table) {
+  const std::size_t columns = table.columns.size();
+  std::vector<std::vector<bool>> bad(columns);  // empty: the column holds no qualities
+  std::optional<bool> is_before;                // whether a quality precedes its values
   std::string names;
-  for (std::size_t i = 0; i < table.columns(); ++i) {
-    if (time.has(i) || (map != nullptr && map->uses(table.header[i]))) continue;
-    bad[i] = bad_rows(table, i);
+  for (std::size_t i = 0; i < columns; ++i) {
+    const TextColumn& column = table.columns[i];
+    if (column.is_time || table.map.uses(column.header)) continue;
+    bad[i] = bad_rows(column);
     if (!is_before) is_before = !bad[i].empty();
-    if (!bad[i].empty()) names += (names.empty() ? "'" : ", '") + table.header[i] + "'";
+    if (!bad[i].empty()) names += (names.empty() ? "'" : ", '") + column.header + "'";
   }
-  if (names.empty()) return {};
+  if (names.empty()) return;
   std::size_t count = 0;
-  for (std::size_t i = 0; i < table.columns(); ++i) {
-    if (time.has(i) || !bad[i].empty()) continue;
-    std::size_t quality = i;
-    while (quality < table.columns() && bad[quality].empty()) quality += *is_before ? -1UL : 1UL;
-    if (quality >= table.columns()) continue;
+  const std::vector<bool>* judge = nullptr;
+  for (std::size_t k = 0; k < columns; ++k) {
+    const std::size_t i = *is_before ? k : columns - 1 - k;
+    if (!bad[i].empty()) judge = &bad[i];
+    if (judge == nullptr || !bad[i].empty() || table.columns[i].is_time) continue;
     for (std::size_t row = 0; row < table.rows(); ++row) {
-      if (!bad[quality][row]) continue;
-      table.fields[row * table.columns() + i] = {};
+      if (!(*judge)[row]) continue;
+      table.columns[i].fields[row] = {};
       ++count;
     }
   }
-  return names + (*is_before ? " before" : " behind") +
-         " values say whether they are good; bad, hence missing: " + std::to_string(count) +
-         " values";
+  table.notes.push_back(names + (*is_before ? " before" : " behind") +
+                        " values say whether they are good; bad, hence missing: " +
+                        std::to_string(count) + " values");
 }
 
-std::string unclear_role(const TextTable& table, std::size_t column) {
-  const std::string& header = table.header[column];
-  const std::string name = toml_text(header);
-  if (!are_numbers(table, column) || has_one_value(table, column)) return {};
-  if (is_one_of(numbered_names, header) && !numbers_rise(table, column))
+std::string unclear_role(const TextColumn& column) {
+  const std::string name = toml_text(column.header);
+  const auto is_number = [](std::string_view field) { return finite_number(field).has_value(); };
+  if (!std::ranges::all_of(column.fields, is_number) || column.has_one_value() ||
+      increases(column, finite_number))
+    return {};
+  if (is_one_of(numbered_names, column.header))
     return "may say which sensor a row is of: write pivot = [" + name +
            ", \"the column of the values\"] in the file of --columns, or ignore = [" + name +
            "] if all rows are of the same";
-  if (is_one_of(time_part_names, header) && !numbers_rise(table, column))
+  if (is_one_of(time_part_names, column.header))
     return "may be a part of the time: write the whole time in one column, or ignore = [" + name +
            "] in the file of --columns if the time is complete without it";
   return {};

@@ -43,6 +43,14 @@ bool is_one_of(std::span<const std::string_view> words, std::string_view text) {
   return std::find(words.begin(), words.end(), small_letters(text)) != words.end();
 }
 
+std::optional<double> switch_word(std::string_view field) {
+  for (const std::string_view on : {"on", "ON", "On", "true", "TRUE", "True"})
+    if (field == on) return 1.0;
+  for (const std::string_view off : {"off", "OFF", "Off", "false", "FALSE", "False"})
+    if (field == off) return 0.0;
+  return std::nullopt;
+}
+
 std::string shortened(std::string_view text) {
   constexpr std::size_t shown_max = 40;
   if (text.size() <= shown_max) return std::string(text);

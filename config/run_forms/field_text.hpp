@@ -26,6 +26,9 @@ namespace thermocomp {
 /// Ignores the case of `text`; `words` are in small letters.
 [[nodiscard]] bool is_one_of(std::span<const std::string_view> words, std::string_view text);
 
+/// The number of on and off, true and false.
+[[nodiscard]] std::optional<double> switch_word(std::string_view field);
+
 /// At most 40 bytes, cut between characters; " ..." marks an omission.
 [[nodiscard]] std::string shortened(std::string_view text);
 

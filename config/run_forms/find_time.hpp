@@ -2,10 +2,8 @@
 #pragma once
 
 #include <optional>
-#include <string>
 #include <vector>
 
-#include "config/run_forms/number_form.hpp"
 #include "config/run_forms/text_table.hpp"
 
 namespace thermocomp {
@@ -14,19 +12,16 @@ namespace thermocomp {
 /// the rows have a period.
 struct TimeColumns {
   std::vector<std::size_t> columns;
-  std::optional<std::size_t> dates;       ///< column with the date at which a counting number was 0
+  std::optional<std::size_t> dates{};     ///< column with the date at which a counting number was 0
   std::optional<std::size_t> fraction{};  ///< column with the fraction of the second of a clock
   double fraction_factor{1.0};            ///< s per unit of it
   std::optional<std::size_t> half{};      ///< column with AM or PM of a clock
-  [[nodiscard]] bool has(std::size_t column) const;
 };
 
 /// As mapped; else `time_s`; else the one column that has dates or clock times; else the one of
 /// numbers that is called time or has a unit of it, counted from an epoch if their size shows one.
-/// @param map  may be nullptr
+/// Marks the columns; `dates` remains a column of its own.
 /// @return nullopt after a problem
-[[nodiscard]] std::optional<TimeColumns> find_time(const TextTable& table, const ColumnMap* map,
-                                                   const std::vector<std::string>& units,
-                                                   const NumberForm& form, ProblemList& problems);
+[[nodiscard]] std::optional<TimeColumns> find_time(TextTable& table);
 
 }  // namespace thermocomp

@@ -21,16 +21,16 @@ constexpr Form known_forms[] = {
 
 }  // namespace
 
-std::optional<PlainTable> plain_table(std::string_view text, const std::string& name,
-                                      const ColumnMap* map) {
-  const ColumnMap none;
-  const forms::Log log{text, name, map == nullptr ? none : *map};
-  if (trimmed(text.substr(0, 100)).starts_with('<'))
-    log.refuse(1, "", shortened(text.substr(0, text.find('\n'))),
+PlainTable plain_table(std::string text, const std::string& name, const ColumnMap& map) {
+  const forms::Log log{text, name, map};
+  if (trimmed(log.text.substr(0, 100)).starts_with('<'))
+    log.refuse(1, "", shortened(log.text.substr(0, text.find('\n'))),
                "is XML, which is not a known table; write its values as CSV or JSON lines");
   for (const Form& form : known_forms)
     if (form.is(text)) return form.plain(log);
-  return std::nullopt;
+  PlainTable table;
+  table.text = std::move(text);
+  return table;
 }
 
 namespace forms {

@@ -2,7 +2,6 @@
 /// and a line of the table in log_form.cpp; other files are read unchanged.
 #pragma once
 
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -19,12 +18,10 @@ struct PlainTable {
   bool has_own_names{false};       ///< columns have names of our own form
 };
 
-/// @param text  UTF-8
-/// @param map  may be nullptr
-/// @return nullopt when the text is not such a log
+/// @param text  UTF-8; returned as it is when it is not such a log
 /// @throws ConfigurationError
-[[nodiscard]] std::optional<PlainTable> plain_table(std::string_view text, const std::string& name,
-                                                    const ColumnMap* map);
+[[nodiscard]] PlainTable plain_table(std::string text, const std::string& name,
+                                     const ColumnMap& map);
 
 namespace forms {
 

@@ -4,10 +4,6 @@
 #include <optional>
 #include <string_view>
 
-#include "config/run_forms/column_map.hpp"
-#include "config/run_forms/problem_list.hpp"
-#include "config/run_forms/spelled_unit.hpp"
-
 namespace thermocomp {
 
 struct TextTable;
@@ -19,9 +15,7 @@ struct NumberForm {
 
 /// Detects the form of the table's numbers. 1,234 alone is ambiguous (1.234 or 1234); if all are,
 /// it is a problem that shows the line to add to the map.
-/// @param map  may be nullptr
-[[nodiscard]] NumberForm number_form(const TextTable& table, const ColumnMap* map,
-                                     ProblemList& problems);
+[[nodiscard]] NumberForm number_form(const TextTable& table);
 
 /// @return nullopt unless `field` is one finite number of that form
 [[nodiscard]] std::optional<double> number_of(std::string_view field, const NumberForm& form);

@@ -23,6 +23,7 @@ class ProblemList {
   void add(Problem problem) {
     if (!full()) problems_.push_back(std::move(problem));
   }
+  [[nodiscard]] const std::string& file() const noexcept { return file_; }
   [[nodiscard]] bool empty() const noexcept { return problems_.empty(); }
   [[nodiscard]] bool full() const noexcept { return problems_.size() >= problems_max; }
   /// @throws ConfigurationError if there are problems

@@ -6,6 +6,9 @@
 #include <string>
 #include <utility>
 
+#include "config/run_forms/column_roles.hpp"
+#include "config/run_forms/field_text.hpp"
+
 namespace thermocomp {
 namespace {
 
@@ -22,17 +25,18 @@ bool may_be_clock_change(double wall_s) {
 
 /// A local clock is set forward by an hour in a night of spring, and back in one of autumn, while
 /// the rows continue.
-void follow_summer_time(const TextTable& table, std::vector<double>& time_s, RunFile& run) {
+void follow_summer_time(TextTable& table, RunTime& time) {
   constexpr double hour_s = 3600.0;
   constexpr double steps_max = 3.0;
-  if (!run.wall_zero || run.wall_zero->is_utc) return;
+  if (!time.wall_zero || time.wall_zero->is_utc) return;
+  std::vector<double>& time_s = time.time_s;
   double added_s = 0.0;
   double step_s = 0.0;  // between the two rows before
   double last = time_s.front();
   for (std::size_t row = 1; row < time_s.size(); ++row) {
     const double now = time_s[row];
     const double before_s = std::exchange(step_s, now - last);
-    const double wall_s = run.wall_zero->seconds + last;
+    const double wall_s = time.wall_zero->seconds + last;
     const double hours = std::floor((wall_s + step_s) / hour_s) - std::floor(wall_s / hour_s);
     const double change_s = step_s <= 0.0 ? hour_s : -hour_s;
     const bool is_change = step_s <= 0.0 || (hours == 2.0 && steps_max * before_s <= hour_s);
@@ -40,39 +44,64 @@ void follow_summer_time(const TextTable& table, std::vector<double>& time_s, Run
         may_be_clock_change(wall_s)) {
       added_s += change_s;
       step_s += change_s;
-      run.understood.push_back(
-          std::string("summer time: the clock was set ") + (change_s > 0.0 ? "back" : "forward") +
-          " by an hour before line " + std::to_string(table.lines[row]) +
-          (change_s > 0.0 ? ": an hour is added" : ": an hour is taken off") + " from there on");
+      const bool is_back = change_s > 0.0;
+      table.notes.push_back(std::string("summer time: the clock was set ") +
+                            (is_back ? "back" : "forward") + " by an hour before line " +
+                            std::to_string(table.lines[row]) + ": an hour is " +
+                            (is_back ? "added" : "taken off") + " from there on");
     }
     last = now;
     time_s[row] += added_s;
   }
 }
 
-void turn_rows(TextTable& table, std::vector<double>& time_s, RunFile& run) {
-  const double earliest = time_s.back();
-  std::reverse(time_s.begin(), time_s.end());
-  for (double& at : time_s) at -= earliest;
-  if (run.wall_zero) run.wall_zero->seconds += earliest;
-  std::reverse(table.lines.begin(), table.lines.end());
-  std::reverse(table.fields.begin(), table.fields.end());
-  for (auto row = table.fields.begin(); row != table.fields.end();) {
-    const auto end = row + static_cast<std::ptrdiff_t>(table.columns());
-    std::reverse(row, end);
-    row = end;
-  }
-  run.understood.emplace_back("the newest row is first: order reversed");
+void turn_rows(TextTable& table, RunTime& time) {
+  const double earliest = time.time_s.back();
+  std::ranges::reverse(time.time_s);
+  for (double& at : time.time_s) at -= earliest;
+  if (time.wall_zero) time.wall_zero->seconds += earliest;
+  std::ranges::reverse(table.lines);
+  for (TextColumn& column : table.columns) std::ranges::reverse(column.fields);
+  table.notes.emplace_back("the newest row is first: order reversed");
+}
+
+/// Whether a column could name the series of a row's value.
+bool has_text(const TextTable& table, std::size_t row) {
+  return std::ranges::any_of(table.columns, [row](const TextColumn& column) {
+    return !column.is_time && is_text(column) && !column.fields[row].empty();
+  });
+}
+
+/// How to mend a time that is not later than that of the row before.
+std::string remedy(const TextTable& table, const std::vector<double>& time_s, std::size_t row) {
+  if (has_text(table, row))
+    return "for one row per value write pivot = \"the column that names the series\" in the file "
+           "of --columns";
+  if (time_s[row] == time_s[row - 1])
+    return "delete one of the two lines, or write the time with its fraction of a second";
+  if (row == 1 && table.lines[0] < table.lines[1])
+    return "delete line " + std::to_string(table.lines[0]) +
+           " if it belongs to the header, or put the rows in the order of time";
+  return "put the rows in the order of time; where the clock was set, delete the lines before or "
+         "after it";
 }
 
 }  // namespace
 
-void order_in_time(TextTable& table, std::vector<double>& time_s, RunFile& run) {
+void order_in_time(TextTable& table, RunTime& time, std::size_t column) {
+  const std::vector<double>& time_s = time.time_s;
   std::ptrdiff_t falling = 0;
   for (std::size_t row = 1; row < time_s.size(); ++row)
     falling += (time_s[row] < time_s[row - 1] ? 1 : 0) - (time_s[row] > time_s[row - 1] ? 1 : 0);
-  if (falling > 0) turn_rows(table, time_s, run);
-  follow_summer_time(table, time_s, run);
+  if (falling > 0) turn_rows(table, time);
+  follow_summer_time(table, time);
+  const auto at = std::ranges::adjacent_find(time_s, [](double a, double b) { return !(b > a); });
+  if (at == time_s.end()) return;
+  const auto row = static_cast<std::size_t>(at - time_s.begin()) + 1;
+  table.refuse_field(row, column,
+                     "must be later than in line " + std::to_string(table.lines[row - 1]) + " (" +
+                         shortened(table.columns[column].fields[row - 1]) +
+                         "): " + remedy(table, time_s, row));
 }
 
 }  // namespace thermocomp

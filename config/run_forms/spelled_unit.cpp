@@ -227,6 +227,11 @@ const SpelledUnit* spelled_unit(std::string_view unit) {
   return found == known_units.end() ? nullptr : &*found;
 }
 
+const SpelledUnit* time_unit(std::string_view unit) {
+  const SpelledUnit* known = spelled_unit(unit);
+  return known != nullptr && known->dimension == "time" ? known : nullptr;
+}
+
 SpelledName spelled_name(std::string_view header) {
   header = trimmed(header);
   SpelledName name;

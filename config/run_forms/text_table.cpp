@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <map>
+#include <utility>
 
+#include "config/run_forms/field_text.hpp"
 #include "config/run_forms/table_header.hpp"
 #include "config/run_forms/text_lines.hpp"
 
@@ -16,25 +18,21 @@ constexpr double values_share_min = 0.2;
 
 class TableReader {
  public:
-  TableReader(const ColumnMap* map, int lines_above, ProblemList& problems)
-      : map_(map), lines_above_(lines_above), problems_(problems) {}
+  TableReader(const ColumnMap& map, ProblemList& problems)
+      : map_(map), problems_(problems), table_(map, problems) {}
 
-  TextTable read(std::string text) {
+  TextTable read(std::string text, int lines_above) {
     table_.text = std::move(text);
     // Heap-allocated, so that moving the table keeps pointers into it valid.
     table_.text.reserve(64);
-    const int first_line = map_ == nullptr ? 0 : map_->header_line;
-    TextLines found = find_lines(table_.text, lines_above_, first_line);
-    lines_ = std::move(found.lines);
-    last_comment_ = found.last_comment;
-    given_separator_ = found.separator;
+    found_ = find_lines(table_.text, lines_above, map_.header_line);
     if (lines_.empty()) {
       problems_.add(0, "", "", "has no header row");
-      return std::move(table_);
+    } else if (choose_separator()) {
+      for (std::size_t i = 0; i < judged(); ++i) head_.push_back(fields_of(lines_[i].text));
+      widen_to_header();
+      if (find_header()) read_rows();
     }
-    if (!choose_separator()) return std::move(table_);
-    widen_to_header();
-    if (find_header()) read_rows();
     return std::move(table_);
   }
 
@@ -57,8 +55,7 @@ class TableReader {
       static_cast<void>(split_line(lines_[i].text, separator, cut[i]));
       ++lines_of[cut[i].size()];
     }
-    Cut best;
-    best.separator = separator;
+    Cut best{separator};
     std::size_t most = 0;
     for (const auto& [fields, lines] : lines_of) {
       if (fields < 2 || lines < most) continue;
@@ -83,9 +80,8 @@ class TableReader {
   }
 
   bool choose_separator() {
-    if (map_ != nullptr && map_->separator) given_separator_ = map_->separator;
-    if (given_separator_) {
-      cut_ = cut_by(*given_separator_);
+    if (const auto given = map_.separator ? map_.separator : found_.separator) {
+      cut_ = cut_by(*given);
     } else {
       for (const char separator : separators) {
         const Cut cut = cut_by(separator);
@@ -102,10 +98,10 @@ class TableReader {
     return is_table;
   }
 
-  TableFields fields_of(std::size_t line) {
+  /// Empty: a quote is not closed.
+  [[nodiscard]] TableFields fields_of(std::string_view line) const {
     TableFields fields;
-    if (!split_line(lines_[line].text, table_.separator, fields)) fields.clear();
-    fill_up(fields);
+    if (!split_line(line, table_.separator, fields)) fields.clear();
     return fields;
   }
 
@@ -119,26 +115,22 @@ class TableReader {
   void widen_to_header() {
     if (cut_.separator == ' ' || cut_.begin < 2) return;
     const std::size_t line = cut_.begin - 2;
-    const TableFields names = fields_of(line);
+    const TableFields& names = head_[line];
     if (names.size() != cut_.fields + 1 || !names.back().starts_with("Serial") ||
-        !is_all_words(names) || fields_of(line + 1).size() != names.size())
+        !is_all_words(names) || head_[line + 1].size() != names.size())
       return;
     narrowest_ = cut_.fields;
     cut_.fields = names.size();
     cut_.begin = line;
+    for (TableFields& fields : head_) fill_up(fields);
   }
 
   bool find_header() {
-    std::vector<TableFields> fields;
-    for (std::size_t i = 0; i < judged(); ++i) fields.push_back(fields_of(i));
-    const bool is_first = map_ != nullptr && map_->header_line > 0;
-    header_ = find_table_header(fields, cut_.begin, cut_.fields, is_first);
+    header_ = find_table_header(head_, cut_.begin, cut_.fields, map_.header_line > 0);
     row_begin_ = header_.row_begin;
-    const TextLine& first = lines_[row_begin_ < lines_.size() ? row_begin_ : 0];
-    const bool has_given = map_ != nullptr && !map_->names.empty();
     if (cut_.fields > fields_max) {
-      problems_.add(first.number, "columns", std::to_string(cut_.fields),
-                    "must be at most " + std::to_string(fields_max));
+      problems_.add(lines_[row_begin_ < lines_.size() ? row_begin_ : 0].number, "columns",
+                    std::to_string(cut_.fields), "must be at most " + std::to_string(fields_max));
     } else if (header_.unclear) {
       const TextLine& line = lines_[*header_.unclear];
       const std::string rule =
@@ -149,44 +141,43 @@ class TableReader {
       problems_.add(line.number, "", line.text,
                     "is neither a row like those below nor names, units or numbers of channels: " +
                         rule + " in the file of --columns");
-    } else if (header_.names && !(has_given && fields[*header_.names].size() != cut_.fields)) {
-      if (header_.units)
-        for (const std::string_view field : fields[*header_.units])
-          table_.units.emplace_back(unit_in_row(field));
-      return take_names(*header_.names) && names_are_clear();
+    } else if (header_.names &&
+               (map_.names.empty() || head_[*header_.names].size() == cut_.fields)) {
+      return take_names(*header_.names) && make_columns();
     } else if (take_commented_names() || take_given_names()) {
-      if (row_begin_ == 0 || is_all_words(fields[row_begin_ - 1])) return names_are_clear();
+      if (row_begin_ == 0 || is_all_words(head_[row_begin_ - 1])) return make_columns();
       problems_.add(lines_[row_begin_ - 1].number, "",
-                    std::to_string(fields[row_begin_ - 1].size()) + " fields",
+                    std::to_string(head_[row_begin_ - 1].size()) + " fields",
                     "must have " + std::to_string(cut_.fields) + ", as the rows below");
     }
     return false;
   }
 
   /// Whether the first column of the rows is a time, or counts them.
-  bool begins_with_count_or_time() {
+  [[nodiscard]] bool begins_with_count_or_time() const {
     std::optional<double> last;
-    for (std::size_t i = row_begin_; i < judged(); ++i) {
-      const TableFields fields = fields_of(i);
-      if (fields.size() != cut_.fields) continue;
-      if (kind_of_field(fields[0]) == FieldKind::time) return true;
-      const auto number = finite_number(fields[0]);
+    for (std::size_t i = row_begin_; i < head_.size(); ++i) {
+      if (head_[i].size() != cut_.fields) continue;
+      if (kind_of_field(head_[i][0]) == FieldKind::time) return true;
+      const auto number = finite_number(head_[i][0]);
       if (!number || (last ? *number != *last + 1 : *number != 0 && *number != 1)) return false;
       last = number;
     }
     return true;
   }
 
-  static std::string more_lines(std::size_t count) {
-    if (count == 0) return {};
-    return " and " + std::to_string(count) + (count == 1 ? " more line" : " more lines");
+  void note_left_out(const std::string& where, std::size_t line, std::size_t count) {
+    if (count == 0) return;
+    std::string note = where + " left out: '" + shortened(lines_[line].text) + "'";
+    if (count > 1) note += " and " + std::to_string(count - 1) + " more line";
+    table_.notes.push_back(note + (count > 2 ? "s" : ""));
   }
 
   bool take_names(std::size_t line) {
-    TableFields fields = fields_of(line);
+    TableFields fields = head_[line];
     while (fields.size() > cut_.fields && fields.back().empty()) fields.pop_back();
     if (fields.size() + 1 == cut_.fields) {
-      const TableFields row = fields_of(row_begin_);
+      const TableFields row = row_begin_ < head_.size() ? head_[row_begin_] : TableFields{};
       if (row.size() == cut_.fields && row.back().empty())
         fields.emplace_back();  // a separator at the end of each row
       else if (begins_with_count_or_time())
@@ -205,69 +196,64 @@ class TableReader {
     }
     table_.has_header = true;
     table_.header_line = lines_[line].number;
-    for (const std::string_view field : fields) table_.header.push_back(unquoted(field));
+    for (const std::string_view field : fields) names_.push_back(unquoted(field));
     header_text_ = lines_[line].text;
-    if (line > 0)
-      table_.notes.push_back("above the header in line " + std::to_string(table_.header_line) +
-                             " left out: '" + shortened(lines_[0].text) + "'" +
-                             more_lines(line - 1));
-    const std::size_t between = row_begin_ - line - 1 - (header_.units > line ? 1 : 0);
-    if (between > 0)
-      table_.notes.push_back("between the header and the first row left out: '" +
-                             shortened(lines_[row_begin_ - 1].text) + "'" +
-                             more_lines(between - 1));
+    note_left_out("above the header in line " + std::to_string(table_.header_line), 0, line);
+    note_left_out("between the header and the first row", row_begin_ - 1,
+                  row_begin_ - line - 1 - (header_.units > line ? 1 : 0));
     return true;
   }
 
   /// "# time t1 z": names in the last comment before rows without a header.
   bool take_commented_names() {
-    std::string_view text = last_comment_.text;
+    const std::string_view text = found_.last_comment.text;
     if (row_begin_ > 0 || text.empty()) return false;
     TableFields fields;
     static_cast<void>(split_line(text, table_.separator, fields));
-    if (fields.size() != cut_.fields) {
+    if (fields.size() != cut_.fields)
       static_cast<void>(split_line(trimmed(text.substr(1)), table_.separator, fields));
-    } else {
+    else
       fields[0] = trimmed(fields[0].substr(1));
-    }
-    if (fields.size() != cut_.fields || !std::all_of(fields.begin(), fields.end(), [](auto field) {
+    if (fields.size() != cut_.fields || !std::ranges::all_of(fields, [](std::string_view field) {
           return kind_of_field(field) == FieldKind::text || field.empty();
         }))
       return false;
     table_.has_header = true;
-    table_.header_line = last_comment_.number;
-    for (const std::string_view field : fields) table_.header.emplace_back(field);
+    table_.header_line = found_.last_comment.number;
+    names_.assign(fields.begin(), fields.end());
     return true;
   }
 
   bool take_given_names() {
     row_begin_ = row_begin_ < lines_.size() ? row_begin_ : 0;
-    table_.header.assign(cut_.fields, "");
-    const bool has_names = map_ != nullptr && !map_->names.empty();
-    if (!has_names) return true;
-    if (map_->names.size() != cut_.fields) {
-      problems_.add(
-          lines_[row_begin_].number, "names", std::to_string(map_->names.size()) + " names",
-          "must be one for each of the " + std::to_string(cut_.fields) + " fields of a row");
-      return false;
-    }
-    table_.header = map_->names;
-    return true;
+    names_ = map_.names;
+    if (names_.empty()) names_.resize(cut_.fields);
+    if (names_.size() == cut_.fields) return true;
+    problems_.add(
+        lines_[row_begin_].number, "names", std::to_string(names_.size()) + " names",
+        "must be one for each of the " + std::to_string(cut_.fields) + " fields of a row");
+    return false;
   }
 
-  bool names_are_clear() {
-    if (table_.has_header && map_ != nullptr && !map_->names.empty())
-      problems_.add(table_.header_line, "names", map_->names.front(),
+  /// Makes the columns of `names_`.
+  bool make_columns() {
+    if (table_.has_header && !map_.names.empty())
+      problems_.add(table_.header_line, "names", map_.names.front(),
                     "are for a table without a header; this one has names in this line");
-    for (std::size_t i = 0; i < table_.header.size(); ++i)
-      if (table_.header[i].empty()) table_.header[i] = unnamed(i);
+    table_.has_unit_row = !header_text_.empty() && header_.units;
+    for (std::size_t i = 0; i < names_.size(); ++i) {
+      TextColumn& column = table_.columns.emplace_back();
+      column.header = names_[i].empty() ? unnamed(i) : names_[i];
+      if (table_.has_unit_row) column.unit_in_row = unit_in_row(head_[*header_.units][i]);
+    }
     return problems_.empty();
   }
 
   void read_rows() {
     TableFields fields;
+    const std::size_t columns = table_.columns.size();
     const std::size_t rows = lines_.size() - std::min(row_begin_, lines_.size());
-    table_.fields.reserve(rows * table_.columns());
+    for (TextColumn& column : table_.columns) column.fields.reserve(rows);
     table_.lines.reserve(rows);
     for (std::size_t i = row_begin_; i < lines_.size() && !problems_.full(); ++i) {
       const TextLine& line = lines_[i];
@@ -276,58 +262,57 @@ class TableReader {
         problems_.add(line.number, "", line.text, "has a quote that is not closed");
         continue;
       }
-      while (fields.size() > table_.columns() && fields.back().empty()) fields.pop_back();
+      while (fields.size() > columns && fields.back().empty()) fields.pop_back();
       fill_up(fields);
       const bool is_cut_off = i + 1 == lines_.size() && table_.text.back() != '\n';
-      if (is_cut_off && fields.size() < table_.columns() && table_.rows() > 0) {
+      if (is_cut_off && fields.size() < columns && table_.rows() > 0) {
         table_.notes.push_back("the last line, " + std::to_string(line.number) +
                                ", is cut off: left out");
-        continue;
-      }
-      if (fields.size() != table_.columns()) {
+      } else if (fields.size() != columns) {
         problems_.add(line.number, "", std::to_string(fields.size()) + " fields",
-                      "must have " + std::to_string(table_.columns()) + ", as the header");
-        continue;
+                      "must have " + std::to_string(columns) + ", as the header");
+      } else {
+        for (std::size_t k = 0; k < columns; ++k) table_.columns[k].fields.push_back(fields[k]);
+        table_.lines.push_back(line.number);
       }
-      table_.fields.insert(table_.fields.end(), fields.begin(), fields.end());
-      table_.lines.push_back(line.number);
     }
     if (table_.rows() == 0 && problems_.empty()) problems_.add(0, "", "", "has no row of data");
   }
 
-  const ColumnMap* map_;
-  int lines_above_;
+  const ColumnMap& map_;
   ProblemList& problems_;
   TextTable table_;
-  std::vector<TextLine> lines_;
-  TextLine last_comment_;
-  std::optional<char> given_separator_;
+  TextLines found_;
+  const std::vector<TextLine>& lines_{found_.lines};
   Cut cut_;
-  std::size_t narrowest_{0};  ///< required fields of a row; 0: all
+  std::vector<TableFields> head_;  ///< fields of the judged lines
+  std::size_t narrowest_{0};       ///< required fields of a row; 0: all
   std::size_t row_begin_{0};
   TableHeader header_;
+  std::vector<std::string> names_;
   std::string_view header_text_;
 };
 
 }  // namespace
 
-void TextTable::leave_out(const std::vector<bool>& left_out) {
-  TextTable kept;
-  for (std::size_t i = 0; i < columns(); ++i) {
-    if (left_out[i]) continue;
-    kept.header.push_back(header[i]);
-    if (!units.empty()) kept.units.push_back(units[i]);
-  }
-  for (std::size_t k = 0; k < fields.size(); ++k)
-    if (!left_out[k % columns()]) kept.fields.push_back(fields[k]);
-  header = std::move(kept.header);
-  units = std::move(kept.units);
-  fields = std::move(kept.fields);
+std::size_t TextTable::find(std::string_view header) const {
+  const auto found = std::ranges::find(columns, header, &TextColumn::header);
+  return static_cast<std::size_t>(found - columns.begin());
 }
 
-TextTable read_text_table(std::string text, const ColumnMap* map, int lines_above,
+void TextTable::refuse_field(std::size_t row, std::size_t column, std::string rule) const {
+  problems.add(lines[row], columns[column].header, columns[column].fields[row], std::move(rule));
+}
+
+void TextTable::refuse_column(std::size_t column, std::string rule) const {
+  const std::string& header = columns[column].header;
+  problems.add(header_line, "column " + std::to_string(column + 1),
+               header.empty() ? "(empty)" : header, std::move(rule));
+}
+
+TextTable read_text_table(std::string text, const ColumnMap& map, int lines_above,
                           ProblemList& problems) {
-  return TableReader(map, lines_above, problems).read(std::move(text));
+  return TableReader(map, problems).read(std::move(text), lines_above);
 }
 
 std::string separator_name(char separator) {

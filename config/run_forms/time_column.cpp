@@ -1,10 +1,10 @@
 #include "config/run_forms/time_column.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <string>
+#include <utility>
 
-#include "config/run_forms/number_epoch.hpp"
 #include "config/run_forms/spelled_unit.hpp"
 #include "config/run_forms/time_name.hpp"
 #include "config/run_forms/time_stamp.hpp"
@@ -15,36 +15,35 @@ namespace {
 
 constexpr double day_s = 86400.0;
 
+/// The least and the greatest difference of two that follow each other.
+std::pair<double, double> steps_of(const std::vector<double>& numbers, double (*seconds)(double)) {
+  double low = INFINITY;
+  double high = -INFINITY;
+  for (std::size_t i = 1; i < numbers.size(); ++i) {
+    const double step = seconds(numbers[i]) - seconds(numbers[i - 1]);
+    low = std::min(low, step);
+    high = std::max(high, step);
+  }
+  return {low, high};
+}
+
 /// 95950, 100000, 100010: equal steps only as hours, minutes and seconds.
 bool are_clock_digits(const std::vector<double>& numbers) {
-  const auto steps_of = [&](auto seconds) {
-    double low = INFINITY;
-    double high = -INFINITY;
-    for (std::size_t i = 1; i < numbers.size(); ++i) {
-      const double step = seconds(numbers[i]) - seconds(numbers[i - 1]);
-      low = std::min(low, step);
-      high = std::max(high, step);
-    }
-    return std::pair(low, high);
-  };
-  const auto of_clock = [](double n) {
-    return 3600 * std::floor(n / 1e4) + 60 * std::fmod(std::floor(n / 100), 100) +
-           std::fmod(n, 100);
-  };
-  const bool may_be = std::all_of(numbers.begin(), numbers.end(), [](double n) {
+  const bool may_be = std::ranges::all_of(numbers, [](double n) {
     return n >= 0 && n < 240000 && std::fmod(n, 100) < 60 && std::fmod(n / 100, 100) < 60;
   });
   if (!may_be || numbers.back() < 1e4) return false;
-  const auto [low, high] = steps_of(of_clock);
-  const auto [number_low, number_high] = steps_of([](double n) { return n; });
+  const auto [low, high] = steps_of(numbers, [](double n) {
+    return 3600 * std::floor(n / 1e4) + 60 * std::fmod(std::floor(n / 100), 100) +
+           std::fmod(n, 100);
+  });
+  const auto [number_low, number_high] = steps_of(numbers, [](double n) { return n; });
   return low > 0 && high <= 2 * low && number_high > 2 * number_low && number_high >= 40 + high;
 }
 
 class TimeReader {
  public:
-  TimeReader(const TextTable& table, const TimeColumns& time, const ColumnMap* map,
-             const std::vector<std::string>& units, const NumberForm& form, ProblemList& problems)
-      : table_(table), time_(time), map_(map), units_(units), form_(form), problems_(problems) {}
+  TimeReader(TextTable& table, const TimeColumns& time) : table_(table), time_(time) {}
 
   RunTime read() {
     if (time_.columns.empty())
@@ -54,33 +53,37 @@ class TimeReader {
     else if (time_.columns.size() == 2 || stamp_of(0, time_.columns[0]))
       read_stamps();
     else
-      read_numbers(time_.columns[0]);
-    for (const double value : run_.time_s)
-      if (!std::isfinite(value) && problems_.empty())
-        problems_.add(0, "time_s", "(too large)", "must be finite numbers of seconds");
-    if (time_.dates && problems_.empty()) {
-      const auto stamp = parse_time_stamp(table_.field(0, *time_.dates));
-      const auto seconds = stamp ? seconds_of(*stamp, DateOrder::unknown, false) : std::nullopt;
-      if (seconds) run_.wall_zero = {*seconds - run_.time_s.front(), stamp->zone_s.has_value()};
-    }
+      read_numbers(column(0));
+    if (!std::ranges::all_of(run_.time_s, [](double value) { return std::isfinite(value); }) &&
+        problems_.empty())
+      problems_.add(0, "time_s", "(too large)", "must be finite numbers of seconds");
+    if (time_.dates && problems_.empty())
+      if (const auto at = wall_time(table_.columns[*time_.dates].fields[0]))
+        run_.wall_zero = {at->seconds - run_.time_s.front(), at->is_utc};
     return std::move(run_);
   }
 
  private:
-  [[nodiscard]] std::string_view asked_unit() const {
-    return map_ == nullptr ? std::string_view() : std::string_view(map_->time_unit);
+  /// A part of the time.
+  [[nodiscard]] const TextColumn& column(std::size_t i) const {
+    return table_.columns[time_.columns[i]];
   }
+  [[nodiscard]] std::string quoted(std::size_t i) const {
+    return "'" + table_.columns[i].header + "'";
+  }
+  void note(const std::string& text) { table_.notes.push_back("time_s: " + text); }
 
   // ---- numbers
   void read_period() {
+    const double period_s = *table_.map.period_s;
     for (std::size_t row = 0; row < table_.rows(); ++row)
-      run_.time_s.push_back(static_cast<double>(row) * *map_->period_s);
-    run_.note = "time_s: a row each " + number_text(*map_->period_s) + " s, from the first";
+      run_.time_s.push_back(static_cast<double>(row) * period_s);
+    note("a row each " + number_text(period_s) + " s, from the first");
   }
 
-  bool take_numbers(std::size_t column) {
+  bool take_numbers(const TextColumn& numbers) {
     for (std::size_t row = 0; row < table_.rows(); ++row) {
-      const auto number = number_of(table_.field(row, column), form_);
+      const auto number = table_.number(numbers.fields[row]);
       if (!number && row == 0) return refuse_form();
       if (!number)
         refuse(row,
@@ -91,59 +94,53 @@ class TimeReader {
   }
 
   void read_day_of_year() {
-    const auto number = [&](std::size_t row, std::size_t column) {
-      const auto value = number_of(table_.field(row, time_.columns[column]), form_);
-      if (!value) refuse(row, "must be year, day of the year and hhmm, as in the rows before");
-      return value.value_or(0.0);
-    };
-    double first = 0.0;
     for (std::size_t row = 0; row < table_.rows() && !problems_.full(); ++row) {
-      TimeStamp new_year;
-      new_year.has_date = true;
-      new_year.date = {static_cast<int>(number(row, 0)), 1, 1};
-      new_year.allows[static_cast<std::size_t>(DateOrder::year_month_day)] = true;
-      const double hhmm = number(row, 2);
-      const double at = seconds_of(new_year, DateOrder::unknown, false).value_or(0.0) +
-                        day_s * (number(row, 1) - 1) + 3600 * std::floor(hhmm / 100) +
-                        60 * std::fmod(hhmm, 100.0);
-      if (row == 0) first = at;
-      run_.time_s.push_back(at - first);
+      const auto number = [&](std::size_t i) {
+        const auto value = table_.number(column(i).fields[row]);
+        if (!value) refuse(row, "must be year, day of the year and hhmm, as in the rows before");
+        return value.value_or(0.0);
+      };
+      const double new_year = seconds_of_day(static_cast<int>(number(0)), 1, 1).value_or(0.0);
+      const double hhmm = number(2);
+      run_.time_s.push_back(new_year + day_s * (number(1) - 1) + 3600 * std::floor(hhmm / 100) +
+                            60 * std::fmod(hhmm, 100.0));
     }
+    const double first = run_.time_s.front();
+    for (double& at : run_.time_s) at -= first;
     run_.wall_zero = WallZero{first, false};
-    run_.note = "time_s: year, day of the year and hhmm from '" + table_.header[time_.columns[0]] +
-                "' on, seconds after the first row (" + date_text(first) + ")";
+    note("year, day of the year and hhmm from " + quoted(time_.columns[0]) +
+         " on, seconds after the first row (" + date_text(first) + ")");
   }
 
-  void read_numbers(std::size_t column) {
-    const std::string& header = table_.header[column];
-    if (!take_numbers(column)) return;
-    std::string unit(asked_unit());
-    if (unit.empty()) unit = header == "time_s" ? "s" : units_[column];
+  void read_numbers(const TextColumn& numbers) {
+    if (!take_numbers(numbers)) return;
+    const std::string& header = numbers.header;
+    std::string unit = table_.map.time_unit;
+    if (unit.empty()) unit = header == "time_s" ? "s" : numbers.unit;
     if (unit.empty()) unit = unit_of_time_name(header);
-    if (number_text_of(units_[column]).unit != nullptr) {
-      problems_.add(table_.header_line, header, units_[column],
+    if (number_text_of(numbers.unit).unit != nullptr) {
+      problems_.add(table_.header_line, header, numbers.unit,
                     "is a multiple of a unit: write the times in s, and s as their unit");
       return;
     }
     if (!unit.empty() && are_clock_digits(run_.time_s)) {
-      problems_.add(table_.lines[0], header, table_.field(0, column),
-                    "is a clock without colons, as the last digits of all rows show, and not a "
-                    "number of " +
-                        unit + ": write time_unit = \"hhmmss\" in the file of --columns");
+      refuse(0,
+             "is a clock without colons, as the last digits of all rows show, and not a number "
+             "of " +
+                 unit + ": write time_unit = \"hhmmss\" in the file of --columns");
       return;
     }
-    const SpelledUnit* known = spelled_unit(unit);
-    const bool is_time = known != nullptr && known->dimension == "time";
+    const SpelledUnit* known = time_unit(unit);
+    const bool is_time = known != nullptr;
     const Epoch* epoch = epoch_of(run_.time_s, is_time || names_date(header), is_time);
     if (epoch != nullptr && is_time && std::abs(known->factor * epoch->per_second - 1) > 1e-9)
       epoch = nullptr;  // the unit implies another scale
     if (epoch != nullptr) {
       count_from_first(header, *epoch);
     } else if (is_time) {
-      run_.note = "time_s: '" + header + "', numbers [" + unit + "]";
-      if (known->factor == 1.0) return;
       for (double& value : run_.time_s) value *= known->factor;
-      run_.note += ", times " + number_text(known->factor);
+      note("'" + header + "', numbers [" + unit + "]" +
+           (known->factor == 1.0 ? "" : ", times " + number_text(known->factor)));
     } else {
       problems_.add(table_.header_line, header, unit.empty() ? "(no unit)" : unit,
                     "has no unit of time: write time_unit = \"s\" (or \"ms\", \"min\", \"h\", "
@@ -158,20 +155,19 @@ class TimeReader {
       value = std::round((value - first) / epoch.per_second * 1e6) / 1e6;
     const double zero_s = first / epoch.per_second + epoch.zero_s;
     run_.wall_zero = WallZero{zero_s, epoch.is_utc};
-    run_.note = "time_s: '" + header + "', numbers [" + epoch.name +
-                "], seconds after the first row (" +
-                (epoch.is_utc ? date_text(zero_s) + " UTC)" : number_text(first) + ")");
+    note("'" + header + "', numbers [" + epoch.name + "], seconds after the first row (" +
+         (epoch.is_utc ? date_text(zero_s) + " UTC)" : number_text(first) + ")"));
   }
 
   // ---- dates and clock times
   /// The stamp of a field; with time_unit = "hhmmss" of the number 95950.
-  [[nodiscard]] std::optional<TimeStamp> stamp_of(std::size_t row, std::size_t column) const {
-    const std::string_view field = table_.field(row, column);
-    if (time_.half && column == time_.columns.back())
+  [[nodiscard]] std::optional<TimeStamp> stamp_of(std::size_t row, std::size_t i) const {
+    const std::string_view field = table_.columns[i].fields[row];
+    if (time_.half && i == time_.columns.back())
       return parse_time_stamp(std::string(field) + ' ' +
-                              std::string(table_.field(row, *time_.half)));
-    if (asked_unit() != "hhmmss") return parse_time_stamp(field);
-    const auto number = finite_number(field);
+                              std::string(table_.columns[*time_.half].fields[row]));
+    const auto number =
+        table_.map.time_unit == "hhmmss" ? finite_number(field) : std::optional<double>();
     if (!number || *number >= 1e6) return parse_time_stamp(field);
     TimeStamp stamp;
     stamp.has_clock = true;
@@ -186,10 +182,10 @@ class TimeReader {
   void read_stamps() {
     std::vector<TimeStamp> stamps;
     std::optional<TimeStamp> date;  // the last one written
-    const auto zone = zone_of_header(table_.header[time_.columns[0]]);
+    const auto zone = zone_of_header(column(0).header);
+    const bool has_clocks = time_.columns.size() == 2;
     for (std::size_t row = 0; row < table_.rows() && !problems_.full(); ++row) {
-      const bool has_clocks = time_.columns.size() == 2;
-      if (!has_clocks || row == 0 || !table_.field(row, time_.columns[0]).empty())
+      if (!has_clocks || row == 0 || !column(0).fields[row].empty())
         date = stamp_of(row, time_.columns[0]);
       std::optional<TimeStamp> stamp = date;
       if (stamp && has_clocks) stamp = joined(row, *stamp);
@@ -205,12 +201,12 @@ class TimeReader {
                "measurement");
       stamps.push_back(stamp.value_or(TimeStamp{}));
     }
-    if (!problems_.empty() || stamps.empty() || !clock_is_clear(stamps) || counts_ms(stamps))
+    if (!problems_.empty() || stamps.empty() || !clock_is_clear(stamps.front()) ||
+        counts_ms(stamps))
       return;
     const std::optional<DateOrder> order = date_order(stamps);
     if (!problems_.empty()) return;
-    const DateOrder taken = order.value_or(DateOrder::unknown);
-    run_.time_s = seconds_by(stamps, taken);
+    run_.time_s = seconds_by(stamps, order.value_or(DateOrder::unknown));
     add_fractions();
     const double first = run_.time_s.front();
     for (std::size_t row = 0; row < stamps.size(); ++row) {
@@ -227,10 +223,9 @@ class TimeReader {
   /// NaN for a day that does not exist.
   [[nodiscard]] std::vector<double> seconds_by(const std::vector<TimeStamp>& stamps,
                                                DateOrder order) const {
-    const bool minutes_first = asked_unit() == "mm:ss";
-    const bool wraps =
-        !stamps.front().has_date && !minutes_first &&
-        std::all_of(stamps.begin(), stamps.end(), [](const auto& s) { return s.clock_a < 24; });
+    const bool minutes_first = table_.map.time_unit == "mm:ss";
+    const bool wraps = !stamps.front().has_date && !minutes_first &&
+                       std::ranges::all_of(stamps, [](const auto& s) { return s.clock_a < 24; });
     std::vector<double> seconds;
     double days = 0.0;
     double last = 0.0;
@@ -246,17 +241,16 @@ class TimeReader {
   void add_fractions() {
     for (std::size_t row = 0; row < table_.rows() && time_.fraction; ++row)
       run_.time_s[row] += time_.fraction_factor *
-                          number_of(table_.field(row, *time_.fraction), form_).value_or(NAN);
+                          table_.number(table_.columns[*time_.fraction].fields[row]).value_or(NAN);
   }
 
-  std::optional<TimeStamp> joined(std::size_t row, TimeStamp date) const {
-    const auto clock = stamp_of(row, time_.columns[1]);
+  [[nodiscard]] std::optional<TimeStamp> joined(std::size_t row, const TimeStamp& date) const {
+    auto clock = stamp_of(row, time_.columns[1]);
     if (!clock || clock->has_date || (date.has_clock && !date.is_midnight())) return std::nullopt;
-    TimeStamp both = *clock;
-    both.has_date = true;
-    both.date = date.date;
-    both.allows = date.allows;
-    return both;
+    clock->has_date = true;
+    clock->date = date.date;
+    clock->allows = date.allows;
+    return clock;
   }
 
   static bool alike(const TimeStamp& a, const TimeStamp& b) {
@@ -270,19 +264,15 @@ class TimeReader {
   std::optional<DateOrder> date_order(const std::vector<TimeStamp>& stamps) {
     if (!stamps.front().has_date) return DateOrder::unknown;
     std::vector<DateOrder> possible;
-    const DateOrder asked = map_ == nullptr ? DateOrder::unknown : map_->date_order;
-    for (const DateOrder order :
-         {DateOrder::year_month_day, DateOrder::day_month_year, DateOrder::month_day_year}) {
-      const bool by_all = std::all_of(stamps.begin(), stamps.end(), [&](const TimeStamp& stamp) {
-        return stamp.allows_order(order);
-      });
-      if (by_all && order == asked) return order;
-      if (by_all) possible.push_back(order);
+    for (const DateOrder order : date_orders) {
+      const auto allows = [&](const TimeStamp& stamp) { return stamp.allows_order(order); };
+      if (!std::ranges::all_of(stamps, allows)) continue;
+      if (order == table_.map.date_order) return order;
+      possible.push_back(order);
     }
     if (possible.empty()) {
-      const auto other = std::find_if(stamps.begin(), stamps.end(), [&](const TimeStamp& stamp) {
-        return stamp.allows != stamps.front().allows;
-      });
+      const auto other = std::ranges::find_if(
+          stamps, [&](const TimeStamp& stamp) { return stamp.allows != stamps.front().allows; });
       refuse(static_cast<std::size_t>(other - stamps.begin()) % stamps.size(),
              "has day and month in another order than an earlier row");
       return std::nullopt;
@@ -292,28 +282,22 @@ class TimeReader {
     for (const DateOrder order : possible) {
       const std::vector<double> seconds = seconds_by(stamps, order);
       const auto [low, high] = std::minmax_element(seconds.begin(), seconds.end());
-      const bool is_good =
-          std::none_of(seconds.begin(), seconds.end(), [](double s) { return std::isnan(s); });
-      if (is_good) spans.emplace_back(*high - *low, order);
+      if (std::ranges::none_of(seconds, [](double s) { return std::isnan(s); }))
+        spans.emplace_back(*high - *low, order);
     }
-    std::sort(spans.begin(), spans.end(),
-              [](const auto& a, const auto& b) { return a.first < b.first; });
+    std::ranges::sort(spans, {}, &std::pair<double, DateOrder>::first);
     if (spans.size() == 1) return spans[0].second;
     if (spans.size() > 1 && spans[1].first > 5 * spans[0].first) return spans[0].second;
     if (stamps.front().has_points) return DateOrder::day_month_year;
-    const bool one_day = std::all_of(stamps.begin(), stamps.end(), [&](const TimeStamp& stamp) {
-      return stamp.date == stamps.front().date;
-    });
-    if (!one_day)
+    if (!std::ranges::all_of(stamps, [&](const auto& s) { return s.date == stamps[0].date; }))
       refuse(0,
              "may begin with the day or the month: write date_order = \"day.month.year\" or "
              "\"month.day.year\" in the file of --columns");
     return std::nullopt;
   }
 
-  bool clock_is_clear(const std::vector<TimeStamp>& stamps) {
-    const TimeStamp& first = stamps.front();
-    if (first.clock_parts != 2 || !asked_unit().empty()) return true;
+  bool clock_is_clear(const TimeStamp& first) {
+    if (first.clock_parts != 2 || !table_.map.time_unit.empty()) return true;
     // Beside a date they are hours and minutes, unless a spreadsheet shows 00:10.0.
     if (first.has_date && first.fraction_digits == 0) return true;
     refuse(0,
@@ -325,12 +309,11 @@ class TimeReader {
   /// Refuses 8:00:00.3, 8:00:00.20: the fractions may be of a second, or counts of ms.
   bool counts_ms(const std::vector<TimeStamp>& stamps) {
     int digits = 0;  // digits in the first fraction
-    const auto other = std::find_if(stamps.begin(), stamps.end(), [&](const TimeStamp& stamp) {
+    const auto other = std::ranges::find_if(stamps, [&](const TimeStamp& stamp) {
       if (digits == 0) digits = stamp.fraction_digits;
       return stamp.fraction_digits != 0 && stamp.fraction_digits != digits;
     });
-    if (other == stamps.end() || std::none_of(stamps.begin(), stamps.end(),
-                                              [](const TimeStamp& s) { return s.may_count_ms; }))
+    if (other == stamps.end() || std::ranges::none_of(stamps, &TimeStamp::may_count_ms))
       return false;
     refuse(static_cast<std::size_t>(other - stamps.begin()),
            "may end with a fraction of a second or with a number of ms, since the rows have "
@@ -339,27 +322,28 @@ class TimeReader {
   }
 
   void note_stamps(const TimeStamp& first, std::optional<DateOrder> order, double first_s) {
-    run_.note = "time_s: '" + table_.header[time_.columns[0]] + "'";
-    if (time_.columns.size() == 2) run_.note += " and '" + table_.header[time_.columns[1]] + "'";
-    if (time_.fraction) run_.note += " and '" + table_.header[*time_.fraction] + "'";
-    if (time_.half) run_.note += " and '" + table_.header[*time_.half] + "'";
+    std::string text = quoted(time_.columns[0]);
+    if (time_.columns.size() == 2) text += " and " + quoted(time_.columns[1]);
+    for (const auto& part : {time_.fraction, time_.half})
+      if (part) text += " and " + quoted(*part);
     if (first.has_date && !order) {
-      run_.note +=
-          ", seconds after the first row; the date may begin with the day or the month, which "
-          "matters only for --join (date_order = \"day.month.year\" or \"month.day.year\" in the "
-          "file of --columns)";
-    } else if (first.has_date) {
-      run_.note += *order == DateOrder::year_month_day   ? ", year-month-day"
-                   : *order == DateOrder::month_day_year ? ", month/day/year"
-                                                         : ", day.month.year";
-      run_.note += ", seconds after the first row (" + date_text(first_s);
-      run_.note += first.zone_s ? " UTC)" : ")";
-    } else {
-      run_.note += first.clock_parts == 2 && asked_unit() == "mm:ss" ? ", minutes:seconds"
-                                                                     : ", time of the clock";
-      run_.note +=
-          ", seconds after the first row (" + std::string(table_.field(0, time_.columns[0])) + ")";
+      note(text +
+           ", seconds after the first row; the date may begin with the day or the month, which "
+           "matters only for --join (date_order = \"day.month.year\" or \"month.day.year\" in the "
+           "file of --columns)");
+      return;
     }
+    std::string zero(column(0).fields[0]);
+    if (first.has_date) {
+      text += *order == DateOrder::year_month_day   ? ", year-month-day"
+              : *order == DateOrder::month_day_year ? ", month/day/year"
+                                                    : ", day.month.year";
+      zero = date_text(first_s) + (first.zone_s ? " UTC" : "");
+    } else {
+      text += first.clock_parts == 2 && table_.map.time_unit == "mm:ss" ? ", minutes:seconds"
+                                                                        : ", time of the clock";
+    }
+    note(text + ", seconds after the first row (" + zero + ")");
   }
 
   /// Reports the first row only.
@@ -369,27 +353,21 @@ class TimeReader {
   }
 
   void refuse(std::size_t row, std::string rule) {
-    const std::size_t column = time_.columns[0];
-    const std::string_view field = table_.field(row, column);
-    problems_.add(table_.lines[row], table_.header[column], field.empty() ? "(missing)" : field,
+    const std::string_view field = column(0).fields[row];
+    problems_.add(table_.lines[row], column(0).header, field.empty() ? "(missing)" : field,
                   std::move(rule));
   }
 
-  const TextTable& table_;
+  TextTable& table_;
   const TimeColumns& time_;
-  const ColumnMap* map_;
-  const std::vector<std::string>& units_;
-  const NumberForm& form_;
-  ProblemList& problems_;
+  ProblemList& problems_{table_.problems};
   RunTime run_;
 };
 
 }  // namespace
 
-RunTime read_time(const TextTable& table, const TimeColumns& time, const ColumnMap* map,
-                  const std::vector<std::string>& units, const NumberForm& form,
-                  ProblemList& problems) {
-  return TimeReader(table, time, map, units, form, problems).read();
+RunTime read_time(TextTable& table, const TimeColumns& time) {
+  return TimeReader(table, time).read();
 }
 
 }  // namespace thermocomp

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "config/run_forms/find_time.hpp"
@@ -12,15 +11,11 @@ namespace thermocomp {
 
 struct RunTime {
   std::vector<double> time_s;  ///< of each row, in the order of the rows
-  std::string note;            ///< how it was read
   std::optional<WallZero> wall_zero;
 };
 
 /// Dates, clock times and numbers with an epoch are counted from the first row, other numbers from
-/// their own zero.
-/// @param units  of each column, as written; empty: none
-[[nodiscard]] RunTime read_time(const TextTable& table, const TimeColumns& time,
-                                const ColumnMap* map, const std::vector<std::string>& units,
-                                const NumberForm& form, ProblemList& problems);
+/// their own zero. Adds a note to the table.
+[[nodiscard]] RunTime read_time(TextTable& table, const TimeColumns& time);
 
 }  // namespace thermocomp

@@ -265,25 +265,27 @@ std::optional<double> parse_zone(std::string_view text) {
   return trimmed(text).empty() ? zone : std::nullopt;
 }
 
+std::optional<double> seconds_of_day(int year, int month, int day) {
+  if (year < 100) year += year < 70 ? 2000 : 1900;
+  const std::chrono::year_month_day date{std::chrono::year{year},
+                                         std::chrono::month{static_cast<unsigned>(month)},
+                                         std::chrono::day{static_cast<unsigned>(day)}};
+  if (!date.ok()) return std::nullopt;
+  return 86400.0 * static_cast<double>(std::chrono::sys_days(date).time_since_epoch().count());
+}
+
 std::optional<double> seconds_of(const TimeStamp& stamp, DateOrder order, bool minutes_first) {
   double seconds = 0.0;
   if (stamp.has_date) {
-    for (const DateOrder each :
-         {DateOrder::year_month_day, DateOrder::day_month_year, DateOrder::month_day_year})
+    for (const DateOrder each : date_orders)
       if (order == DateOrder::unknown && stamp.allows_order(each)) order = each;
-    if (!stamp.allows_order(order)) return std::nullopt;
-    const std::array<std::size_t, 3> at =
-        order == DateOrder::day_month_year   ? std::array<std::size_t, 3>{0, 1, 2}
-        : order == DateOrder::month_day_year ? std::array<std::size_t, 3>{1, 0, 2}
-                                             : std::array<std::size_t, 3>{2, 1, 0};
-    int year = stamp.date[at[2]];
-    if (year < 100) year += year < 70 ? 2000 : 1900;
-    const std::chrono::year_month_day date{
-        std::chrono::year{year}, std::chrono::month{static_cast<unsigned>(stamp.date[at[1]])},
-        std::chrono::day{static_cast<unsigned>(stamp.date[at[0]])}};
-    if (!date.ok() || (stamp.has_clock && stamp.clock_a > 24)) return std::nullopt;
-    const auto days = std::chrono::sys_days(date).time_since_epoch().count();
-    seconds = 86400.0 * static_cast<double>(days);
+    if (!stamp.allows_order(order) || (stamp.has_clock && stamp.clock_a > 24)) return std::nullopt;
+    const auto& [a, b, c] = stamp.date;
+    const auto day = order == DateOrder::day_month_year   ? seconds_of_day(c, b, a)
+                     : order == DateOrder::month_day_year ? seconds_of_day(c, a, b)
+                                                          : seconds_of_day(a, b, c);
+    if (!day) return std::nullopt;
+    seconds = *day;
   }
   if (stamp.has_clock && stamp.clock_parts == 2 && minutes_first)
     seconds += 60.0 * stamp.clock_a + stamp.clock_b;

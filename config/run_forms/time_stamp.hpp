@@ -10,6 +10,9 @@
 
 namespace thermocomp {
 
+inline constexpr std::array date_orders{DateOrder::year_month_day, DateOrder::day_month_year,
+                                        DateOrder::month_day_year};
+
 /// The parts of a time stamp, before the order of day, month and year is known.
 struct TimeStamp {
   bool has_date{false};
@@ -49,6 +52,8 @@ struct TimeStamp {
 /// @return nullopt when the day does not exist, or the stamp does not allow the order
 [[nodiscard]] std::optional<double> seconds_of(const TimeStamp& stamp, DateOrder order,
                                                bool minutes_first);
+/// Seconds since 1970; years below 100 are 1970 to 2069. @return nullopt: no such day
+[[nodiscard]] std::optional<double> seconds_of_day(int year, int month, int day);
 
 /// "2026-03-01 08:30:00"
 [[nodiscard]] std::string date_text(double seconds_since_1970);
