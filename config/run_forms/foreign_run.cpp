@@ -8,14 +8,12 @@
 #include <utility>
 
 #include "config/run_forms/column_meanings.hpp"
-#include "config/run_forms/column_roles.hpp"
 #include "config/run_forms/field_text.hpp"
-#include "config/run_forms/find_time.hpp"
 #include "config/run_forms/log_form.hpp"
-#include "config/run_forms/long_table.hpp"
+#include "config/run_forms/number_form.hpp"
 #include "config/run_forms/row_order.hpp"
-#include "config/run_forms/run_text.hpp"
 #include "config/run_forms/spelled_unit.hpp"
+#include "config/run_forms/text_lines.hpp"
 #include "config/run_forms/text_table.hpp"
 #include "config/run_forms/time_column.hpp"
 #include "config/text/printable_text.hpp"
@@ -45,27 +43,6 @@ void leave_empty_columns_out(TextTable& table) {
   });
 }
 
-/// The first unit of a column's cells, if each number has one: in "80.6 A" below 20.5 the A may be
-/// a flag.
-std::string_view unit_of_cells(const TextColumn& column) {
-  std::string_view first;
-  for (const std::string_view field : column.fields) {
-    const SpelledUnit* unit = number_text_of(field).unit;
-    if (unit == nullptr && looks_like_number(field)) return {};
-    if (first.empty() && unit != nullptr) first = unit->spelling;
-  }
-  return first;
-}
-
-/// Reads units from the header, the row of units, or the cells.
-void read_units(TextTable& table) {
-  for (TextColumn& column : table.columns) {
-    column.unit = spelled_name(column.header).unit;
-    if (column.unit.empty()) column.unit = column.unit_in_row;
-    if (column.unit.empty()) column.unit = unit_of_cells(column);
-  }
-}
-
 void note_layout(TextTable& table, std::vector<std::string> notes, bool from_latin1) {
   std::string note = "separator '" + separator_name(table.separator) + "', decimal " +
                      (table.form.decimal == ',' ? "comma" : "point");
@@ -76,25 +53,6 @@ void note_layout(TextTable& table, std::vector<std::string> notes, bool from_lat
   if (!table.has_header) note += ", no header";
   notes.push_back(note);
   table.notes.insert(table.notes.begin(), notes.begin(), notes.end());
-}
-
-/// Makes one row per time, and puts the rows in its order.
-void order_rows(TextTable& table, RunTime& time, const TimeColumns& columns) {
-  std::size_t shown = columns.columns.empty() ? 0 : columns.columns.back();
-  if (pivot_long_table(table, time.time_s)) {
-    if (!table.problems.empty()) return;
-    const double first = time.time_s.front();  // the earliest, which is 0
-    if (first < 0)
-      for (double& at : time.time_s) at -= first;
-    if (time.wall_zero && first < 0) time.wall_zero->seconds += first;
-    shown = 0;
-    read_units(table);
-  } else {
-    join_units(table);
-    read_units(table);
-    leave_bad_values_out(table);
-  }
-  order_in_time(table, time, shown);
 }
 
 class ValueReader {

@@ -2,9 +2,10 @@
 
 #include <array>
 #include <string>
+#include <string_view>
 
+#include "config/run_forms/field_text.hpp"
 #include "config/run_forms/spelled_unit.hpp"
-#include "config/run_forms/text_table.hpp"
 
 namespace thermocomp {
 namespace {
@@ -112,25 +113,6 @@ NumberForm number_form(const TextTable& table) {
     form.decimal = ',';
   }
   return form;
-}
-
-std::optional<double> number_of(std::string_view field, const NumberForm& form) {
-  std::array<char, 64> digits{};
-  if (field.size() >= digits.size()) return finite_number(field);
-  if (form.thousands != '\0' && field.find(form.thousands) != std::string_view::npos) {
-    std::string_view whole = field.substr(0, field.find(form.decimal));
-    if (!whole.empty() && (whole.front() == '-' || whole.front() == '+')) whole.remove_prefix(1);
-    if (!is_grouped(whole, form.thousands)) return std::nullopt;
-  }
-  std::size_t size = 0;
-  bool in_fraction = false;
-  for (const char c : field) {
-    if (c == form.thousands && c != '\0' && !in_fraction) continue;
-    if (c == form.decimal) in_fraction = true;
-    if (c == '.' && form.decimal != '.') return std::nullopt;
-    digits[size++] = c == form.decimal ? '.' : c;
-  }
-  return finite_number({digits.data(), size});
 }
 
 }  // namespace thermocomp

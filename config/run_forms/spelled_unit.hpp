@@ -1,4 +1,4 @@
-/// Units in other spellings, and numbers with a unit.
+/// Units in other spellings; numbers with a unit, with a decimal point or comma.
 #pragma once
 
 #include <optional>
@@ -65,6 +65,14 @@ struct NumberText {
   const SpelledUnit* unit{nullptr};
 };
 [[nodiscard]] NumberText number_text_of(std::string_view field);
+
+struct NumberForm {
+  char decimal{'.'};
+  char thousands{'\0'};  ///< none
+};
+
+/// @return nullopt unless `field` is one finite number of that form
+[[nodiscard]] std::optional<double> number_of(std::string_view field, const NumberForm& form);
 
 /// Whether it may be a number of either form, with or without unit.
 [[nodiscard]] bool looks_like_number(std::string_view field);

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "config/run_forms/column_map.hpp"
-#include "config/run_forms/number_form.hpp"
 #include "config/run_forms/problem_list.hpp"
+#include "config/run_forms/spelled_unit.hpp"
 
 namespace thermocomp {
 

@@ -1,8 +1,11 @@
+// Logs with a header of keys, each with values for all channels.
 #include <algorithm>
+#include <map>
 
 #include "config/run_forms/field_text.hpp"
 #include "config/run_forms/log_form.hpp"
-#include "config/run_forms/number_form.hpp"
+#include "config/run_forms/run_data.hpp"
+#include "config/run_forms/spelled_unit.hpp"
 #include "config/text/printable_text.hpp"
 
 namespace thermocomp::forms {
@@ -35,11 +38,85 @@ std::string start_ms(const std::string& filetime) {
 
 }  // namespace
 
-bool is_twincat(std::string_view text) {
-  return text.substr(0, 20000).find("SampleTime[ms]") != std::string_view::npos;
+std::optional<PlainTable> kw_watcher(const Log& log) {
+  // Numbers, names, stations, registers, kinds of value, data formats, units.
+  std::string_view rest = log.text;
+  std::vector<std::vector<std::string>> head(7);
+  for (auto& line : head) line = fields_of(take_line(rest));
+  const std::size_t columns = head[0].size();
+  if (columns < 3 || head[0][0] != "Date" || head[0][1] != "Time" || head[0][2] != "1")
+    return std::nullopt;
+  for (std::size_t i = 1; i < head.size(); ++i)
+    if (head[i].size() != columns)
+      log.refuse(static_cast<int>(i) + 1, "", std::to_string(head[i].size()) + " fields",
+                 "must have as many as the first line, " + std::to_string(columns));
+  PlainTable table;
+  table.text = "\"Date\",\"Time\"";
+  for (std::size_t i = 2; i < columns; ++i)
+    table.text.append(",").append(with_unit(head[1][i], head[6][i]));
+  table.text.append("\n").append(rest);
+  table.lines_above = 6;
+  table.notes.emplace_back("KW Watcher: names in line 2, units in line 7");
+  return table;
 }
 
-PlainTable plain_twincat(const Log& log) {
+std::optional<PlainTable> lvm(const Log& log) {
+  constexpr std::string_view end_of_header = "***End_of_Header***";
+  if (!log.text.starts_with("LabVIEW Measurement")) return std::nullopt;
+  std::map<std::string, std::vector<std::string>> keys;
+  std::string_view rest = log.text;
+  const bool by_commas = rest.substr(0, 2000).find("Separator,Comma") != std::string_view::npos;
+  const char separator = by_commas ? ',' : '\t';
+  int line = 0;
+  int names_line = 0;
+  std::vector<std::string> names;
+  std::string_view rows;
+  while (!rest.empty()) {
+    ++line;
+    std::vector<std::string> fields = fields_of(take_line(rest), separator);
+    if (names_line == line) {
+      names = std::move(fields);
+      rows = rest;
+    } else if (fields[0].starts_with(end_of_header)) {
+      names_line = line + 1;
+    } else if (!fields[0].empty() && rows.empty()) {
+      const std::string key = fields[0];
+      keys[key] = std::move(fields);
+    }
+    // The first header ends with an empty line, that of a segment with the names.
+    if (names_line == line && (names.empty() || names[0] != "X_Value")) rows = {};
+    if (!rows.empty()) break;
+  }
+  if (rows.empty()) log.refuse(line, "X_Value", "(missing)", "must head the rows of an LVM file");
+  PlainTable table;
+  const bool has_comments = names.back() == "Comment";  // most rows omit it
+  if (has_comments) names.pop_back();
+  const auto key = [&](const char* name, std::size_t i) {
+    const auto found = keys.find(name);
+    return found == keys.end() || i >= found->second.size() ? std::string() : found->second[i];
+  };
+  const auto zero = wall_time(key("Date", 1) + " " + key("Time", 1));
+  if (zero) table.text = wall_zero_comment({zero->seconds, false});
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (i > 0) table.text += separator;
+    table.text += with_unit(names[i], i == 0 ? "s" : key("Y_Unit_Label", i));
+  }
+  table.lines_above = names_line - 1 - (zero ? 1 : 0);
+  while (!rows.empty()) {
+    const std::string_view row = take_line(rows);
+    std::size_t end = has_comments ? 0 : std::string_view::npos;
+    for (std::size_t i = 0; i < names.size() && end != std::string_view::npos; ++i)
+      end = row.find(separator, i == 0 ? 0 : end + 1);
+    table.text.append("\n").append(row.substr(0, end));
+  }
+  if (has_comments) table.notes.emplace_back("'Comment' left out");
+  table.notes.emplace_back("LVM of LabVIEW: names in line " + std::to_string(names_line));
+  return table;
+}
+
+std::optional<PlainTable> twincat(const Log& log) {
+  if (log.text.substr(0, 20000).find("SampleTime[ms]") == std::string_view::npos)
+    return std::nullopt;
   const char separator = separator_of(log.text);
   std::string_view rest = log.text;
   std::vector<std::string> names;
