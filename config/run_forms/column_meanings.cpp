@@ -17,19 +17,17 @@
 namespace thermocomp {
 namespace {
 
-constexpr auto unit_names = std::to_array<std::string_view>(
-    {"unit", "units", "einheit", "unit_of_measurement", "uom", "u"});
-constexpr auto series_names = std::to_array<std::string_view>(
-    {"sensor", "sensors",    "sensor_id", "sensor_name", "sensor name", "channel",
-     "kanal",  "tag",        "tagname",   "tag name",    "probe",       "place",
-     "point",  "messstelle", "series",    "signal",      "variable",    "parameter",
-     "metric", "item",       "topic",     "entity_id",   "sphere"});
+constexpr std::string_view unit_names = "|unit|units|einheit|unit_of_measurement|uom|u|";
+constexpr std::string_view series_names =
+    "|sensor|sensors|sensor_id|sensor_name|sensor name|channel|kanal|tag|tagname"
+    "|tag name|probe|place|point|messstelle|series|signal|variable|parameter"
+    "|metric|item|topic|entity_id|sphere|";
 /// Those whose sensors may have numbers.
-constexpr auto numbered_names = std::to_array<std::string_view>(
-    {"sensor", "sensor_id", "channel", "kanal", "ch", "chan", "probe", "messstelle", "sphere"});
-constexpr auto time_part_names = std::to_array<std::string_view>(
-    {"day", "hour", "minute", "second", "sec", "secs", "millis", "milliseconds", "ms", "msec", "us",
-     "usec", "micros", "microseconds", "ns", "nsec", "nanoseconds"});
+constexpr std::string_view numbered_names =
+    "|sensor|sensor_id|channel|kanal|ch|chan|probe|messstelle|sphere|";
+constexpr std::string_view time_part_names =
+    "|day|hour|minute|second|sec|secs|millis|milliseconds|ms|msec|us|usec|micros"
+    "|microseconds|ns|nsec|nanoseconds|";
 
 enum class Quality { good, bad, other };
 enum class Codes { none, opc, validity };  ///< validity: 1 good, 0 bad

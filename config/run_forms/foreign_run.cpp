@@ -23,13 +23,11 @@ namespace thermocomp {
 namespace {
 
 /// Usual words for a missing value, in lower case.
-constexpr auto missing_words = std::to_array<std::string_view>(
-    {"na",       "n/a",         "#n/a",    "#nv",   "null",         "none",     "-",
-     "--",       "---",         "----",    "-.-",   "--.-",         "*",        "***",
-     "inf",      "+inf",        "-inf",    "ol",    "open",         "overflow", "overload",
-     "burnout",  "unavailable", "unknown", "error", "no data",      "bad",      "invalid",
-     "#div/0!",  "#value!",     "undef",   "n.a.",  "disconnected", "over",     "under",
-     "no value", "nodata",      "logged",  "nan"});
+constexpr std::string_view missing_words =
+    "|na|n/a|#n/a|#nv|null|none|-|--|---|----|-.-|--.-|*|***|inf|+inf|-inf|ol"
+    "|open|overflow|overload|burnout|unavailable|unknown|error|no data|bad"
+    "|invalid|#div/0!|#value!|undef|n.a.|disconnected|over|under|no value|nodata"
+    "|logged|nan|";
 
 /// Outside, a temperature is a sign of a fault, such as -9999.
 constexpr double degC_min = -273.15;

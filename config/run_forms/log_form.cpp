@@ -35,16 +35,9 @@ void Log::refuse(int line, const std::string& key, const std::string& value,
   throw ConfigurationError({Problem{name, line, key, value, std::move(rule)}});
 }
 
-std::string_view take_line(std::string_view& text) {
-  std::string_view line;
-  static_cast<void>(take(text, '\n', line));
-  if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
-  return line;
-}
-
 std::vector<std::string> fields_of(std::string_view line, char separator) {
   std::vector<std::string_view> parts;
-  static_cast<void>(split_line(line, separator, parts));
+  split_line(line, separator, parts);
   std::vector<std::string> fields;
   for (const std::string_view part : parts) fields.push_back(unquoted(part));
   if (fields.empty()) fields.emplace_back();  // an empty line, between blanks

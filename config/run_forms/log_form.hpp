@@ -63,9 +63,6 @@ std::optional<PlainTable> twincat(const Log& log);
 /// Lines with a time and "name: value" pairs: serial consoles, decoded CAN frames, logfmt.
 std::optional<PlainTable> labelled(const Log& log);
 
-/// Takes the first line off `text`; returned without its line end.
-std::string_view take_line(std::string_view& text);
-
 /// Splits at separators; removes quotes and blanks. At least one field.
 std::vector<std::string> fields_of(std::string_view line, char separator = ',');
 

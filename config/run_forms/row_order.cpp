@@ -19,8 +19,8 @@
 namespace thermocomp {
 namespace {
 
-constexpr auto value_names = std::to_array<std::string_view>(
-    {"value", "_value", "varvalue", "state", "val", "wert", "reading", "mean", "messwert"});
+constexpr std::string_view value_names =
+    "|value|_value|varvalue|state|val|wert|reading|mean|messwert|";
 constexpr std::size_t series_max = 1024;
 
 struct LongForm {

@@ -107,9 +107,8 @@ std::string_view plain_temperature(std::string_view unit) {
   bool has_degree = unit.size() == 2 && unit[0] == 'o' && unit[1] < 'a';  // "oC"; not "of"
   if (has_degree) unit.remove_prefix(1);
   while (!unit.empty()) {
-    const auto* const sign =
-        std::find_if(degree_signs.begin(), degree_signs.end(),
-                     [&](const DegreeSign& each) { return unit.starts_with(each.bytes); });
+    const auto* const sign = std::ranges::find_if(
+        degree_signs, [&](const DegreeSign& each) { return unit.starts_with(each.bytes); });
     if (sign != degree_signs.end()) {
       has_degree = true;
       letters += sign->letter;
@@ -237,7 +236,7 @@ bool is_grouped(std::string_view text, char sign) {
   std::string_view part;
   bool first = true;
   while (take(text, sign, part)) {
-    const bool digits = std::all_of(part.begin(), part.end(), is_digit);
+    const bool digits = std::ranges::all_of(part, is_digit);
     if (!digits || part.empty() || part.size() > 3 || (!first && part.size() != 3)) return false;
     first = false;
   }
@@ -315,9 +314,8 @@ bool looks_like_number(std::string_view field) {
   const std::string_view digits = field.substr(0, exponent);
   return !digits.empty() && digits.find_first_of("+-") == std::string_view::npos &&
          digits.find_first_of("0123456789") != std::string_view::npos &&
-         (std::count(digits.begin(), digits.end(), '.') <= 1 ||
-          std::count(digits.begin(), digits.end(), ',') <= 1) &&
-         !(std::count(digits.begin(), digits.end(), '.') > 1 && !is_grouped(digits, '.'));
+         (std::ranges::count(digits, '.') <= 1 || std::ranges::count(digits, ',') <= 1) &&
+         !(std::ranges::count(digits, '.') > 1 && !is_grouped(digits, '.'));
 }
 
 }  // namespace thermocomp

@@ -11,23 +11,14 @@ namespace thermocomp {
 namespace {
 
 bool is_utf8(std::string_view text) {
-  for (std::size_t i = 0; i < text.size();) {
-    const auto lead = static_cast<unsigned char>(text[i]);
-    std::size_t more = 0;
-    if (lead >= 0xf0)
-      more = lead < 0xf8 ? 3 : 4;
-    else if (lead >= 0xe0)
-      more = 2;
-    else if (lead >= 0xc2)
-      more = 1;
-    else if (lead >= 0x80)
-      return false;
-    if (more > 3 || i + more >= text.size() + (more == 0 ? 1 : 0)) return false;
-    for (std::size_t k = 1; k <= more; ++k)
-      if ((static_cast<unsigned char>(text[i + k]) & 0xc0) != 0x80) return false;
-    i += more + 1;
+  int more = 0;  // bytes that continue a letter
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    const bool is_next = byte >= 0x80 && byte < 0xc0;
+    if (is_next != (more > 0) || byte == 0xc0 || byte == 0xc1 || byte >= 0xf8) return false;
+    more = is_next ? more - 1 : byte >= 0xf0 ? 3 : byte >= 0xe0 ? 2 : byte >= 0xc0 ? 1 : 0;
   }
-  return true;
+  return more == 0;
 }
 
 void append_letter(std::string& text, std::uint32_t letter) {
@@ -58,7 +49,7 @@ std::string utf8_of_utf16(std::string_view bytes, bool low_first) {
 
 /// Old Macintosh lines end with a carriage return only.
 std::string with_line_ends(std::string text) {
-  if (text.find('\n') == std::string::npos) std::replace(text.begin(), text.end(), '\r', '\n');
+  if (text.find('\n') == std::string::npos) std::ranges::replace(text, '\r', '\n');
   return text;
 }
 
@@ -133,14 +124,11 @@ bool is_end(std::string_view line) {
 std::string_view with_quoted_ends(std::string& text, std::string_view line, std::string_view& rest,
                                   int& number) {
   constexpr int lines_max = 8;
-  const auto is_open = [](std::string_view part) {
-    return std::count(part.begin(), part.end(), '"') % 2 == 1;
-  };
+  const auto is_open = [](std::string_view part) { return std::ranges::count(part, '"') % 2 == 1; };
   std::string_view longer = line;
   std::string_view behind = rest;
   for (int more = 1; more <= lines_max && is_open(longer) && !behind.empty(); ++more) {
-    std::string_view next;
-    static_cast<void>(take(behind, '\n', next));
+    const std::string_view next = take_line(behind);
     longer = {line.data(), static_cast<std::size_t>(next.data() + next.size() - line.data())};
     if (is_open(longer)) continue;
     const auto begin = static_cast<std::size_t>(line.data() - text.data());
@@ -184,11 +172,8 @@ TextLines find_lines(std::string& text, int lines_above, int first_line) {
   TextLines found;
   std::vector<TextLine>& lines = found.lines;
   std::string_view rest = text;
-  std::string_view line;
   for (int number = 1 + lines_above; !rest.empty(); ++number) {
-    static_cast<void>(take(rest, '\n', line));
-    line = with_quoted_ends(text, line, rest, number);
-    if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+    const std::string_view line = with_quoted_ends(text, take_line(rest), rest, number);
     if (number < first_line) continue;
     const bool is_comment = line.starts_with('#');
     if (is_comment && lines.empty()) found.last_comment = {number, line};
@@ -205,14 +190,19 @@ TextLines find_lines(std::string& text, int lines_above, int first_line) {
   return found;
 }
 
+std::vector<std::string_view> words_of(std::string_view line) {
+  std::vector<std::string_view> words;
+  for (line = trimmed(line); !line.empty(); line = trimmed(line)) {
+    words.push_back(line.substr(0, line.find_first_of(" \t")));
+    line.remove_prefix(words.back().size());
+  }
+  return words;
+}
+
 bool split_line(std::string_view line, char separator, std::vector<std::string_view>& fields) {
   fields.clear();
   if (separator == ' ') {
-    for (line = trimmed(line); !line.empty(); line = trimmed(line)) {
-      const auto end = std::min(line.find_first_of(" \t"), line.size());
-      fields.push_back(line.substr(0, end));
-      line.remove_prefix(end);
-    }
+    fields = words_of(line);
     return true;
   }
   for (bool more = true; more;) {

@@ -36,6 +36,9 @@ struct TextLines {
 /// @param first_line  earlier ones are left out
 [[nodiscard]] TextLines find_lines(std::string& text, int lines_above, int first_line);
 
+/// Splits at blanks and tabs.
+[[nodiscard]] std::vector<std::string_view> words_of(std::string_view line);
+
 /// A quoted field may contain the separator and doubled quotes. A quote with text behind it is a
 /// part of its field: "AI".Bed.
 /// @return false for an unclosed quote

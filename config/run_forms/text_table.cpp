@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <utility>
 
 #include "config/run_forms/field_text.hpp"
 #include "config/run_forms/spelled_unit.hpp"
 #include "config/run_forms/text_lines.hpp"
-#include "config/run_forms/time_name.hpp"
 #include "config/run_forms/time_stamp.hpp"
 
 namespace thermocomp {
@@ -22,12 +22,11 @@ constexpr double values_share_min = 0.2;
 constexpr std::size_t header_rows_max = 10;
 
 /// Kinds of values in a row of types, and statistics of a column.
-constexpr auto type_words = std::to_array<std::string_view>(
-    {"smp", "avg", "std", "tot", "string", "text", "double", "float", "real", "int", "integer",
-     "long", "bool", "boolean", "datetime"});
-constexpr auto statistic_words =
-    std::to_array<std::string_view>({"min", "max", "mean", "average", "minimum", "maximum",
-                                     "mittelwert", "lower limit", "upper limit"});
+constexpr std::string_view type_words =
+    "|smp|avg|std|tot|string|text|double|float|real|int|integer|long|bool|boolean"
+    "|datetime|";
+constexpr std::string_view statistic_words =
+    "|min|max|mean|average|minimum|maximum|mittelwert|lower limit|upper limit|";
 
 enum class FieldKind { text, nothing, number, time };
 
@@ -47,21 +46,27 @@ FieldKind kind_of_field(std::string_view field) {
   return parse_time_stamp(field) ? FieldKind::time : FieldKind::text;
 }
 
-/// Whether no field is a number or a time.
-bool is_all_words(const TableFields& fields) {
-  return std::none_of(fields.begin(), fields.end(), [](std::string_view field) {
-    const FieldKind kind = kind_of_field(field);
-    return kind == FieldKind::number || kind == FieldKind::time;
-  });
-}
+/// One of the first lines; without fields if a quote is not closed.
+struct HeadLine {
+  TableFields fields;
+  std::vector<FieldKind> kinds;
+
+  [[nodiscard]] bool has(FieldKind kind) const {
+    return std::ranges::find(kinds, kind) != kinds.end();
+  }
+  /// Whether no field is a number or a time.
+  [[nodiscard]] bool is_all_words() const {
+    return !has(FieldKind::number) && !has(FieldKind::time);
+  }
+};
 
 /// The kind of each column in the lower half of the lines.
-std::vector<FieldKind> column_kinds(const std::vector<TableFields>& lines, std::size_t begin,
+std::vector<FieldKind> column_kinds(const std::vector<HeadLine>& lines, std::size_t begin,
                                     std::size_t columns) {
   std::vector<std::array<std::size_t, 4>> counts(columns);
   for (std::size_t i = (begin + lines.size()) / 2; i < lines.size(); ++i)
-    for (std::size_t k = 0; k < columns && lines[i].size() == columns; ++k)
-      ++counts[k][static_cast<std::size_t>(kind_of_field(lines[i][k]))];
+    for (std::size_t k = 0; k < columns && lines[i].kinds.size() == columns; ++k)
+      ++counts[k][static_cast<std::size_t>(lines[i].kinds[k])];
   std::vector<FieldKind> kinds;
   for (const auto& [texts, nothing, numbers, times] : counts)
     kinds.push_back(times > texts + numbers                   ? FieldKind::time
@@ -73,7 +78,7 @@ std::vector<FieldKind> column_kinds(const std::vector<TableFields>& lines, std::
 /// The column that tells rows from other lines: the first of times, else the first of numbers.
 std::optional<std::size_t> key_column(const std::vector<FieldKind>& kinds) {
   for (const FieldKind kind : {FieldKind::time, FieldKind::number})
-    if (const auto found = std::find(kinds.begin(), kinds.end(), kind); found != kinds.end())
+    if (const auto found = std::ranges::find(kinds, kind); found != kinds.end())
       return static_cast<std::size_t>(found - kinds.begin());
   return std::nullopt;
 }
@@ -102,47 +107,44 @@ bool is_row_of_units(const TableFields& fields) {
 }
 
 bool is_row_of_types(const TableFields& fields) {
-  return std::all_of(fields.begin(), fields.end(), [](std::string_view field) {
+  return std::ranges::all_of(fields, [](std::string_view field) {
     return field.empty() || is_one_of(type_words, field.substr(0, field.find(':')));
   });
 }
 
 /// Channel numbers, 1 2 3, or the statistics of each column.
-bool is_known_row_of_numbers(const TableFields& fields) {
-  if (is_one_of(statistic_words, fields[0].substr(0, fields[0].find_first_of(".:")))) return true;
+bool is_known_row_of_numbers(const HeadLine& line) {
+  const std::string_view first = line.fields[0];
+  if (is_one_of(statistic_words, first.substr(0, first.find_first_of(".:")))) return true;
+  if (line.has(FieldKind::time)) return false;
   std::vector<double> numbers;
-  for (const std::string_view field : fields) {
-    if (kind_of_field(field) == FieldKind::time) return false;
-    if (looks_like_number(field)) numbers.push_back(finite_number(field).value_or(NAN));
-  }
+  for (std::size_t i = 0; i < line.kinds.size(); ++i)
+    if (line.kinds[i] == FieldKind::number)
+      numbers.push_back(finite_number(line.fields[i]).value_or(NAN));
   return numbers.size() > 1 && (numbers[0] == 0 || numbers[0] == 1) &&
-         std::adjacent_find(numbers.begin(), numbers.end(),
-                            [](double a, double b) { return !(b == a + 1); }) == numbers.end();
+         std::ranges::adjacent_find(numbers, [](double a, double b) { return !(b == a + 1); }) ==
+             numbers.end();
 }
 
 /// Whether the key column has its kind, or is missing in a line without any word.
-bool may_be_row(const TableFields& fields, const std::vector<FieldKind>& kinds, std::size_t key) {
-  if (fields.size() != kinds.size()) return false;
-  const FieldKind here = kind_of_field(fields[key]);
-  if (here != FieldKind::nothing) return here == kinds[key];
-  return kinds[key] == FieldKind::number && !is_all_words(fields) &&
-         !is_known_row_of_numbers(fields) &&
-         std::none_of(fields.begin(), fields.end(), [](std::string_view field) {
-           return kind_of_field(field) == FieldKind::text;
-         });
+bool may_be_row(const HeadLine& line, const std::vector<FieldKind>& kinds, std::size_t key) {
+  if (line.kinds.size() != kinds.size()) return false;
+  if (line.kinds[key] != FieldKind::nothing) return line.kinds[key] == kinds[key];
+  return kinds[key] == FieldKind::number && !line.is_all_words() &&
+         !is_known_row_of_numbers(line) && !line.has(FieldKind::text);
 }
 
 /// Whether also half of the numbers are there.
-bool is_row(const TableFields& fields, const std::vector<FieldKind>& kinds, std::size_t key) {
-  if (!may_be_row(fields, kinds, key)) return false;
+bool is_row(const HeadLine& line, const std::vector<FieldKind>& kinds, std::size_t key) {
+  if (!may_be_row(line, kinds, key)) return false;
   std::ptrdiff_t alike = 0;
   for (std::size_t k = 0; k < kinds.size(); ++k)
-    if (kinds[k] == FieldKind::number && kind_of_field(fields[k]) == FieldKind::number) ++alike;
-  return 2 * alike >= std::count(kinds.begin(), kinds.end(), FieldKind::number);
+    if (kinds[k] == FieldKind::number && line.kinds[k] == FieldKind::number) ++alike;
+  return 2 * alike >= std::ranges::count(kinds, FieldKind::number);
 }
 
 /// The first row, with those before it whose values are missing.
-std::size_t first_row(const std::vector<TableFields>& lines, std::size_t begin,
+std::size_t first_row(const std::vector<HeadLine>& lines, std::size_t begin,
                       const std::vector<FieldKind>& kinds) {
   const auto key = key_column(kinds);
   if (!key) return std::min(begin + 1, lines.size());
@@ -162,7 +164,7 @@ bool may_be_factors(const TableFields& fields) {
   bool all_one = true;
   for (const std::string_view field : fields) {
     const auto number = finite_number(field);
-    if (!number || std::find(powers.begin(), powers.end(), *number) == powers.end()) return false;
+    if (!number || std::ranges::find(powers, *number) == powers.end()) return false;
     all_one = all_one && *number == 1.0;
   }
   return !all_one;
@@ -170,8 +172,7 @@ bool may_be_factors(const TableFields& fields) {
 
 /// "Scale,0.1,0.1" above the names.
 bool is_named_row_of_factors(const TableFields& fields) {
-  constexpr auto names = std::to_array<std::string_view>(
-      {"scale", "scaling", "factor", "gain", "multiplier", "skalierung", "faktor"});
+  constexpr std::string_view names = "|scale|scaling|factor|gain|multiplier|skalierung|faktor|";
   if (fields.empty() || !is_one_of(names, fields[0])) return false;
   return std::any_of(fields.begin() + 1, fields.end(), [](std::string_view field) {
     const auto number = finite_number(field);
@@ -180,39 +181,33 @@ bool is_named_row_of_factors(const TableFields& fields) {
 }
 
 bool names_time_or_unit(const TableFields& fields) {
-  return std::any_of(fields.begin(), fields.end(), [](std::string_view field) {
+  return std::ranges::any_of(fields, [](std::string_view field) {
     return names_time(field) || !unit_of_time_name(field).empty() ||
            spelled_name(field).known != nullptr;
   });
 }
 
-bool holds_time(const TableFields& fields) {
-  return std::any_of(fields.begin(), fields.end(), [](std::string_view field) {
-    return kind_of_field(field) == FieldKind::time;
-  });
-}
-
 /// Finds names and units above the first row.
-void find_names(const std::vector<TableFields>& lines, std::size_t columns, TableHeader& header) {
+void find_names(const std::vector<HeadLine>& lines, std::size_t columns, TableHeader& header) {
   bool is_found = false;
   for (std::size_t up = 1; up <= std::min(header.row_begin, header_rows_max); ++up) {
     const std::size_t i = header.row_begin - up;
-    const TableFields& fields = lines[i];
+    const TableFields& fields = lines[i].fields;
     if (fields.size() != columns) {
       // Names of another count: one too few is explained, others are refused.
-      if (!header.names && is_all_words(fields)) header.names = i;
+      if (!header.names && lines[i].is_all_words()) header.names = i;
       return;
     }
     if (is_row_of_units(fields) && i > 0) {
       if (!header.units) header.units = i;
       continue;
     }
-    const std::size_t named =
-        columns - static_cast<std::size_t>(std::count(fields.begin(), fields.end(), ""));
+    const std::size_t named = columns - static_cast<std::size_t>(std::ranges::count(fields, ""));
     const bool has_names = named >= 2 || 2 * named >= columns;
-    if (is_found || !has_names || holds_time(fields) || is_row_of_types(fields)) continue;
+    if (is_found || !has_names || lines[i].has(FieldKind::time) || is_row_of_types(fields))
+      continue;
     is_found = names_time_or_unit(fields);
-    if (is_found || (!header.names && is_all_words(fields))) header.names = i;
+    if (is_found || (!header.names && lines[i].is_all_words())) header.names = i;
   }
 }
 
@@ -222,29 +217,32 @@ void find_names(const std::vector<TableFields>& lines, std::size_t columns, Tabl
 /// @param lines  the fields of the first lines
 /// @param begin  the first line with `columns` fields, if names are not in line 0
 /// @param is_first  the names are in line 0
-TableHeader find_table_header(const std::vector<TableFields>& lines, std::size_t begin,
+TableHeader find_table_header(const std::vector<HeadLine>& lines, std::size_t begin,
                               std::size_t columns, bool is_first) {
   TableHeader header;
   header.row_begin = first_row(lines, is_first ? 1 : begin, column_kinds(lines, begin, columns));
   if (is_first) {
     header.names = 0;
     for (std::size_t i = 1; i < header.row_begin; ++i)
-      if (lines[i].size() == columns && is_row_of_units(lines[i])) header.units = i;
+      if (lines[i].fields.size() == columns && is_row_of_units(lines[i].fields)) header.units = i;
   } else {
     find_names(lines, columns, header);
   }
-  if (!header.names && header.row_begin > 0 && lines[header.row_begin - 1].size() == columns &&
-      !is_all_words(lines[header.row_begin - 1]))
-    header.unclear = header.row_begin - 1;
+  if (!header.names && header.row_begin > 0) {
+    const HeadLine& above = lines[header.row_begin - 1];
+    if (above.fields.size() == columns && !above.is_all_words())
+      header.unclear = header.row_begin - 1;
+  }
   if (!header.names) return header;
   for (std::size_t i = 0; i < *header.names; ++i)
-    if (is_named_row_of_factors(lines[i])) header.unclear = i;
+    if (is_named_row_of_factors(lines[i].fields)) header.unclear = i;
   for (std::size_t i = *header.names + 1; i < header.row_begin; ++i)
-    if (!header.unclear && !is_all_words(lines[i]) && i != header.units &&
+    if (!header.unclear && !lines[i].is_all_words() && i != header.units &&
         !is_known_row_of_numbers(lines[i]))
       header.unclear = i;
   if (header.units && header.row_begin + 1 < lines.size() &&
-      may_be_factors(lines[header.row_begin]) && !may_be_factors(lines[header.row_begin + 1]))
+      may_be_factors(lines[header.row_begin].fields) &&
+      !may_be_factors(lines[header.row_begin + 1].fields))
     header.unclear = header.row_begin;
   return header;
 }
@@ -262,7 +260,7 @@ class TableReader {
     if (lines_.empty()) {
       problems_.add(0, "", "", "has no header row");
     } else if (choose_separator()) {
-      for (std::size_t i = 0; i < judged(); ++i) head_.push_back(fields_of(lines_[i].text));
+      for (std::size_t i = 0; i < judged(); ++i) head_.push_back(head_line(lines_[i].text));
       widen_to_header();
       if (find_header()) read_rows();
     }
@@ -285,7 +283,7 @@ class TableReader {
     std::map<std::size_t, std::size_t> lines_of;
     std::vector<TableFields> cut(judged());
     for (std::size_t i = 0; i < cut.size(); ++i) {
-      static_cast<void>(split_line(lines_[i].text, separator, cut[i]));
+      split_line(lines_[i].text, separator, cut[i]);
       ++lines_of[cut[i].size()];
     }
     Cut best{separator};
@@ -331,11 +329,11 @@ class TableReader {
     return is_table;
   }
 
-  /// Empty: a quote is not closed.
-  [[nodiscard]] TableFields fields_of(std::string_view line) const {
-    TableFields fields;
-    if (!split_line(line, table_.separator, fields)) fields.clear();
-    return fields;
+  [[nodiscard]] HeadLine head_line(std::string_view text) const {
+    HeadLine line;
+    if (!split_line(text, table_.separator, line.fields)) line.fields.clear();
+    std::ranges::transform(line.fields, std::back_inserter(line.kinds), kind_of_field);
+    return line;
   }
 
   /// Missing last columns of a row are empty.
@@ -348,14 +346,17 @@ class TableReader {
   void widen_to_header() {
     if (cut_.separator == ' ' || cut_.begin < 2) return;
     const std::size_t line = cut_.begin - 2;
-    const TableFields& names = head_[line];
+    const TableFields& names = head_[line].fields;
     if (names.size() != cut_.fields + 1 || !names.back().starts_with("Serial") ||
-        !is_all_words(names) || head_[line + 1].size() != names.size())
+        !head_[line].is_all_words() || head_[line + 1].fields.size() != names.size())
       return;
     narrowest_ = cut_.fields;
     cut_.fields = names.size();
     cut_.begin = line;
-    for (TableFields& fields : head_) fill_up(fields);
+    for (HeadLine& each : head_) {
+      fill_up(each.fields);
+      each.kinds.resize(each.fields.size(), FieldKind::nothing);
+    }
   }
 
   bool find_header() {
@@ -375,12 +376,12 @@ class TableReader {
                     "is neither a row like those below nor names, units or numbers of channels: " +
                         rule + " in the file of --columns");
     } else if (header_.names &&
-               (map_.names.empty() || head_[*header_.names].size() == cut_.fields)) {
+               (map_.names.empty() || head_[*header_.names].fields.size() == cut_.fields)) {
       return take_names(*header_.names) && make_columns();
     } else if (take_commented_names() || take_given_names()) {
-      if (row_begin_ == 0 || is_all_words(head_[row_begin_ - 1])) return make_columns();
+      if (row_begin_ == 0 || head_[row_begin_ - 1].is_all_words()) return make_columns();
       problems_.add(lines_[row_begin_ - 1].number, "",
-                    std::to_string(head_[row_begin_ - 1].size()) + " fields",
+                    std::to_string(head_[row_begin_ - 1].fields.size()) + " fields",
                     "must have " + std::to_string(cut_.fields) + ", as the rows below");
     }
     return false;
@@ -390,9 +391,9 @@ class TableReader {
   [[nodiscard]] bool begins_with_count_or_time() const {
     std::optional<double> last;
     for (std::size_t i = row_begin_; i < head_.size(); ++i) {
-      if (head_[i].size() != cut_.fields) continue;
-      if (kind_of_field(head_[i][0]) == FieldKind::time) return true;
-      const auto number = finite_number(head_[i][0]);
+      if (head_[i].fields.size() != cut_.fields) continue;
+      if (head_[i].kinds[0] == FieldKind::time) return true;
+      const auto number = finite_number(head_[i].fields[0]);
       if (!number || (last ? *number != *last + 1 : *number != 0 && *number != 1)) return false;
       last = number;
     }
@@ -407,10 +408,10 @@ class TableReader {
   }
 
   bool take_names(std::size_t line) {
-    TableFields fields = head_[line];
+    TableFields fields = head_[line].fields;
     while (fields.size() > cut_.fields && fields.back().empty()) fields.pop_back();
     if (fields.size() + 1 == cut_.fields) {
-      const TableFields row = row_begin_ < head_.size() ? head_[row_begin_] : TableFields{};
+      const TableFields row = row_begin_ < head_.size() ? head_[row_begin_].fields : TableFields{};
       if (row.size() == cut_.fields && row.back().empty())
         fields.emplace_back();  // a separator at the end of each row
       else if (begins_with_count_or_time())
@@ -442,9 +443,9 @@ class TableReader {
     const std::string_view text = found_.last_comment.text;
     if (row_begin_ > 0 || text.empty()) return false;
     TableFields fields;
-    static_cast<void>(split_line(text, table_.separator, fields));
+    split_line(text, table_.separator, fields);
     if (fields.size() != cut_.fields)
-      static_cast<void>(split_line(trimmed(text.substr(1)), table_.separator, fields));
+      split_line(trimmed(text.substr(1)), table_.separator, fields);
     else
       fields[0] = trimmed(fields[0].substr(1));
     if (fields.size() != cut_.fields || !std::ranges::all_of(fields, [](std::string_view field) {
@@ -477,7 +478,7 @@ class TableReader {
     for (std::size_t i = 0; i < names_.size(); ++i) {
       TextColumn& column = table_.columns.emplace_back();
       column.header = names_[i].empty() ? unnamed(i) : names_[i];
-      if (table_.has_unit_row) column.unit_in_row = unit_in_row(head_[*header_.units][i]);
+      if (table_.has_unit_row) column.unit_in_row = unit_in_row(head_[*header_.units].fields[i]);
     }
     return problems_.empty();
   }
@@ -518,8 +519,8 @@ class TableReader {
   TextLines found_;
   const std::vector<TextLine>& lines_{found_.lines};
   Cut cut_;
-  std::vector<TableFields> head_;  ///< fields of the judged lines
-  std::size_t narrowest_{0};       ///< required fields of a row; 0: all
+  std::vector<HeadLine> head_;  ///< the judged lines
+  std::size_t narrowest_{0};    ///< required fields of a row; 0: all
   std::size_t row_begin_{0};
   TableHeader header_;
   std::vector<std::string> names_;

@@ -11,7 +11,6 @@
 #include "config/run_forms/field_text.hpp"
 #include "config/run_forms/run_data.hpp"
 #include "config/run_forms/spelled_unit.hpp"
-#include "config/run_forms/time_name.hpp"
 #include "config/run_forms/time_stamp.hpp"
 #include "config/text/printable_text.hpp"
 
@@ -218,7 +217,7 @@ void find_fraction(const TextTable& table, TimeColumns& time) {
 
 /// A column of nothing but AM and PM, of a clock without.
 void find_half(const TextTable& table, TimeColumns& time) {
-  constexpr std::array<std::string_view, 2> halves{"am", "pm"};
+  constexpr std::string_view halves = "|am|pm|";
   if (table.rows() == 0) return;
   const auto stamp = parse_time_stamp(table.columns[time.columns.back()].fields[0]);
   if (!stamp || !stamp->has_clock) return;

@@ -18,14 +18,17 @@ struct Samples {
   std::size_t overruns{0};
 };
 
+bool is_overrun(const std::vector<std::string_view>& words) {
+  return words.size() == 1 && words[0] == "overrun";
+}
+
 /// Whether the text has only numbers and blanks, in at least one row.
 bool is_halsampler(std::string_view text) {
   constexpr int rows_judged = 20;
   int rows = 0;
-  std::vector<std::string_view> words;
   while (!text.empty() && rows < rows_judged) {
-    static_cast<void>(split_line(take_line(text), ' ', words));
-    if (words.empty() || words == std::vector<std::string_view>{"overrun"}) continue;
+    const std::vector<std::string_view> words = words_of(take_line(text));
+    if (words.empty() || is_overrun(words)) continue;
     if (!std::ranges::all_of(words, [](auto word) { return finite_number(word).has_value(); }))
       return false;
     ++rows;
@@ -37,11 +40,10 @@ Samples samples_of(const Log& log) {
   std::string_view text = log.text;
   Samples samples;
   bool overrun = false;
-  std::vector<std::string_view> words;
   for (int line = 1; !text.empty(); ++line) {
-    static_cast<void>(split_line(take_line(text), ' ', words));
+    const std::vector<std::string_view> words = words_of(take_line(text));
     if (words.empty()) continue;
-    if (words == std::vector<std::string_view>{"overrun"}) {
+    if (is_overrun(words)) {
       overrun = !samples.rows.empty();  // rows before the first one are not part of the file
       continue;
     }
@@ -168,9 +170,8 @@ std::optional<PlainTable> halscope(const Log& log) {
   NamedColumns columns;
   const std::size_t time = columns.add("time_s");
   std::map<std::size_t, std::size_t> rows;  // of each column
-  std::vector<std::string_view> words;
   for (int line = 2; !rest.empty(); ++line) {
-    static_cast<void>(split_line(take_line(rest), ' ', words));
+    std::vector<std::string_view> words = words_of(take_line(rest));
     words.resize(words.size() + words.size() % 2);
     for (std::size_t i = 0; i < words.size(); i += 2) {
       if (!finite_number(words[i + 1]))

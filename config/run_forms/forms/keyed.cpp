@@ -141,7 +141,7 @@ std::optional<PlainTable> twincat(const Log& log) {
   // A column called Name is a time column, and applies to the channels after it.
   std::vector<std::string> series;
   PlainTable table;
-  const bool many_times = std::count(names.begin(), names.end(), "Name") > 1;
+  const bool many_times = std::ranges::count(names, "Name") > 1;
   units.resize(names.size());
   if (!many_times) {
     table.text = "\"time [ms]\"";
@@ -163,7 +163,7 @@ std::optional<PlainTable> twincat(const Log& log) {
       if (names[i] == "Name") {
         const auto at = number_of(field, form);
         time = at ? number_text(*at < 1e15 ? *at + zero_ms : *at * 1e-4 - 11644473600000.0) : "";
-        std::replace(time.begin(), time.end(), '.', form.decimal);
+        std::ranges::replace(time, '.', form.decimal);
         if (!many_times) table.text.append("\n").append(time);
       } else if (!many_times) {
         table.text.append(";").append(field);

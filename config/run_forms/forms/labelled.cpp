@@ -17,8 +17,8 @@ struct Labelled {
   std::vector<std::pair<std::string, std::string>> values;  ///< name and its number or word
   std::string words;  ///< in front of the first name, without levels such as INFO
   [[nodiscard]] bool has_number() const {
-    return std::any_of(values.begin(), values.end(),
-                       [](const auto& value) { return looks_like_number(value.second); });
+    return std::ranges::any_of(values,
+                               [](const auto& value) { return looks_like_number(value.second); });
   }
 };
 
@@ -72,8 +72,7 @@ std::string_view unit_after(std::string_view rest) {
 
 /// The words of a text, without digits and without the levels of a log.
 std::string words_of(std::string_view text) {
-  constexpr auto levels = std::to_array<std::string_view>(
-      {"info", "warn", "warning", "error", "debug", "trace", "notice"});
+  constexpr std::string_view levels = "|info|warn|warning|error|debug|trace|notice|";
   std::string words;
   std::string word;
   for (const char c : std::string(text) + ' ') {
@@ -96,7 +95,7 @@ class WordsBesideNames {
     auto& counts = counts_[names];
     ++counts[found.words];
     const auto repeated = [](const auto& each) { return each.second > 1; };
-    const auto first = std::find_if(counts.begin(), counts.end(), repeated);
+    const auto first = std::ranges::find_if(counts, repeated);
     const auto second =
         first == counts.end() ? first : std::find_if(std::next(first), counts.end(), repeated);
     if (second == counts.end()) return;
@@ -158,7 +157,8 @@ std::optional<PlainTable> labelled(const Log& log) {
   NamedColumns columns;
   const std::size_t time = columns.add("time");
   std::vector<int> lines;  // of each row
-  std::string last;
+  std::string last;        // time, with its values
+  std::map<std::string, std::string> values;
   std::size_t left_out = 0;
   WordsBesideNames words;
   std::string_view rest = log.text;
@@ -171,18 +171,21 @@ std::optional<PlainTable> labelled(const Log& log) {
     }
     words.add(log, line, found);
     // Lines of equal time form one row.
-    if (lines.empty() || last != found.time) lines.push_back(line);
+    if (lines.empty() || last != found.time) {
+      lines.push_back(line);
+      values.clear();
+    }
     last = found.time;
     const std::size_t row = lines.size() - 1;
     columns.cell(row, time) = in_quotes(last);
     for (const auto& [name, value] : found.values) {
-      std::string& cell = columns.cell(row, columns.find_or_add(name));
-      if (!cell.empty() && cell != in_quotes(value))
+      const auto [earlier, is_new] = values.emplace(name, value);
+      if (!is_new && earlier->second != value)
         log.refuse(line, name, value,
                    "must be there once at a time, under a name of one word; an earlier value of "
                    "that time is " +
-                       shortened(cell.substr(1, cell.size() - 2)));
-      cell = in_quotes(value);
+                       shortened(earlier->second));
+      columns.cell(row, columns.find_or_add(name)) = in_quotes(value);
     }
   }
   PlainTable table{columns.text(lines), {"lines of a time and named values"}, -1};
