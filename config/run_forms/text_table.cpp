@@ -32,22 +32,15 @@ enum class FieldKind { text, nothing, number, time };
 
 using TableFields = std::vector<std::string_view>;
 
-/// Indices of lines.
-struct TableHeader {
-  std::size_t row_begin{0};            ///< first row of data
-  std::optional<std::size_t> names;    ///< nullopt: none
-  std::optional<std::size_t> units;    ///< a row of units below the names
-  std::optional<std::size_t> unclear;  ///< factors, or numbers below the names that are no row
-};
-
 FieldKind kind_of_field(std::string_view field) {
   if (is_missing(field)) return FieldKind::nothing;
   if (looks_like_number(field)) return FieldKind::number;
   return parse_time_stamp(field) ? FieldKind::time : FieldKind::text;
 }
 
-/// One of the first lines; without fields if a quote is not closed.
+/// One of the first lines.
 struct HeadLine {
+  bool is_closed{true};  ///< no quote is open
   TableFields fields;
   std::vector<FieldKind> kinds;
 
@@ -59,21 +52,6 @@ struct HeadLine {
     return !has(FieldKind::number) && !has(FieldKind::time);
   }
 };
-
-/// The kind of each column in the lower half of the lines.
-std::vector<FieldKind> column_kinds(const std::vector<HeadLine>& lines, std::size_t begin,
-                                    std::size_t columns) {
-  std::vector<std::array<std::size_t, 4>> counts(columns);
-  for (std::size_t i = (begin + lines.size()) / 2; i < lines.size(); ++i)
-    for (std::size_t k = 0; k < columns && lines[i].kinds.size() == columns; ++k)
-      ++counts[k][static_cast<std::size_t>(lines[i].kinds[k])];
-  std::vector<FieldKind> kinds;
-  for (const auto& [texts, nothing, numbers, times] : counts)
-    kinds.push_back(times > texts + numbers                   ? FieldKind::time
-                    : numbers >= texts + times && numbers > 0 ? FieldKind::number
-                                                              : FieldKind::text);
-  return kinds;
-}
 
 /// The column that tells rows from other lines: the first of times, else the first of numbers.
 std::optional<std::size_t> key_column(const std::vector<FieldKind>& kinds) {
@@ -143,21 +121,6 @@ bool is_row(const HeadLine& line, const std::vector<FieldKind>& kinds, std::size
   return 2 * alike >= std::ranges::count(kinds, FieldKind::number);
 }
 
-/// The first row, with those before it whose values are missing.
-std::size_t first_row(const std::vector<HeadLine>& lines, std::size_t begin,
-                      const std::vector<FieldKind>& kinds) {
-  const auto key = key_column(kinds);
-  if (!key) return std::min(begin + 1, lines.size());
-  for (const auto& is : {is_row, may_be_row}) {
-    std::size_t row = begin;
-    while (row < lines.size() && !is(lines[row], kinds, *key)) ++row;
-    if (row == lines.size()) continue;
-    while (row > begin && may_be_row(lines[row - 1], kinds, *key)) --row;
-    return row;
-  }
-  return std::min(begin + 1, lines.size());
-}
-
 /// 1 0.1 0.1 below a row of units.
 bool may_be_factors(const TableFields& fields) {
   constexpr std::array powers{0.001, 0.01, 0.1, 1.0, 10.0, 100.0, 1000.0};
@@ -187,66 +150,6 @@ bool names_time_or_unit(const TableFields& fields) {
   });
 }
 
-/// Finds names and units above the first row.
-void find_names(const std::vector<HeadLine>& lines, std::size_t columns, TableHeader& header) {
-  bool is_found = false;
-  for (std::size_t up = 1; up <= std::min(header.row_begin, header_rows_max); ++up) {
-    const std::size_t i = header.row_begin - up;
-    const TableFields& fields = lines[i].fields;
-    if (fields.size() != columns) {
-      // Names of another count: one too few is explained, others are refused.
-      if (!header.names && lines[i].is_all_words()) header.names = i;
-      return;
-    }
-    if (is_row_of_units(fields) && i > 0) {
-      if (!header.units) header.units = i;
-      continue;
-    }
-    const std::size_t named = columns - static_cast<std::size_t>(std::ranges::count(fields, ""));
-    const bool has_names = named >= 2 || 2 * named >= columns;
-    if (is_found || !has_names || lines[i].has(FieldKind::time) || is_row_of_types(fields))
-      continue;
-    is_found = names_time_or_unit(fields);
-    if (is_found || (!header.names && lines[i].is_all_words())) header.names = i;
-  }
-}
-
-/// The header is the lowest line above the first row that names the time or a unit, else the lowest
-/// one of words; it has as many fields as the rows. Lines of units, types, channel numbers and
-/// statistics between it and the first row are recognised; other numbers there are unclear.
-/// @param lines  the fields of the first lines
-/// @param begin  the first line with `columns` fields, if names are not in line 0
-/// @param is_first  the names are in line 0
-TableHeader find_table_header(const std::vector<HeadLine>& lines, std::size_t begin,
-                              std::size_t columns, bool is_first) {
-  TableHeader header;
-  header.row_begin = first_row(lines, is_first ? 1 : begin, column_kinds(lines, begin, columns));
-  if (is_first) {
-    header.names = 0;
-    for (std::size_t i = 1; i < header.row_begin; ++i)
-      if (lines[i].fields.size() == columns && is_row_of_units(lines[i].fields)) header.units = i;
-  } else {
-    find_names(lines, columns, header);
-  }
-  if (!header.names && header.row_begin > 0) {
-    const HeadLine& above = lines[header.row_begin - 1];
-    if (above.fields.size() == columns && !above.is_all_words())
-      header.unclear = header.row_begin - 1;
-  }
-  if (!header.names) return header;
-  for (std::size_t i = 0; i < *header.names; ++i)
-    if (is_named_row_of_factors(lines[i].fields)) header.unclear = i;
-  for (std::size_t i = *header.names + 1; i < header.row_begin; ++i)
-    if (!header.unclear && !lines[i].is_all_words() && i != header.units &&
-        !is_known_row_of_numbers(lines[i]))
-      header.unclear = i;
-  if (header.units && header.row_begin + 1 < lines.size() &&
-      may_be_factors(lines[header.row_begin].fields) &&
-      !may_be_factors(lines[header.row_begin + 1].fields))
-    header.unclear = header.row_begin;
-  return header;
-}
-
 class TableReader {
  public:
   TableReader(const ColumnMap& map, ProblemList& problems)
@@ -260,54 +163,53 @@ class TableReader {
     if (lines_.empty()) {
       problems_.add(0, "", "", "has no header row");
     } else if (choose_separator()) {
-      for (std::size_t i = 0; i < judged(); ++i) head_.push_back(head_line(lines_[i].text));
       widen_to_header();
-      if (find_header()) read_rows();
+      find_header();
+      if (take_header()) read_rows();
     }
     return std::move(table_);
   }
 
  private:
-  /// The result of splitting all lines by one separator.
+  /// The result of splitting the first lines by one separator.
   struct Cut {
     char separator{','};
+    std::vector<HeadLine> lines;
     std::size_t fields{1};
     std::size_t begin{0};  ///< first line with this number of fields
     double score{0.0};
     double values{0.0};  ///< share of fields that are numbers or times
   };
 
-  [[nodiscard]] std::size_t judged() const { return std::min(lines_.size(), rows_judged); }
-
   [[nodiscard]] Cut cut_by(char separator) const {
+    Cut cut{separator, {}};
     std::map<std::size_t, std::size_t> lines_of;
-    std::vector<TableFields> cut(judged());
-    for (std::size_t i = 0; i < cut.size(); ++i) {
-      split_line(lines_[i].text, separator, cut[i]);
-      ++lines_of[cut[i].size()];
+    for (std::size_t i = 0; i < std::min(lines_.size(), rows_judged); ++i) {
+      HeadLine& line = cut.lines.emplace_back();
+      line.is_closed = split_line(lines_[i].text, separator, line.fields);
+      std::ranges::transform(line.fields, std::back_inserter(line.kinds), kind_of_field);
+      ++lines_of[line.fields.size()];
     }
-    Cut best{separator};
     std::size_t most = 0;
     for (const auto& [fields, lines] : lines_of) {
       if (fields < 2 || lines < most) continue;
       most = lines;
-      best.fields = fields;
+      cut.fields = fields;
     }
-    if (best.fields < 2) return best;
-    while (cut[best.begin].size() != best.fields) ++best.begin;
-    std::size_t values = 0;
-    std::size_t texts = 0;
-    for (std::size_t i = (best.begin + cut.size()) / 2; i < cut.size(); ++i) {
-      if (cut[i].size() != best.fields) continue;
-      for (const std::string_view field : cut[i]) {
-        const FieldKind kind = kind_of_field(field);
-        if (kind != FieldKind::nothing) ++(kind == FieldKind::text ? texts : values);
-      }
+    if (cut.fields < 2) return cut;
+    while (cut.lines[cut.begin].fields.size() != cut.fields) ++cut.begin;
+    std::ptrdiff_t filled = 0;
+    std::ptrdiff_t texts = 0;
+    for (std::size_t i = (cut.begin + cut.lines.size()) / 2; i < cut.lines.size(); ++i) {
+      const std::vector<FieldKind>& kinds = cut.lines[i].kinds;
+      if (kinds.size() != cut.fields) continue;
+      filled += std::ssize(kinds) - std::ranges::count(kinds, FieldKind::nothing);
+      texts += std::ranges::count(kinds, FieldKind::text);
     }
-    best.values = static_cast<double>(values) / std::max<double>(1.0, double(values + texts));
-    best.score = static_cast<double>(most) / static_cast<double>(cut.size() - best.begin) *
-                 (0.1 + best.values);
-    return best;
+    cut.values = static_cast<double>(filled - texts) / std::max(1.0, static_cast<double>(filled));
+    cut.score = static_cast<double>(most) / static_cast<double>(cut.lines.size() - cut.begin) *
+                (0.1 + cut.values);
+    return cut;
   }
 
   bool choose_separator() {
@@ -315,25 +217,21 @@ class TableReader {
       cut_ = cut_by(*given);
     } else {
       for (const char separator : separators) {
-        const Cut cut = cut_by(separator);
-        if (cut.fields > 1 && cut.score > cut_.score) cut_ = cut;
+        Cut cut = cut_by(separator);
+        if (cut.fields > 1 && cut.score > cut_.score) cut_ = std::move(cut);
       }
       if (cut_.fields < 2) cut_ = cut_by(' ');
     }
     table_.separator = cut_.separator;
-    const bool is_table = cut_.fields > 1 && (cut_.values >= values_share_min || judged() == 1);
+    const bool is_table =
+        cut_.fields > 1 && (cut_.values >= values_share_min || cut_.lines.size() == 1);
     if (!is_table)
       problems_.add(lines_[0].number, "", lines_[0].text,
                     "is not a known table: rows of numbers and times between ; , tab | "
                     "or blanks; docs/run_files.md lists the forms that are read");
+    for (HeadLine& line : cut_.lines)
+      if (!line.is_closed) line = {};
     return is_table;
-  }
-
-  [[nodiscard]] HeadLine head_line(std::string_view text) const {
-    HeadLine line;
-    if (!split_line(text, table_.separator, line.fields)) line.fields.clear();
-    std::ranges::transform(line.fields, std::back_inserter(line.kinds), kind_of_field);
-    return line;
   }
 
   /// Missing last columns of a row are empty.
@@ -353,31 +251,111 @@ class TableReader {
     narrowest_ = cut_.fields;
     cut_.fields = names.size();
     cut_.begin = line;
-    for (HeadLine& each : head_) {
+    for (HeadLine& each : cut_.lines) {
       fill_up(each.fields);
       each.kinds.resize(each.fields.size(), FieldKind::nothing);
     }
   }
 
-  bool find_header() {
-    header_ = find_table_header(head_, cut_.begin, cut_.fields, map_.header_line > 0);
-    row_begin_ = header_.row_begin;
+  // ---- header
+  /// The kind of each column in the lower half of the lines.
+  [[nodiscard]] std::vector<FieldKind> column_kinds() const {
+    std::vector<std::array<std::size_t, 4>> counts(cut_.fields);
+    for (std::size_t i = (cut_.begin + head_.size()) / 2; i < head_.size(); ++i)
+      for (std::size_t k = 0; k < cut_.fields && head_[i].kinds.size() == cut_.fields; ++k)
+        ++counts[k][static_cast<std::size_t>(head_[i].kinds[k])];
+    std::vector<FieldKind> kinds;
+    for (const auto& [texts, nothing, numbers, times] : counts)
+      kinds.push_back(times > texts + numbers                   ? FieldKind::time
+                      : numbers >= texts + times && numbers > 0 ? FieldKind::number
+                                                                : FieldKind::text);
+    return kinds;
+  }
+
+  /// The first row from `begin` on, with those before it whose values are missing.
+  [[nodiscard]] std::size_t first_row(std::size_t begin) const {
+    const std::vector<FieldKind> kinds = column_kinds();
+    const auto key = key_column(kinds);
+    for (const auto& is : {is_row, may_be_row}) {
+      std::size_t row = key ? begin : head_.size();
+      while (row < head_.size() && !is(head_[row], kinds, *key)) ++row;
+      if (row == head_.size()) continue;
+      while (row > begin && may_be_row(head_[row - 1], kinds, *key)) --row;
+      return row;
+    }
+    return std::min(begin + 1, head_.size());
+  }
+
+  /// Finds names and units above the first row.
+  void find_names() {
+    bool is_found = false;
+    for (std::size_t up = 1; up <= std::min(row_begin_, header_rows_max); ++up) {
+      const std::size_t i = row_begin_ - up;
+      const HeadLine& line = head_[i];
+      if (line.fields.size() != cut_.fields) {
+        // Names of another count: one too few is explained, others are refused.
+        if (!names_line_ && line.is_all_words()) names_line_ = i;
+        return;
+      }
+      if (is_row_of_units(line.fields) && i > 0) {
+        if (!units_line_) units_line_ = i;
+        continue;
+      }
+      const std::size_t named =
+          cut_.fields - static_cast<std::size_t>(std::ranges::count(line.fields, ""));
+      const bool has_names = named >= 2 || 2 * named >= cut_.fields;
+      if (is_found || !has_names || line.has(FieldKind::time) || is_row_of_types(line.fields))
+        continue;
+      is_found = names_time_or_unit(line.fields);
+      if (is_found || (!names_line_ && line.is_all_words())) names_line_ = i;
+    }
+  }
+
+  /// The header is the lowest line above the first row that names the time or a unit, else the
+  /// lowest one of words; it has as many fields as the rows. Lines of units, types, channel numbers
+  /// and statistics between it and the first row are recognised; other numbers there are unclear.
+  void find_header() {
+    const bool is_first = map_.header_line > 0;
+    row_begin_ = first_row(is_first ? 1 : cut_.begin);
+    if (!is_first) find_names();
+    if (is_first) names_line_ = 0;
+    for (std::size_t i = 1; is_first && i < row_begin_; ++i)
+      if (head_[i].fields.size() == cut_.fields && is_row_of_units(head_[i].fields))
+        units_line_ = i;
+    if (!names_line_) {
+      if (row_begin_ > 0 && head_[row_begin_ - 1].fields.size() == cut_.fields &&
+          !head_[row_begin_ - 1].is_all_words())
+        unclear_line_ = row_begin_ - 1;
+      return;
+    }
+    for (std::size_t i = 0; i < *names_line_; ++i)
+      if (is_named_row_of_factors(head_[i].fields)) unclear_line_ = i;
+    for (std::size_t i = *names_line_ + 1; i < row_begin_; ++i)
+      if (!unclear_line_ && !head_[i].is_all_words() && i != units_line_ &&
+          !is_known_row_of_numbers(head_[i]))
+        unclear_line_ = i;
+    if (units_line_ && row_begin_ + 1 < head_.size() && may_be_factors(head_[row_begin_].fields) &&
+        !may_be_factors(head_[row_begin_ + 1].fields))
+      unclear_line_ = row_begin_;
+  }
+
+  bool take_header() {
     if (cut_.fields > fields_max) {
       problems_.add(lines_[row_begin_ < lines_.size() ? row_begin_ : 0].number, "columns",
                     std::to_string(cut_.fields), "must be at most " + std::to_string(fields_max));
-    } else if (header_.unclear) {
-      const TextLine& line = lines_[*header_.unclear];
+    } else if (unclear_line_) {
+      const TextLine& line = lines_[*unclear_line_];
       const std::string rule =
-          header_.names ? "delete the line; where it holds factors also write \"T1\" = { name = "
-                          "\"t1_degC\", unit = \"0.1 degC\" } under [columns]"
-                        : "delete the line or, if it holds the names, write header_line = " +
-                              std::to_string(line.number);
+          names_line_ ? "delete the line; where it holds factors also write \"T1\" = { name = "
+                        "\"t1_degC\", unit = \"0.1 degC\" } under [columns]"
+                      : "delete the line or, if it holds the names, write header_line = " +
+                            std::to_string(line.number);
       problems_.add(line.number, "", line.text,
                     "is neither a row like those below nor names, units or numbers of channels: " +
                         rule + " in the file of --columns");
-    } else if (header_.names &&
-               (map_.names.empty() || head_[*header_.names].fields.size() == cut_.fields)) {
-      return take_names(*header_.names) && make_columns();
+    } else if (names_line_ &&
+               (map_.names.empty() || head_[*names_line_].fields.size() == cut_.fields)) {
+      return take_names(*names_line_) && make_columns();
     } else if (take_commented_names() || take_given_names()) {
       if (row_begin_ == 0 || head_[row_begin_ - 1].is_all_words()) return make_columns();
       problems_.add(lines_[row_begin_ - 1].number, "",
@@ -434,7 +412,7 @@ class TableReader {
     header_text_ = lines_[line].text;
     note_left_out("above the header in line " + std::to_string(table_.header_line), 0, line);
     note_left_out("between the header and the first row", row_begin_ - 1,
-                  row_begin_ - line - 1 - (header_.units > line ? 1 : 0));
+                  row_begin_ - line - 1 - (units_line_ > line ? 1 : 0));
     return true;
   }
 
@@ -474,11 +452,11 @@ class TableReader {
     if (table_.has_header && !map_.names.empty())
       problems_.add(table_.header_line, "names", map_.names.front(),
                     "are for a table without a header; this one has names in this line");
-    table_.has_unit_row = !header_text_.empty() && header_.units;
+    table_.has_unit_row = !header_text_.empty() && units_line_;
     for (std::size_t i = 0; i < names_.size(); ++i) {
       TextColumn& column = table_.columns.emplace_back();
       column.header = names_[i].empty() ? unnamed(i) : names_[i];
-      if (table_.has_unit_row) column.unit_in_row = unit_in_row(head_[*header_.units].fields[i]);
+      if (table_.has_unit_row) column.unit_in_row = unit_in_row(head_[*units_line_].fields[i]);
     }
     return problems_.empty();
   }
@@ -519,10 +497,13 @@ class TableReader {
   TextLines found_;
   const std::vector<TextLine>& lines_{found_.lines};
   Cut cut_;
-  std::vector<HeadLine> head_;  ///< the judged lines
-  std::size_t narrowest_{0};    ///< required fields of a row; 0: all
+  const std::vector<HeadLine>& head_{cut_.lines};
+  std::size_t narrowest_{0};  ///< required fields of a row; 0: all
   std::size_t row_begin_{0};
-  TableHeader header_;
+  std::optional<std::size_t> names_line_;  ///< index; nullopt: none
+  std::optional<std::size_t> units_line_;  ///< a row of units below the names
+  std::optional<std::size_t>
+      unclear_line_;  ///< factors, or numbers below the names that are no row
   std::vector<std::string> names_;
   std::string_view header_text_;
 };
