@@ -236,31 +236,18 @@ bool add_table(const json& object, Records& records) {
   return has_columns;
 }
 
-/// Collects the tables anywhere in a document.
-void collect_tables(const json& value, int depth, Records& records) {
+/// Collects the tables anywhere in a document or, without `tables`, the records in lists or keyed
+/// by their time.
+void collect(const json& value, bool tables, int depth, Records& records) {
   if (depth > depth_max || !value.is_structured() ||
-      (value.is_object() && add_table(value, records)))
+      (tables && value.is_object() && add_table(value, records)))
     return;
-  for (const json& each : value) collect_tables(each, depth + 1, records);
-}
-
-/// Collects records in lists, or keyed by time.
-void collect(const json& value, int depth, Records& records) {
-  if (depth > depth_max) return;
-  if (value.is_array()) {
-    for (const json& each : value) {
-      if (each.is_object())
-        records.add(each);
-      else
-        collect(each, depth + 1, records);
-    }
-  } else if (value.is_object()) {
-    for (const auto& [key, each] : value.items()) {
-      if (each.is_object() && parse_time_stamp(key))
-        records.add(each, in_quotes(key));
-      else
-        collect(each, depth + 1, records);
-    }
+  for (const auto& [key, each] : value.items()) {
+    const bool is_timed = value.is_object() && parse_time_stamp(key);
+    if (!tables && each.is_object() && (value.is_array() || is_timed))
+      records.add(each, is_timed ? in_quotes(key) : "");
+    else
+      collect(each, tables, depth + 1, records);
   }
 }
 
@@ -274,11 +261,7 @@ PlainTable plain_lines(const Log& log) {
     if (!record.is_object()) log.refuse(line, "", "(other JSON)", "must be an object, {...}");
     records.add(record);
   }
-  PlainTable table;
-  table.text = records.text();
-  table.lines_above = -1;
-  table.notes.emplace_back("JSON, a record a line; what a record does not have is missing");
-  return table;
+  return {records.text(), {"JSON, a record a line; what a record does not have is missing"}, -1};
 }
 
 bool is_json(std::string_view text) {
@@ -299,27 +282,22 @@ std::optional<PlainTable> json_log(const Log& log) {
                         rest.find_first_not_of(" \t\r\n") != std::string_view::npos;
   if (is_lines) return plain_lines(log);
   json document = parsed(log, log.text, 0);
-  if (document.is_object() && document.contains("result")) {
-    json result = document["result"];
-    document = std::move(result);
-  }
+  if (document.is_object() && document.contains("result"))
+    document = json(std::move(document["result"]));
   if (is_store(document)) return plain_store(log, document);
-  PlainTable table;
   Records records(log, stated_units(document));
-  collect_tables(document, 0, records);
+  collect(document, true, 0, records);
   const bool has_tables = !records.empty();
-  if (!has_tables) collect(document, 0, records);
+  if (!has_tables) collect(document, false, 0, records);
   if (records.empty())
     log.refuse(
         0, "", "(other JSON)",
         "must be records (a line each, a list, or each under its time), lists of values with "
         "their names, or the answer of Moonraker's server/temperature_store, a list "
         "\"temperatures\" for each heater and sensor");
-  table.text = records.text();
-  table.notes.emplace_back(has_tables
-                               ? "JSON, names once and lists of values"
-                               : "JSON, a row a record; what a record does not have is missing");
-  return table;
+  return PlainTable{records.text(),
+                    {has_tables ? "JSON, names once and lists of values"
+                                : "JSON, a row a record; what a record does not have is missing"}};
 }
 
 }  // namespace thermocomp::forms

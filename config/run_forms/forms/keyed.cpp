@@ -30,10 +30,8 @@ void check_scales(const Log& log, const std::vector<std::string>& fields, int li
 }
 
 /// Converts 100 ns since 1601 to ms since 1970.
-std::string start_ms(const std::string& filetime) {
-  const auto ticks = finite_number(filetime);
-  if (!ticks || !(*ticks > 1.2e17 && *ticks < 1.5e17)) return {};
-  return number_text(*ticks * 1e-4 - 11644473600000.0);
+double ms_of_ticks(double ticks) {
+  return ticks * 1e-4 - 11644473600000.0;
 }
 
 }  // namespace
@@ -68,26 +66,17 @@ std::optional<PlainTable> lvm(const Log& log) {
   const bool by_commas = rest.substr(0, 2000).find("Separator,Comma") != std::string_view::npos;
   const char separator = by_commas ? ',' : '\t';
   int line = 0;
-  int names_line = 0;
+  bool is_behind = false;  // a header; the first one ends with an empty line, the others with names
   std::vector<std::string> names;
-  std::string_view rows;
-  while (!rest.empty()) {
+  while (!rest.empty() && names.empty()) {
     ++line;
-    std::vector<std::string> fields = fields_of(take_line(rest), separator);
-    if (names_line == line) {
-      names = std::move(fields);
-      rows = rest;
-    } else if (fields[0].starts_with(end_of_header)) {
-      names_line = line + 1;
-    } else if (!fields[0].empty() && rows.empty()) {
-      const std::string key = fields[0];
-      keys[key] = std::move(fields);
-    }
-    // The first header ends with an empty line, that of a segment with the names.
-    if (names_line == line && (names.empty() || names[0] != "X_Value")) rows = {};
-    if (!rows.empty()) break;
+    const std::vector<std::string> fields = fields_of(take_line(rest), separator);
+    const bool is_end = !is_behind && fields[0].starts_with(end_of_header);
+    if (is_behind && fields[0] == "X_Value") names = fields;
+    if (!is_behind && !is_end && !fields[0].empty()) keys[fields[0]] = fields;
+    is_behind = is_end;
   }
-  if (rows.empty()) log.refuse(line, "X_Value", "(missing)", "must head the rows of an LVM file");
+  if (rest.empty()) log.refuse(line, "X_Value", "(missing)", "must head the rows of an LVM file");
   PlainTable table;
   const bool has_comments = names.back() == "Comment";  // most rows omit it
   if (has_comments) names.pop_back();
@@ -101,16 +90,16 @@ std::optional<PlainTable> lvm(const Log& log) {
     if (i > 0) table.text += separator;
     table.text += with_unit(names[i], i == 0 ? "s" : key("Y_Unit_Label", i));
   }
-  table.lines_above = names_line - 1 - (zero ? 1 : 0);
-  while (!rows.empty()) {
-    const std::string_view row = take_line(rows);
+  table.lines_above = line - 1 - (zero ? 1 : 0);
+  while (!rest.empty()) {
+    const std::string_view row = take_line(rest);
     std::size_t end = has_comments ? 0 : std::string_view::npos;
     for (std::size_t i = 0; i < names.size() && end != std::string_view::npos; ++i)
       end = row.find(separator, i == 0 ? 0 : end + 1);
     table.text.append("\n").append(row.substr(0, end));
   }
   if (has_comments) table.notes.emplace_back("'Comment' left out");
-  table.notes.emplace_back("LVM of LabVIEW: names in line " + std::to_string(names_line));
+  table.notes.emplace_back("LVM of LabVIEW: names in line " + std::to_string(line));
   return table;
 }
 
@@ -121,14 +110,16 @@ std::optional<PlainTable> twincat(const Log& log) {
   std::string_view rest = log.text;
   std::vector<std::string> names;
   std::vector<std::string> units;
-  std::string start;
+  double zero_ms = 0.0;
   std::string_view rows;
   int line = 0;
   for (std::string_view before = rest; !rest.empty(); before = rest) {
     ++line;
     const std::vector<std::string> fields = fields_of(take_line(rest), separator);
-    std::string key = fields[0];
-    if (key.starts_with("Start") && fields.size() > 1 && start.empty()) start = start_ms(fields[1]);
+    const std::string& key = fields[0];
+    if (key.starts_with("Start") && fields.size() > 1 && zero_ms == 0.0)
+      if (const auto ticks = finite_number(fields[1]); ticks && *ticks > 1.2e17 && *ticks < 1.5e17)
+        zero_ms = ms_of_ticks(*ticks);
     if (key == "Name" && fields.size() >= names.size()) names = fields;
     if (key == "Unit") units = fields;
     if (key == "ScaleFactor" || key == "Offset") check_scales(log, fields, line);
@@ -139,18 +130,15 @@ std::optional<PlainTable> twincat(const Log& log) {
   if (rows.empty() || names.size() < 2)
     log.refuse(line, "Name", "(missing)", "must name the channels of TwinCAT's scope");
   // A column called Name is a time column, and applies to the channels after it.
-  std::vector<std::string> series;
-  PlainTable table;
   const bool many_times = std::ranges::count(names, "Name") > 1;
   units.resize(names.size());
-  if (!many_times) {
-    table.text = "\"time [ms]\"";
-    for (std::size_t i = 1; i < names.size(); ++i)
-      table.text.append(";").append(with_unit(names[i], units[i].starts_with('(') ? "" : units[i]));
-  } else {
-    table.text = "time [ms];series;value";
+  PlainTable table;
+  table.text = many_times ? "time [ms];series;value" : "\"time [ms]\"";
+  std::vector<std::string> labels;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    labels.push_back(with_unit(names[i], units[i].starts_with('(') ? "" : units[i]));
+    if (i > 0 && !many_times) table.text.append(";").append(labels[i]);
   }
-  const double zero_ms = finite_number(start).value_or(0.0);
   const NumberForm form{separator != ',' && rows.find(',') != std::string_view::npos ? ',' : '.',
                         '\0'};
   table.lines_above = line - 2;
@@ -162,15 +150,13 @@ std::optional<PlainTable> twincat(const Log& log) {
       const std::string& field = fields[i];
       if (names[i] == "Name") {
         const auto at = number_of(field, form);
-        time = at ? number_text(*at < 1e15 ? *at + zero_ms : *at * 1e-4 - 11644473600000.0) : "";
+        time = at ? number_text(*at < 1e15 ? *at + zero_ms : ms_of_ticks(*at)) : "";
         std::ranges::replace(time, '.', form.decimal);
         if (!many_times) table.text.append("\n").append(time);
       } else if (!many_times) {
         table.text.append(";").append(field);
       } else if (!field.empty() && !time.empty()) {
-        table.text.append("\n").append(time).append(";");
-        table.text.append(with_unit(names[i], units[i].starts_with('(') ? "" : units[i]));
-        table.text.append(";").append(field);
+        table.text.append("\n" + time + ";" + labels[i] + ";" + field);
       }
     }
   }
