@@ -42,8 +42,10 @@ void leave_empty_columns_out(TextTable& table) {
 }
 
 void note_layout(TextTable& table, std::vector<std::string> notes, bool from_latin1) {
-  std::string note = "separator '" + separator_name(table.separator) + "', decimal " +
-                     (table.form.decimal == ',' ? "comma" : "point");
+  const char sign = table.separator;
+  const std::string separator = sign == '\t' ? "tab" : sign == ' ' ? "blank" : std::string(1, sign);
+  std::string note =
+      "separator '" + separator + "', decimal " + (table.form.decimal == ',' ? "comma" : "point");
   if (table.form.thousands != '\0')
     note += std::string(", thousands '") + table.form.thousands + "'";
   if (from_latin1) note += ", letters Latin-1";

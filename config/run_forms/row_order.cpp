@@ -305,11 +305,15 @@ void follow_summer_time(TextTable& table, RunTime& time) {
   }
 }
 
+void count_from_first(RunTime& time) {
+  const double first = time.time_s.front();
+  for (double& at : time.time_s) at -= first;
+  if (time.wall_zero) time.wall_zero->seconds += first;
+}
+
 void turn_rows(TextTable& table, RunTime& time) {
-  const double earliest = time.time_s.back();
   std::ranges::reverse(time.time_s);
-  for (double& at : time.time_s) at -= earliest;
-  if (time.wall_zero) time.wall_zero->seconds += earliest;
+  count_from_first(time);
   std::ranges::reverse(table.lines);
   for (TextColumn& column : table.columns) std::ranges::reverse(column.fields);
   table.notes.emplace_back("the newest row is first: order reversed");
@@ -344,10 +348,7 @@ void order_rows(TextTable& table, RunTime& time, const TimeColumns& columns) {
   if (const auto form = long_form(table, time_s)) {
     Pivot(table, time_s, *form).run();
     if (!table.problems.empty()) return;
-    const double first = time_s.front();  // the earliest, which is 0
-    if (first < 0)
-      for (double& at : time_s) at -= first;
-    if (time.wall_zero && first < 0) time.wall_zero->seconds += first;
+    if (time_s.front() < 0) count_from_first(time);
     column = 0;
     read_units(table);
   } else {

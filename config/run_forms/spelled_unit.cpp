@@ -106,19 +106,17 @@ std::string_view plain_temperature(std::string_view unit) {
   std::string letters;
   bool has_degree = unit.size() == 2 && unit[0] == 'o' && unit[1] < 'a';  // "oC"; not "of"
   if (has_degree) unit.remove_prefix(1);
-  while (!unit.empty()) {
+  const std::string small = small_letters(unit);
+  for (std::string_view rest = small; !rest.empty();) {
     const auto* const sign = std::ranges::find_if(
-        degree_signs, [&](const DegreeSign& each) { return unit.starts_with(each.bytes); });
-    if (sign != degree_signs.end()) {
-      has_degree = true;
+        degree_signs, [&](const DegreeSign& each) { return rest.starts_with(each.bytes); });
+    const bool is_sign = sign != degree_signs.end();
+    has_degree = has_degree || is_sign;
+    if (is_sign)
       letters += sign->letter;
-      unit.remove_prefix(sign->bytes.size());
-      continue;
-    }
-    const char c = unit.front();
-    unit.remove_prefix(1);
-    if (c == ' ' || c == '_' || c == '.') continue;
-    letters += c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+    else if (std::string_view(" _.").find(rest.front()) == std::string_view::npos)
+      letters += rest.front();
+    rest.remove_prefix(is_sign ? sign->bytes.size() : 1);
   }
   std::string_view left = letters;
   for (const std::string_view word : {"degrees", "degree", "deg", "grad", "grd"}) {
@@ -139,28 +137,6 @@ bool is_index(std::string_view text) {
   return !text.empty() && text.find_first_not_of("0123456789, ") == std::string_view::npos;
 }
 
-bool split_blank(std::string_view header, SpelledName& name);
-
-/// "T1 [°C]": unit in brackets at the end.
-bool split_brackets(std::string_view header, SpelledName& name) {
-  for (const auto& [open, close] : {std::pair('[', ']'), {'(', ')'}, {'{', '}'}}) {
-    if (!header.ends_with(close)) continue;
-    const auto begin = header.rfind(open);
-    if (begin == std::string_view::npos) continue;
-    if (header.find('=', begin) != std::string_view::npos) continue;  // labels: {place="bed"}
-    if (open == '(' && is_index(header.substr(begin + 1, header.size() - begin - 2))) continue;
-    const std::string_view base = trimmed(header.substr(0, begin));
-    name.base = base;
-    name.unit = trimmed(header.substr(begin + 1, header.size() - begin - 2));
-    name.known = spelled_unit(name.unit);
-    // "Temp, °C (LGR S/N: 1)": the unit precedes other text.
-    SpelledName before;
-    if (name.known == nullptr && split_blank(base, before)) name = before;
-    return true;
-  }
-  return false;
-}
-
 /// "Temp °C", "Temp, °C", "I / A", "t in s": unit after the last blank.
 bool split_blank(std::string_view header, SpelledName& name) {
   const auto blank = header.rfind(' ');
@@ -177,6 +153,26 @@ bool split_blank(std::string_view header, SpelledName& name) {
   if (unit == nullptr || (unit->only_in_brackets && !is_marked)) return false;
   name = {std::string(base), std::string(header.substr(blank + 1)), unit};
   return true;
+}
+
+/// "T1 [°C]": unit in brackets at the end.
+bool split_brackets(std::string_view header, SpelledName& name) {
+  for (const auto& [open, close] : {std::pair('[', ']'), {'(', ')'}, {'{', '}'}}) {
+    if (!header.ends_with(close)) continue;
+    const auto begin = header.rfind(open);
+    if (begin == std::string_view::npos) continue;
+    const std::string_view inside = header.substr(begin + 1, header.size() - begin - 2);
+    if (inside.find('=') != std::string_view::npos) continue;  // labels: {place="bed"}
+    if (open == '(' && is_index(inside)) continue;
+    const std::string_view base = trimmed(header.substr(0, begin));
+    const std::string unit(trimmed(inside));
+    name = {std::string(base), unit, spelled_unit(unit)};
+    // "Temp, °C (LGR S/N: 1)": the unit precedes other text.
+    SpelledName before;
+    if (name.known == nullptr && split_blank(base, before)) name = before;
+    return true;
+  }
+  return false;
 }
 
 /// "T1°C", "z/µm": characters that occur in units only.

@@ -530,8 +530,4 @@ TextTable read_text_table(std::string text, const ColumnMap& map, int lines_abov
   return TableReader(map, problems).read(std::move(text), lines_above);
 }
 
-std::string separator_name(char separator) {
-  return separator == '\t' ? "tab" : separator == ' ' ? "blank" : std::string(1, separator);
-}
-
 }  // namespace thermocomp

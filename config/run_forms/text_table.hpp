@@ -106,7 +106,4 @@ struct TextTable {
 [[nodiscard]] TextTable read_text_table(std::string text, const ColumnMap& map, int lines_above,
                                         ProblemList& problems);
 
-/// Name of a separator in a ColumnMap's file: "tab" or the character.
-[[nodiscard]] std::string separator_name(char separator);
-
 }  // namespace thermocomp

@@ -398,6 +398,11 @@ TEST_CASE("TwinCAT's scope: groups of thousands are read, a scale is refused", "
         "time_s,Bed\n0,20.5\n0.5,20.75\n", ""}});
 }
 
+TEST_CASE("halsampler's lines may end with CR LF", "[import]") {
+  check_all({{"two rows", "20.5\r\n20.75\r\n", "time_s,t1_degC\n0,20.5\n1,20.75\n",
+              "names = [\"t1_degC\"]\nperiod_s = 1\n"}});
+}
+
 TEST_CASE("the comments of an LVM are left out", "[import]") {
   const std::string head =
       "LabVIEW Measurement\t\nSeparator\tTab\n***End_of_Header***\t\n\nChannels\t1\n"
