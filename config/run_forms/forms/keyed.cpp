@@ -156,7 +156,8 @@ std::optional<PlainTable> twincat(const Log& log) {
       } else if (!many_times) {
         table.text.append(";").append(field);
       } else if (!field.empty() && !time.empty()) {
-        table.text.append("\n" + time + ";" + labels[i] + ";" + field);
+        table.text.append("\n").append(time).append(";").append(labels[i]).append(";").append(
+            field);
       }
     }
   }
