@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "config/run_forms/long_table.hpp"
+#include "config/run_forms/row_order.hpp"
 #include "config/runs/robust.hpp"
 #include "config/text/printable_text.hpp"
 #include "config/text/problems.hpp"

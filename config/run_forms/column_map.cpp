@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "config/run_forms/field_text.hpp"
 #include "config/run_forms/spelled_unit.hpp"
 #include "config/text/units.hpp"
 #include "config/toml/toml_reader.hpp"
@@ -38,14 +39,26 @@ bool is_unnamed(std::string_view header) {
 }
 
 bool ColumnMap::ignores(std::string_view header) const {
-  const auto has = [&](std::string_view name) {
-    return std::find(ignored.begin(), ignored.end(), name) != ignored.end();
-  };
-  return has(header) || (is_unnamed(header) && has(""));
+  return std::ranges::any_of(ignored, [&](const std::string& name) {
+    return name == header || (name.empty() && is_unnamed(header));
+  });
 }
 
-bool ColumnMap::uses(std::string_view header) const {
-  return ignores(header) || columns.contains(std::string(header));
+const MappedColumn* ColumnMap::find(const std::string& header) const {
+  const auto found = columns.find(header);
+  return found == columns.end() ? nullptr : &found->second;
+}
+
+bool ColumnMap::uses(const std::string& header) const {
+  return ignores(header) || find(header) != nullptr;
+}
+
+std::string write_column(std::string_view header, const std::string& value) {
+  return "write " + toml_text(header) + " = " + value + " under [columns] in the file of --columns";
+}
+
+std::string ignore_column(std::string_view header) {
+  return "ignore = [" + toml_text(header) + "]";
 }
 
 ColumnMap parse_column_map(const std::string& text, const std::string& name) {

@@ -39,9 +39,16 @@ struct ColumnMap {
   std::map<std::string, MappedColumn> columns;  ///< by the name in the header
 
   [[nodiscard]] bool ignores(std::string_view header) const;
+  /// nullptr: it does not say what the column is.
+  [[nodiscard]] const MappedColumn* find(const std::string& header) const;
   /// Whether it says what the column is, or leaves it out.
-  [[nodiscard]] bool uses(std::string_view header) const;
+  [[nodiscard]] bool uses(const std::string& header) const;
 };
+
+/// Parts of messages: write "T1" = `value` under [columns] in the file of --columns;
+/// ignore = ["T1"].
+[[nodiscard]] std::string write_column(std::string_view header, const std::string& value);
+[[nodiscard]] std::string ignore_column(std::string_view header);
 
 /// "column 3": name of a column without one.
 [[nodiscard]] std::string unnamed(std::size_t column);

@@ -1,26 +1,80 @@
 #include "config/run_forms/column_meanings.hpp"
 
 #include <algorithm>
+#include <array>
+#include <charconv>
+#include <cstdint>
+#include <optional>
+#include <set>
+#include <utility>
 
 #include "config/run_forms/field_text.hpp"
+#include "config/run_forms/spelled_unit.hpp"
 #include "config/text/printable_text.hpp"
 #include "config/text/units.hpp"
+#include "config/toml/toml_reader.hpp"
 
 namespace thermocomp {
 namespace {
+
+constexpr std::string_view unit_names = "|unit|units|einheit|unit_of_measurement|uom|u|";
+constexpr std::string_view series_names =
+    "|sensor|sensors|sensor_id|sensor_name|sensor name|channel|kanal|tag|tagname"
+    "|tag name|probe|place|point|messstelle|series|signal|variable|parameter"
+    "|metric|item|topic|entity_id|sphere|";
+/// Those whose sensors may have numbers.
+constexpr std::string_view numbered_names =
+    "|sensor|sensor_id|channel|kanal|ch|chan|probe|messstelle|sphere|";
+constexpr std::string_view time_part_names =
+    "|day|hour|minute|second|sec|secs|millis|milliseconds|ms|msec|us|usec|micros"
+    "|microseconds|ns|nsec|nanoseconds|";
+
+enum class Quality { good, bad, other };
+enum class Codes { none, opc, validity };  ///< validity: 1 good, 0 bad
+
+/// The number of "192" or, with base 16, "0x000000C0".
+std::optional<std::uint64_t> code_of(std::string_view field) {
+  const bool is_hex = field.starts_with("0x") || field.starts_with("0X");
+  if (is_hex) field.remove_prefix(2);
+  std::uint64_t code = 0;
+  const char* const end = field.data() + field.size();
+  const auto [at, error] = std::from_chars(field.data(), end, code, is_hex ? 16 : 10);
+  return error == std::errc() && at == end ? std::optional(code) : std::nullopt;
+}
+
+/// Reads words or, with `codes`, a number: OPC calls 192 to 255 good and numbers below 64 bad, OPC
+/// UA calls numbers from 0x80000000 on bad.
+Quality quality_of(std::string_view field, Codes codes) {
+  const std::string word = small_letters(field);
+  if (word.starts_with("good") || word == "valid") return Quality::good;
+  if (word.starts_with("bad") || word == "invalid") return Quality::bad;
+  const auto code = codes == Codes::none ? std::nullopt : code_of(field);
+  if (code && codes == Codes::validity)
+    return *code == 1 ? Quality::good : *code == 0 ? Quality::bad : Quality::other;
+  if (code && *code >= 192 && *code <= 255) return Quality::good;
+  return code && (*code < 64 || *code >= 0x80000000) ? Quality::bad : Quality::other;
+}
+
+Codes codes_of(const TextColumn& column) {
+  const std::string name = small_letters(column.header);
+  const auto has = [&](std::string_view part) { return name.find(part) != std::string::npos; };
+  if (has("valid")) return Codes::validity;
+  if (has("qualit") || has("status")) return Codes::opc;
+  // Under another name if most are OPC's "good".
+  std::size_t good = 0;
+  for (const std::string_view field : column.fields) {
+    const auto code = code_of(field);
+    if (!code || *code > 255) return Codes::none;
+    if (*code == 192) ++good;
+  }
+  return 2 * good >= column.fields.size() ? Codes::opc : Codes::none;
+}
 
 /// Suggested name for a column without a unit; the user corrects it.
 std::string example_name(std::string_view base) {
   std::string name = plain_name(base);
   if (name.empty()) return "t1_degC";
-  const char first = name.front();
-  if (first == 't' || first == 'T') return name + "_degC";
-  if (first >= 'x' && first <= 'z') return name + "_um";
-  return name + "_degC";
-}
-
-std::string own_name(const SpelledName& spelled) {
-  return plain_name(spelled.base).append(spelled.known->suffix);
+  return name + (name.front() >= 'x' && name.front() <= 'z' ? "_um" : "_degC");
 }
 
 /// "ΔT", "dT bed-head", "Temp diff", "rise above ambient".
@@ -39,190 +93,381 @@ bool is_factor(std::string_view word) {
   return finite_number(word) && (is_marked || word.find('.') != std::string_view::npos);
 }
 
+/// The first unit of a column's cells, if each number has one: in "80.6 A" below 20.5 the A may be
+/// a flag.
+std::string_view unit_of_cells(const TextColumn& column) {
+  std::string_view first;
+  for (const std::string_view field : column.fields) {
+    const SpelledUnit* unit = number_text_of(field).unit;
+    if (unit == nullptr && looks_like_number(field)) return {};
+    if (first.empty() && unit != nullptr) first = unit->spelling;
+  }
+  return first;
+}
+
 /// A name that keeps its meaning in a file of our own form.
 bool is_plain(const std::string& name) {
   return is_column_name(name) && spelled_name(name).known == nullptr && name != "time_s";
 }
 
-}  // namespace
-
-ColumnMeanings::ColumnMeanings(const TextTable& table, const ColumnMap* map,
-                               const std::vector<std::string>& units, bool has_own_names,
-                               ProblemList& problems, std::vector<std::string>& understood)
-    : table_(table),
-      map_(map),
-      units_(units),
-      has_own_names_(has_own_names),
-      problems_(problems),
-      understood_(understood) {}
-
-std::optional<ColumnMeaning> ColumnMeanings::of(std::size_t i) const {
-  const std::string& header = table_.header[i];
-  SpelledName spelled = spelled_name(header);
-  if (spelled.unit.empty() && !units_[i].empty()) {
-    spelled.unit = units_[i];
-    spelled.known = spelled_unit(units_[i]);
-  }
-  const bool is_mapped_with_unit = is_mapped(header) && !map_->columns.at(header).unit.empty();
-  if (const std::string why = is_mapped_with_unit ? "" : unclear_unit(i, spelled); !why.empty()) {
-    refuse(i, why);
-    return std::nullopt;
-  }
-  const bool has_own = spelled_name(header).unit.empty() && has_own_unit(header);
-  if (has_own && spelled.known != nullptr && spelled.known->dimension != "none" &&
-      !is_mapped_with_unit) {
-    const bool is_same =
-        conversion(*spelled.known, header).value_or(UnitConversion{0}).is_identity();
-    if (is_same && !is_mapped(header)) return ColumnMeaning{i, header, {}};
-    if (!is_same)
-      refuse(i, "names one unit, and its column is in " + spelled.unit + ": write " +
-                    toml_text(header) + " = { name = " + toml_text(header) +
-                    ", unit = " + toml_text(spelled.unit) +
-                    " } under [columns] in the file of --columns, or the unit that is true");
-    if (!is_same) return std::nullopt;
-  }
-  if (is_mapped(header)) return mapped(i, map_->columns.at(header), spelled);
-  if (spelled.unit.empty() && !unit_of(header).suffix.empty() && is_column_name(header))
-    return ColumnMeaning{i, header, {}};
-  const bool is_named = map_ != nullptr && std::find(map_->names.begin(), map_->names.end(),
-                                                     header) != map_->names.end();
-  const bool takes_signal = spelled.unit.empty() && (has_own_names_ || is_named ||
-                                                     (map_ != nullptr && map_->takes_signals));
-  if (takes_signal && is_column_name(plain_name(header)))
-    return ColumnMeaning{i, plain_name(header), {}};
-  if (spelled.known == nullptr || spelled.known->dimension == "time") {
-    const std::string example = spelled.unit.empty()
-                                    ? example_name(spelled.base)
-                                    : plain_name(spelled.base + "_" + spelled.unit);
-    refuse(
-        i,
-        (spelled.unit.empty() ? std::string("has no unit")
-                              : "has an unknown unit, " + spelled.unit) +
-            ": write " + toml_text(header) + " = " + toml_text(example) +
-            (spelled.unit.empty()
-                 ? " (or what it is; without a unit it is a signal)"
-                 : ", a signal, or { name = \"its name\", unit = " +
-                       toml_text(unit_with_factor(spelled.unit) ? spelled.unit : "a known unit") +
-                       " }") +
-            " under [columns], or ignore = [" + toml_text(header) + "], in the file of --columns");
-    return std::nullopt;
-  }
-  ColumnMeaning meaning{i, own_name(spelled), {}};
-  const bool own_unit = unit_of(meaning.name).suffix == spelled.known->suffix;
-  if (plain_name(spelled.base).empty() || !own_unit || !is_plain(meaning.name)) {
-    refuse(i, "is not a descriptive name: write " + toml_text(header) +
-                  " = \"its name\" under [columns] in the file of --columns");
-    return std::nullopt;
-  }
-  meaning.conversion = conversion(*spelled.known, meaning.name).value_or(UnitConversion{});
-  return meaning;
-}
-
-/// Why the unit of a column may be another than it seems; empty: it is clear.
-std::string ColumnMeanings::unclear_unit(std::size_t i, const SpelledName& spelled) const {
-  if (spelled.known == nullptr) return {};
-  const auto ask = [&](const std::string& name, const std::string& unit,
-                       const std::string& other = "what is true") {
-    return ": write " + toml_text(table_.header[i]) + " = { name = " + toml_text(plain_name(name)) +
-           ", unit = " + toml_text(unit) + " }, or " + other +
-           ", under [columns] in the file of --columns";
-  };
-  if (spelled.known->suffix == "_degC" && spelled.known->offset != 0.0 &&
-      names_difference(spelled.base))
-    return "may be a difference of temperatures" +
-           ask(spelled.base + "_K", "delta_degF", "unit = \"degF\" with a name in _degC");
-  const std::string of_name = spelled_name(table_.header[i]).unit;
-  const std::string in_row = table_.units.empty() ? "" : table_.units[i];
-  const SpelledUnit* row = spelled_unit(in_row);
-  if (!of_name.empty() && row != nullptr && row->dimension != "none" &&
-      (row->factor != spelled.known->factor || row->offset != spelled.known->offset ||
-       row->dimension != spelled.known->dimension))
-    return "may be in " + of_name + ", as its name says, or in " + in_row +
-           ", as the row of units says" + ask(spelled.base + std::string(row->suffix), in_row);
-  const auto factor = spelled.base.find_last_of(" _") + 1;
-  if (is_factor(std::string_view(spelled.base).substr(factor)))
-    return "may be a multiple of its unit" +
-           ask(std::string(trimmed(spelled.base.substr(0, factor))) +
-                   std::string(spelled.known->suffix),
-               "0.1 " + spelled.unit);
-  const bool is_prefix = spelled.known->spelling == "K" || spelled.known->spelling == "m";
-  if (of_name.empty() && in_row.empty() && is_prefix)
-    return "has numbers with " + spelled.unit + ", which may be a unit or mean " +
-           (spelled.unit == "K" ? "a thousand" : "a thousandth") +
-           ask(spelled.base + std::string(spelled.known->suffix), spelled.unit);
-  return {};
-}
-
-std::optional<ColumnMeaning> ColumnMeanings::mapped(std::size_t i, const MappedColumn& column,
-                                                    const SpelledName& spelled) const {
-  ColumnMeaning meaning{i, column.name, {}};
-  const auto unit = column.unit.empty()
-                        ? (spelled.known == nullptr ? std::nullopt : std::optional(*spelled.known))
-                        : unit_with_factor(column.unit);
-  if (!is_plain(column.name)) {
-    problems_.add({map_->file, 0, "columns", column.name, std::string(column_name_rule)});
-    return std::nullopt;
-  }
-  const bool has_brackets = !unit && !spelled.unit.empty();
-  if (has_brackets && !unit_of(column.name).suffix.empty() && may_be_unit(spelled.unit)) {
-    problems_.add({map_->file, 0, "columns", column.name,
-                   "may not be the unit of '" + table_.header[i] +
-                       "': write { name = " + toml_text(column.name) +
-                       ", unit = \"that of the file\" }, such as degC, 0.1 degC or mil"});
-    return std::nullopt;
-  }
-  if (has_brackets)
-    understood_.push_back("in '" + table_.header[i] + "' '" + spelled.unit +
-                          "' is taken for a part of the name, not for a unit");
-  if (!unit) return meaning;
-  const auto converted = conversion(*unit, column.name);
-  if (!converted) {
-    problems_.add({map_->file, 0, "columns", column.name,
-                   "cannot be made from '" + table_.header[i] + "', which is in " +
-                       std::string(unit->spelling)});
-    return std::nullopt;
-  }
-  meaning.conversion = *converted;
-  return meaning;
-}
-
-void ColumnMeanings::note(const ColumnMeaning& meaning) const {
-  const std::size_t i = meaning.source;
-  std::string note = "'" + table_.header[i] + "' is " + meaning.name;
-  const bool has_unit = !unit_of(meaning.name).suffix.empty();
-  if (!has_unit) note += ", a signal without unit";
-  if (!has_unit && !is_mapped(table_.header[i]) && !has_own_names_ && map_ != nullptr &&
-      map_->takes_signals && map_->names.empty())
-    note += " (if it has one, write " + toml_text(table_.header[i]) + " = " +
-            toml_text(example_name(spelled_name(table_.header[i]).base)) +
-            ", or what it is, under [columns] in the file of --columns)";
-  if (meaning.conversion.factor != 1.0) note += ", times " + number_text(meaning.conversion.factor);
-  if (meaning.conversion.offset != 0.0) note += ", plus " + number_text(meaning.conversion.offset);
-  const bool from_mm = kind_of(meaning.name) == QuantityKind::position;
-  if (from_mm && meaning.name != table_.header[i])
-    note += ", a position (a displacement: write " + toml_text(table_.header[i]) + " = " +
-            toml_text(meaning.name.substr(0, meaning.name.size() - 2) + "um") +
-            " under [columns] in the file of --columns)";
-  understood_.push_back(note);
-}
-
-bool ColumnMeanings::is_mapped(const std::string& header) const {
-  return map_ != nullptr && map_->columns.contains(header);
-}
-
-void ColumnMeanings::refuse(std::size_t column, std::string rule) const {
-  refuse_column(table_, column, std::move(rule), problems_);
-}
-
+/// Whether a header is a name of ours with a unit: "T1_degC".
 bool has_own_unit(const std::string& header) {
   return is_column_name(header) && !unit_of(header).suffix.empty();
 }
 
-void refuse_column(const TextTable& table, std::size_t column, std::string rule,
-                   ProblemList& problems) {
-  const std::string& header = table.header[column];
-  problems.add(table.header_line, "column " + std::to_string(column + 1),
-               header.empty() ? "(empty)" : header, std::move(rule));
+/// "3 K rpm", "4.5 K rpm": numbers with a unit that is not known.
+bool begins_with_numbers(const TextColumn& column) {
+  const auto is_empty = [](std::string_view field) { return field.empty(); };
+  const auto begins = [](std::string_view field) {
+    return field.empty() || finite_number(field.substr(0, field.find(' ')));
+  };
+  return std::ranges::all_of(column.fields, begins) &&
+         !std::ranges::all_of(column.fields, is_empty);
+}
+
+/// Whether the column numbers the rows, 0 1 2 or 1 2 3.
+bool counts_rows(const TextColumn& column) {
+  const auto first = finite_number(column.fields[0]);
+  if (!first || (*first != 0.0 && *first != 1.0)) return false;
+  double next = *first;
+  return column.fields.size() > 1 &&
+         std::ranges::all_of(
+             column.fields, [&](std::string_view field) { return finite_number(field) == next++; });
+}
+
+/// "{ name = "t1_degC", unit = "0.1 degC" }"
+std::string with_name_and_unit(const std::string& name, const std::string& unit) {
+  return "{ name = " + toml_text(name) + ", unit = " + toml_text(unit) + " }";
+}
+
+class MeaningFinder {
+ public:
+  explicit MeaningFinder(TextTable& table) : table_(table) {}
+
+  std::vector<ColumnMeaning> find() {
+    check_map();
+    for (std::size_t i = 0; i < table_.columns.size(); ++i) {
+      const TextColumn& column = table_.columns[i];
+      if (column.is_time) continue;
+      const bool is_mapped = table_.map.find(column.header) != nullptr;
+      if (table_.map.ignores(column.header))
+        note_on(column, " left out");
+      else if (const std::string why = is_mapped ? "" : no_value(column); !why.empty())
+        note_on(column, " left out: " + why);
+      else if (const std::string role = is_mapped ? "" : unclear_role(column); !role.empty())
+        table_.refuse_column(i, role);
+      else if (auto meaning = meaning_of(i))
+        take(i, std::move(*meaning), is_mapped);
+    }
+    if (found_.empty() && table_.problems.empty())
+      table_.problems.add(0, "", "", "has no column of numbers besides the time");
+    return std::move(found_);
+  }
+
+ private:
+  void note_on(const TextColumn& column, const std::string& text) {
+    table_.notes.push_back("'" + column.header + "'" + text);
+  }
+
+  void check_map() {
+    std::vector<std::string> headers;
+    for (const TextColumn& column : table_.columns) headers.push_back(column.header);
+    const auto check = [&](const std::string& key, const std::string& header) {
+      const auto count = std::ranges::count(headers, header);
+      if (count == 1) return;
+      std::string rule = count > 1 ? "appears twice in " : "is not a column of ";
+      rule += table_.problems.file();
+      std::string near = nearest_name(header, headers);
+      for (const std::string& each : headers)
+        if (spelled_name(each).base == header) near = each;  // equal except for the unit
+      if (count == 0 && !near.empty()) rule += "; '" + near + "' is";
+      table_.refuse_map(key, header, rule);
+    };
+    for (const auto& [header, column] : table_.map.columns) check("columns", header);
+    for (const std::string& header : table_.map.ignored)
+      if (!header.empty()) check("ignore", header);
+  }
+
+  /// Why an unmapped column is not a value; empty: it is one.
+  [[nodiscard]] std::string no_value(const TextColumn& column) const {
+    const std::string& header = column.header;
+    const bool has_no_unit = column.unit.empty() && !has_own_unit(header);
+    const bool is_count = is_unnamed(header) || header == "#" || header == "RECORD" ||
+                          header == "No." || header == "Nr." || header == "index" ||
+                          (has_no_unit && table_.rows() >= 10);
+    if (is_count && (counts_rows(column) || header == "RECORD")) return "it counts the rows";
+    if (time_unit(column.unit) != nullptr) return "another time";
+    if (!bad_rows(column).empty()) return "it is the quality of values";
+    const bool may_be_value = spelled_unit(column.unit) != nullptr || has_own_unit(header) ||
+                              !is_text(column) || begins_with_numbers(column);
+    return may_be_value ? "" : "no field of it is a number";
+  }
+
+  void take(std::size_t i, ColumnMeaning meaning, bool is_mapped) {
+    if (!is_mapped) number_name(meaning);
+    if (!names_.insert(meaning.name).second) {
+      table_.refuse_column(i, "becomes " + meaning.name + ", which appears twice: " +
+                                  write_column(meaning.source->header, "\"another name\""));
+      return;
+    }
+    note(meaning, is_mapped);
+    found_.push_back(std::move(meaning));
+  }
+
+  /// Numbers columns of equal names: Temp_degC, Temp_2_degC.
+  void number_name(ColumnMeaning& meaning) const {
+    const std::string suffix(unit_of(meaning.name).suffix);
+    const std::string base = meaning.name.substr(0, meaning.name.size() - suffix.size());
+    for (int i = 2; names_.contains(meaning.name); ++i)
+      meaning.name = base + "_" + std::to_string(i) + suffix;
+  }
+
+  void note(const ColumnMeaning& meaning, bool is_mapped) {
+    const std::string& header = meaning.source->header;
+    std::string text = " is " + meaning.name;
+    const bool has_unit = !unit_of(meaning.name).suffix.empty();
+    if (!has_unit) text += ", a signal without unit";
+    if (!has_unit && !is_mapped && !table_.has_own_names && table_.map.takes_signals &&
+        table_.map.names.empty())
+      text += " (if it has one, " +
+              write_column(
+                  header, toml_text(example_name(spelled_name(header).base)) + ", or what it is,") +
+              ")";
+    const auto& [factor, offset] = meaning.conversion;
+    if (factor != 1.0) text += ", times " + number_text(factor);
+    if (offset != 0.0) text += ", plus " + number_text(offset);
+    if (kind_of(meaning.name) == QuantityKind::position && meaning.name != header)
+      text +=
+          ", a position (a displacement: " +
+          write_column(header, toml_text(meaning.name.substr(0, meaning.name.size() - 2) + "um")) +
+          ")";
+    note_on(*meaning.source, text);
+  }
+
+  // ---- meaning of one column
+  /// @return nullopt: refused
+  std::optional<ColumnMeaning> meaning_of(std::size_t i) {
+    const TextColumn& column = table_.columns[i];
+    const std::string& header = column.header;
+    const auto refused = [&](std::string rule) {
+      table_.refuse_column(i, std::move(rule));
+      return std::nullopt;
+    };
+    const SpelledName of_header = spelled_name(header);
+    SpelledName spelled = of_header;
+    if (spelled.unit.empty() && !column.unit.empty()) {
+      spelled.unit = column.unit;
+      spelled.known = spelled_unit(column.unit);
+    }
+    const MappedColumn* mapped = table_.map.find(header);
+    const bool has_own = of_header.unit.empty() && has_own_unit(header);
+    if (mapped == nullptr || mapped->unit.empty()) {
+      if (const std::string why = unclear_unit(column, spelled); !why.empty()) return refused(why);
+      if (has_own && spelled.known != nullptr && spelled.known->dimension != "none") {
+        const auto own = conversion(*spelled.known, header);
+        if (!own || !own->is_identity())
+          return refused("names one unit, and its column is in " + spelled.unit + ": " +
+                         write_column(header, with_name_and_unit(header, spelled.unit)) +
+                         ", or the unit that is true");
+        if (mapped == nullptr) return ColumnMeaning{&column, header, {}};
+      }
+    }
+    if (mapped != nullptr) return mapped_meaning(column, *mapped, spelled);
+    if (spelled.unit.empty() && has_own) return ColumnMeaning{&column, header, {}};
+    if (spelled.unit.empty() && takes_signal(header) && is_column_name(plain_name(header)))
+      return ColumnMeaning{&column, plain_name(header), {}};
+    if (spelled.known == nullptr || spelled.known->dimension == "time")
+      return refused(unknown_unit(header, spelled));
+    const std::string name = plain_name(spelled.base).append(spelled.known->suffix);
+    if (plain_name(spelled.base).empty() || unit_of(name).suffix != spelled.known->suffix ||
+        !is_plain(name))
+      return refused("is not a descriptive name: " + write_column(header, "\"its name\""));
+    return ColumnMeaning{&column, name,
+                         conversion(*spelled.known, name).value_or(UnitConversion{})};
+  }
+
+  [[nodiscard]] bool takes_signal(const std::string& header) const {
+    return table_.has_own_names || table_.map.takes_signals ||
+           std::ranges::find(table_.map.names, header) != table_.map.names.end();
+  }
+
+  static std::string unknown_unit(const std::string& header, const SpelledName& spelled) {
+    const std::string end =
+        " under [columns], or " + ignore_column(header) + ", in the file of --columns";
+    if (spelled.unit.empty())
+      return "has no unit: write " + toml_text(header) + " = " +
+             toml_text(example_name(spelled.base)) +
+             " (or what it is; without a unit it is a signal)" + end;
+    const bool has_factor = unit_with_factor(spelled.unit).has_value();
+    return "has an unknown unit, " + spelled.unit + ": write " + toml_text(header) + " = " +
+           toml_text(plain_name(spelled.base + "_" + spelled.unit)) + ", a signal, or " +
+           with_name_and_unit("its name", has_factor ? spelled.unit : "a known unit") + end;
+  }
+
+  /// Why the unit of a column may be another than it seems; empty: it is clear.
+  [[nodiscard]] std::string unclear_unit(const TextColumn& column,
+                                         const SpelledName& spelled) const {
+    if (spelled.known == nullptr) return {};
+    const auto ask = [&](const std::string& name, const std::string& unit,
+                         const std::string& other = "what is true") {
+      return ": " + write_column(column.header, with_name_and_unit(plain_name(name), unit) +
+                                                    ", or " + other + ",");
+    };
+    if (spelled.known->suffix == "_degC" && spelled.known->offset != 0.0 &&
+        names_difference(spelled.base))
+      return "may be a difference of temperatures" +
+             ask(spelled.base + "_K", "delta_degF", "unit = \"degF\" with a name in _degC");
+    const std::string of_name = spelled_name(column.header).unit;
+    const std::string& in_row = column.unit_in_row;
+    const SpelledUnit* row = spelled_unit(in_row);
+    if (!of_name.empty() && row != nullptr && row->dimension != "none" &&
+        !row->measures_as(*spelled.known))
+      return "may be in " + of_name + ", as its name says, or in " + in_row +
+             ", as the row of units says" + ask(spelled.base + std::string(row->suffix), in_row);
+    const auto factor = spelled.base.find_last_of(" _") + 1;
+    if (is_factor(std::string_view(spelled.base).substr(factor)))
+      return "may be a multiple of its unit" +
+             ask(std::string(trimmed(spelled.base.substr(0, factor))) +
+                     std::string(spelled.known->suffix),
+                 "0.1 " + spelled.unit);
+    const bool is_prefix = spelled.known->spelling == "K" || spelled.known->spelling == "m";
+    if (of_name.empty() && in_row.empty() && is_prefix)
+      return "has numbers with " + spelled.unit + ", which may be a unit or mean " +
+             (spelled.unit == "K" ? "a thousand" : "a thousandth") +
+             ask(spelled.base + std::string(spelled.known->suffix), spelled.unit);
+    return {};
+  }
+
+  std::optional<ColumnMeaning> mapped_meaning(const TextColumn& column, const MappedColumn& mapped,
+                                              const SpelledName& spelled) {
+    const auto refused = [&](const std::string& rule) {
+      table_.refuse_map("columns", mapped.name, rule);
+      return std::nullopt;
+    };
+    if (!is_plain(mapped.name)) return refused(std::string(column_name_rule));
+    const SpelledUnit* known = spelled.known;
+    const auto unit = !mapped.unit.empty() ? unit_with_factor(mapped.unit)
+                      : known != nullptr   ? std::optional(*known)
+                                           : std::nullopt;
+    if (!unit && !spelled.unit.empty()) {
+      if (!unit_of(mapped.name).suffix.empty() && may_be_unit(spelled.unit))
+        return refused("may not be the unit of '" + column.header +
+                       "': write { name = " + toml_text(mapped.name) +
+                       ", unit = \"that of the file\" }, such as degC, 0.1 degC or mil");
+      table_.notes.push_back("in '" + column.header + "' '" + spelled.unit +
+                             "' is taken for a part of the name, not for a unit");
+    }
+    if (!unit) return ColumnMeaning{&column, mapped.name, {}};
+    const auto converted = conversion(*unit, mapped.name);
+    if (!converted)
+      return refused("cannot be made from '" + column.header + "', which is in " +
+                     std::string(unit->spelling));
+    return ColumnMeaning{&column, mapped.name, *converted};
+  }
+
+  TextTable& table_;
+  std::set<std::string> names_{"time_s"};
+  std::vector<ColumnMeaning> found_;
+};
+
+}  // namespace
+
+bool names_units(std::string_view header) {
+  return is_one_of(unit_names, header.substr(header.rfind('.') + 1));
+}
+
+bool names_series(std::string_view header) {
+  return is_one_of(series_names, header);
+}
+
+bool is_text(const TextColumn& column) {
+  return std::ranges::none_of(column.fields, [](std::string_view field) {
+    return looks_like_number(field) || switch_word(field);
+  });
+}
+
+std::vector<bool> bad_rows(const TextColumn& column) {
+  const Codes codes = codes_of(column);
+  std::vector<bool> bad;
+  bool has_good = false;
+  for (const std::string_view field : column.fields) {
+    const Quality quality = quality_of(field, codes);
+    has_good = has_good || quality == Quality::good;
+    bad.push_back(quality == Quality::bad);
+  }
+  return has_good ? bad : std::vector<bool>();
+}
+
+void read_units(TextTable& table) {
+  for (TextColumn& column : table.columns) {
+    column.unit = spelled_name(column.header).unit;
+    if (column.unit.empty()) column.unit = column.unit_in_row;
+    if (column.unit.empty()) column.unit = unit_of_cells(column);
+  }
+}
+
+void join_units(TextTable& table) {
+  for (std::size_t i = 1; i < table.columns.size(); ++i) {
+    const TextColumn& units = table.columns[i];
+    if (!names_units(units.header) || table.map.uses(units.header)) continue;
+    for (std::size_t row = 0; row < table.rows(); ++row) {
+      const std::string_view unit = units.fields[row];
+      std::string_view& value = table.columns[i - 1].fields[row];
+      if (spelled_unit(unit) != nullptr && looks_like_number(value) &&
+          number_text_of(value).unit == nullptr)
+        value = table.joined.emplace_back(std::string(value) + ' ' + std::string(unit));
+    }
+  }
+}
+
+void leave_bad_values_out(TextTable& table) {
+  const std::size_t columns = table.columns.size();
+  std::vector<std::vector<bool>> bad(columns);  // empty: the column holds no qualities
+  std::optional<bool> is_before;                // whether a quality precedes its values
+  std::string names;
+  for (std::size_t i = 0; i < columns; ++i) {
+    const TextColumn& column = table.columns[i];
+    if (column.is_time || table.map.uses(column.header)) continue;
+    bad[i] = bad_rows(column);
+    if (!is_before) is_before = !bad[i].empty();
+    if (!bad[i].empty()) names += (names.empty() ? "'" : ", '") + column.header + "'";
+  }
+  if (names.empty()) return;
+  std::size_t count = 0;
+  const std::vector<bool>* judge = nullptr;
+  for (std::size_t k = 0; k < columns; ++k) {
+    const std::size_t i = *is_before ? k : columns - 1 - k;
+    if (!bad[i].empty()) judge = &bad[i];
+    if (judge == nullptr || !bad[i].empty() || table.columns[i].is_time) continue;
+    for (std::size_t row = 0; row < table.rows(); ++row) {
+      if (!(*judge)[row]) continue;
+      table.columns[i].fields[row] = {};
+      ++count;
+    }
+  }
+  table.notes.push_back(names + (*is_before ? " before" : " behind") +
+                        " values say whether they are good; bad, hence missing: " +
+                        std::to_string(count) + " values");
+}
+
+std::string unclear_role(const TextColumn& column) {
+  const std::string name = toml_text(column.header);
+  const auto is_number = [](std::string_view field) { return finite_number(field).has_value(); };
+  if (!std::ranges::all_of(column.fields, is_number) || column.has_one_value() ||
+      increases(column, finite_number))
+    return {};
+  if (is_one_of(numbered_names, column.header))
+    return "may say which sensor a row is of: write pivot = [" + name +
+           ", \"the column of the values\"] in the file of --columns, or ignore = [" + name +
+           "] if all rows are of the same";
+  if (is_one_of(time_part_names, column.header))
+    return "may be a part of the time: write the whole time in one column, or ignore = [" + name +
+           "] in the file of --columns if the time is complete without it";
+  return {};
+}
+
+std::vector<ColumnMeaning> column_meanings(TextTable& table) {
+  return MeaningFinder(table).find();
 }
 
 }  // namespace thermocomp

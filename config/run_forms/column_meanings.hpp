@@ -1,57 +1,53 @@
-/// The quantity and unit of each column of a foreign table, by its name, its units, and the map of
-/// --columns.
+/// What each column of a foreign table is, by its name, its content, and the map of --columns: a
+/// quantity in a unit, or what says how values of other columns are to be understood, such as their
+/// unit, whether they are valid, which sensor a row is of.
 #pragma once
 
-#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "config/run_forms/spelled_unit.hpp"
 #include "config/run_forms/text_table.hpp"
-#include "config/text/units.hpp"
 
 namespace thermocomp {
 
+/// "Unit", "attributes.unit_of_measurement"
+[[nodiscard]] bool names_units(std::string_view header);
+
+/// "Sensor", "Channel": says which sensor a row is of.
+[[nodiscard]] bool names_series(std::string_view header);
+
+/// Whether no field is a number or a switch.
+[[nodiscard]] bool is_text(const TextColumn& column);
+
+/// Rows whose values a column of qualities calls bad: words, or the numbers of OPC.
+/// @return empty unless `column` holds qualities
+[[nodiscard]] std::vector<bool> bad_rows(const TextColumn& column);
+
+/// Reads the units of columns from the header, the row of units, or the cells.
+void read_units(TextTable& table);
+
+/// Writes the unit in a column behind one of numbers to each of these: 68.9 and °F become "68.9
+/// °F".
+void join_units(TextTable& table);
+
+/// Empties the values that a column of qualities calls bad, and notes it. Each such column judges
+/// the columns between it and the one before it or, where the first column holds qualities, those
+/// behind it.
+void leave_bad_values_out(TextTable& table);
+
+/// Why a column cannot be left out or taken for a value without being asked for; empty: it can.
+[[nodiscard]] std::string unclear_role(const TextColumn& column);
+
 struct ColumnMeaning {
-  std::size_t source{0};  ///< column of the table
-  std::string name;       ///< in a run file of our own form: "T1_degC"
+  const TextColumn* source{nullptr};
+  std::string name;  ///< in a run file of our own form: "T1_degC"
   UnitConversion conversion;
 };
 
-/// Its parameters must outlive it. Refused columns become problems; what was taken for granted is
-/// added to `understood`.
-class ColumnMeanings {
- public:
-  /// @param map  may be nullptr
-  /// @param units  as written, by column
-  /// @param has_own_names  the table comes from a form whose names are ours
-  ColumnMeanings(const TextTable& table, const ColumnMap* map,
-                 const std::vector<std::string>& units, bool has_own_names, ProblemList& problems,
-                 std::vector<std::string>& understood);
-
-  /// @return nullopt: refused
-  [[nodiscard]] std::optional<ColumnMeaning> of(std::size_t column) const;
-  void note(const ColumnMeaning& meaning) const;
-
- private:
-  [[nodiscard]] std::optional<ColumnMeaning> mapped(std::size_t column, const MappedColumn& mapped,
-                                                    const SpelledName& spelled) const;
-  [[nodiscard]] std::string unclear_unit(std::size_t column, const SpelledName& spelled) const;
-  [[nodiscard]] bool is_mapped(const std::string& header) const;
-  void refuse(std::size_t column, std::string rule) const;
-
-  const TextTable& table_;
-  const ColumnMap* map_;
-  const std::vector<std::string>& units_;
-  bool has_own_names_;
-  ProblemList& problems_;
-  std::vector<std::string>& understood_;
-};
-
-/// Whether a header is a name of ours with a unit: "T1_degC".
-[[nodiscard]] bool has_own_unit(const std::string& header);
-
-void refuse_column(const TextTable& table, std::size_t column, std::string rule,
-                   ProblemList& problems);
+/// Of the columns that hold values. Refused columns become problems; notes say what was left out or
+/// taken for granted.
+[[nodiscard]] std::vector<ColumnMeaning> column_meanings(TextTable& table);
 
 }  // namespace thermocomp

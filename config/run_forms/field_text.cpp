@@ -33,14 +33,29 @@ bool take(std::string_view& rest, char separator, std::string_view& part) {
   return true;
 }
 
+std::string_view take_line(std::string_view& text) {
+  std::string_view line;
+  if (take(text, '\n', line) && line.ends_with('\r')) line.remove_suffix(1);
+  return line;
+}
+
 std::string small_letters(std::string_view text) {
   std::string small(text);
   for (char& c : small) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
   return small;
 }
 
-bool is_one_of(std::span<const std::string_view> words, std::string_view text) {
-  return std::find(words.begin(), words.end(), small_letters(text)) != words.end();
+bool is_one_of(std::string_view words, std::string_view text) {
+  return text.find('|') == std::string_view::npos &&
+         words.find('|' + small_letters(text) + '|') != std::string_view::npos;
+}
+
+std::optional<double> switch_word(std::string_view field) {
+  for (const std::string_view on : {"on", "ON", "On", "true", "TRUE", "True"})
+    if (field == on) return 1.0;
+  for (const std::string_view off : {"off", "OFF", "Off", "false", "FALSE", "False"})
+    if (field == off) return 0.0;
+  return std::nullopt;
 }
 
 std::string shortened(std::string_view text) {

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <optional>
-#include <span>
 #include <string>
 #include <string_view>
 
@@ -20,11 +19,18 @@ namespace thermocomp {
 /// Splits the part before the next separator off `rest`. @return false at the end
 [[nodiscard]] bool take(std::string_view& rest, char separator, std::string_view& part);
 
+/// Takes the first line off `text`; returned without its line end.
+[[nodiscard]] std::string_view take_line(std::string_view& text);
+
 /// ASCII letters only.
 [[nodiscard]] std::string small_letters(std::string_view text);
 
-/// Ignores the case of `text`; `words` are in small letters.
-[[nodiscard]] bool is_one_of(std::span<const std::string_view> words, std::string_view text);
+/// Ignores the case of `text`.
+/// @param words  in small letters, with bars around: "|date|time|"
+[[nodiscard]] bool is_one_of(std::string_view words, std::string_view text);
+
+/// The number of on and off, true and false.
+[[nodiscard]] std::optional<double> switch_word(std::string_view field);
 
 /// At most 40 bytes, cut between characters; " ..." marks an omission.
 [[nodiscard]] std::string shortened(std::string_view text);

@@ -2,9 +2,11 @@
 /// and a line of the table in log_form.cpp; other files are read unchanged.
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "config/run_forms/column_map.hpp"
@@ -19,12 +21,10 @@ struct PlainTable {
   bool has_own_names{false};       ///< columns have names of our own form
 };
 
-/// @param text  UTF-8
-/// @param map  may be nullptr
-/// @return nullopt when the text is not such a log
+/// @param text  UTF-8; returned as it is when it is not such a log
 /// @throws ConfigurationError
-[[nodiscard]] std::optional<PlainTable> plain_table(std::string_view text, const std::string& name,
-                                                    const ColumnMap* map);
+[[nodiscard]] PlainTable plain_table(std::string text, const std::string& name,
+                                     const ColumnMap& map);
 
 namespace forms {
 
@@ -38,46 +38,61 @@ struct Log {
                            std::string rule) const;
 };
 
+// Each returns nullopt when the text is of another form.
+
 /// LinuxCNC's sampler: numbers separated by blanks, with -t preceded by the sample's number. Rows
 /// lost by an overrun are a gap if numbered, else an error. Also numbers of other programs if one
 /// of the names is a time.
-bool is_halsampler(std::string_view text);
-PlainTable plain_halsampler(const Log& log);
+std::optional<PlainTable> halsampler(const Log& log);
 
 /// LinuxCNC's oscilloscope: "Sampling period is N ns", then a label before each value.
-bool is_halscope(std::string_view text);
-PlainTable plain_halscope(const Log& log);
+std::optional<PlainTable> halscope(const Log& log);
 
 /// JSON: Moonraker's temperature store, lines or lists of records, records by their time.
-bool is_json(std::string_view text);
-PlainTable plain_json(const Log& log);
+std::optional<PlainTable> json_log(const Log& log);
 
 /// Panasonic's KW Watcher: seven lines above the rows.
-bool is_kw_watcher(std::string_view text);
-PlainTable plain_kw_watcher(const Log& log);
+std::optional<PlainTable> kw_watcher(const Log& log);
 
 /// LabVIEW's LVM: a header of keys, then names.
-bool is_lvm(std::string_view text);
-PlainTable plain_lvm(const Log& log);
+std::optional<PlainTable> lvm(const Log& log);
 
 /// TwinCAT's scope: keys of each channel above rows without names.
-bool is_twincat(std::string_view text);
-PlainTable plain_twincat(const Log& log);
+std::optional<PlainTable> twincat(const Log& log);
 
 /// Lines with a time and "name: value" pairs: serial consoles, decoded CAN frames, logfmt.
-bool is_labelled(std::string_view text);
-PlainTable plain_labelled(const Log& log);
+std::optional<PlainTable> labelled(const Log& log);
 
-/// Takes the first line off `text`; returned without its line end.
-std::string_view take_line(std::string_view& text);
-
-/// Splits at separators; removes quotes and blanks.
+/// Splits at separators; removes quotes and blanks. At least one field.
 std::vector<std::string> fields_of(std::string_view line, char separator = ',');
 
 /// Quotes a field of a comma-separated line.
 std::string in_quotes(std::string_view field);
 /// "PTemp [C]", quoted.
 std::string with_unit(std::string_view name, std::string_view unit);
+
+/// Columns in the order in which their names appear.
+class NamedColumns {
+ public:
+  /// @param units  by name
+  explicit NamedColumns(std::map<std::string, std::string> units = {}) : units_(std::move(units)) {}
+  /// @param header  as it is to be written
+  std::size_t add(const std::string& header);
+  /// A name of the log, added if it is new.
+  std::size_t find_or_add(const std::string& name);
+  /// To be written as it is; makes the rows up to this one.
+  std::string& cell(std::size_t row, std::size_t column);
+  [[nodiscard]] std::size_t rows() const noexcept { return rows_.size(); }
+  void keep_rows(std::size_t rows) { rows_.resize(rows); }
+  /// @param lines  of each row; empty: one after the other
+  [[nodiscard]] std::string text(const std::vector<int>& lines = {}) const;
+
+ private:
+  std::map<std::string, std::string> units_;
+  std::vector<std::string> headers_;
+  std::map<std::string, std::size_t> index_;
+  std::vector<std::vector<std::string>> rows_;
+};
 
 }  // namespace forms
 

@@ -1,8 +1,11 @@
 #include "config/run_forms/number_form.hpp"
 
 #include <array>
+#include <string>
+#include <string_view>
 
-#include "config/run_forms/text_table.hpp"
+#include "config/run_forms/field_text.hpp"
+#include "config/run_forms/spelled_unit.hpp"
 
 namespace thermocomp {
 namespace {
@@ -43,90 +46,73 @@ struct Seen {
   explicit operator bool() const noexcept { return line > 0; }
 };
 
+/// The first field of each kind, by rows.
 std::array<Seen, 6> seen_in(const TextTable& table, bool& has_apostrophes) {
   std::array<Seen, 6> seen;
-  for (std::size_t i = 0; i < table.fields.size(); ++i) {
-    std::string_view digits = number_text_of(table.fields[i]).digits;
-    if (const auto group = digits.rfind('\''); group != std::string_view::npos) {  // 12'000.5
-      if (looks_like_number(digits)) has_apostrophes = true;
-      digits.remove_prefix(group + 1);
+  for (std::size_t row = 0; row < table.rows(); ++row)
+    for (const TextColumn& column : table.columns) {
+      const std::string_view field = column.fields[row];
+      std::string_view digits = number_text_of(field).digits;
+      if (const auto group = digits.rfind('\''); group != std::string_view::npos) {  // 12'000.5
+        if (looks_like_number(digits)) has_apostrophes = true;
+        digits.remove_prefix(group + 1);
+      }
+      Seen& first = seen[static_cast<std::size_t>(shown_by(digits))];
+      if (!first) first = {table.lines[row], field};
     }
-    Seen& first = seen[static_cast<std::size_t>(shown_by(digits))];
-    if (!first) first = {table.lines[i / table.columns()], table.fields[i]};
-  }
   return seen;
 }
 
 }  // namespace
 
-NumberForm number_form(const TextTable& table, const ColumnMap* map, ProblemList& problems) {
+NumberForm number_form(const TextTable& table) {
   NumberForm form;
-  if (map != nullptr && map->thousands) {
-    form.thousands = *map->thousands;
-    form.decimal = form.thousands == '.' ? ',' : '.';
-  }
-  if (map != nullptr && map->decimal) form.decimal = *map->decimal;
-  if (map != nullptr && (map->decimal || map->thousands)) return form;
+  const ColumnMap& map = table.map;
+  if (map.thousands) form = {*map.thousands == '.' ? ',' : '.', *map.thousands};
+  if (map.decimal) form.decimal = *map.decimal;
+  if (map.decimal || map.thousands) return form;
   bool has_apostrophes = false;
   const auto seen = seen_in(table, has_apostrophes);
   if (has_apostrophes) form.thousands = '\'';
   const auto of = [&](Shows what) { return seen[static_cast<std::size_t>(what)]; };
   const auto ask = [&](Seen where, const std::string& rule) {
-    problems.add(where.line, "", where.field, rule);
+    table.problems.add(where.line, "", where.field, rule);
+  };
+  const auto ask_beside = [&](Seen where, const char* has, Seen other) {
+    ask(where, has + (", and line " + std::to_string(other.line)) + " has " +
+                   shortened(other.field) + ": there must be one decimal sign in a file");
   };
   const Seen comma = of(Shows::comma);
   // A separating comma cannot be a decimal sign, so a single point is one.
-  const Seen point =
-      of(Shows::point) || table.separator != ',' ? of(Shows::point) : of(Shows::point_or_group);
+  const bool by_commas = table.separator == ',';
+  const Seen point = of(Shows::point) || !by_commas ? of(Shows::point) : of(Shows::point_or_group);
   const Seen unclear_comma = of(Shows::comma_or_group);
-  const Seen unclear_point = table.separator == ',' ? Seen{} : of(Shows::point_or_group);
-  if (const Seen& groups = of(Shows::groups)) {
+  const Seen unclear_point = by_commas ? Seen{} : of(Shows::point_or_group);
+  const Seen clear = comma ? comma : point;
+  const Seen unclear = comma || !unclear_comma ? unclear_point : unclear_comma;
+  const std::string unclear_sign = unclear_comma && !comma ? "," : ".";
+  if (const Seen groups = of(Shows::groups)) {
     // The last of two different signs is the decimal one: 1.234,5.
     const char first = groups.field[groups.field.find_first_of(".,")];
-    form.thousands = first;
-    form.decimal = first == '.' ? ',' : '.';
-    if (const Seen& other = form.decimal == ',' ? of(Shows::point) : of(Shows::comma))
-      ask(groups, "has groups of thousands, and line " + std::to_string(other.line) + " has " +
-                      shortened(other.field) + ": there must be one decimal sign in a file");
+    form = {first == '.' ? ',' : '.', first};
+    if (const Seen other = form.decimal == ',' ? of(Shows::point) : comma)
+      ask_beside(groups, "has groups of thousands", other);
   } else if (comma && point) {
-    ask(comma, "has a decimal comma, and line " + std::to_string(point.line) + " has " +
-                   shortened(point.field) + ": there must be one decimal sign in a file");
+    ask_beside(comma, "has a decimal comma", point);
   } else if ((comma && unclear_point) || (point && unclear_comma)) {
-    ask(comma ? unclear_point : unclear_comma,
-        "may have a group of thousands, as line " + std::to_string((comma ? comma : point).line) +
-            " has " + shortened((comma ? comma : point).field) + ": write thousands = \"" +
-            (comma ? "." : ",") + "\" in the file of --columns if it is one");
-  } else if (!comma && !point && unclear_comma && unclear_point) {
+    ask(unclear, "may have a group of thousands, as line " + std::to_string(clear.line) + " has " +
+                     shortened(clear.field) + ": write thousands = \"" + unclear_sign +
+                     "\" in the file of --columns if it is one");
+  } else if (!clear && unclear_comma && unclear_point) {
     ask(unclear_comma, "and " + std::string(unclear_point.field) +
                            ": write decimal = \",\" or decimal = \".\" in the file of --columns");
-  } else if (!comma && !point && (unclear_comma || unclear_point)) {
-    const Seen& unclear = unclear_comma ? unclear_comma : unclear_point;
-    const std::string sign = unclear_comma ? "," : ".";
-    ask(unclear, "may be a decimal or thousands: write decimal = \"" + sign +
-                     "\" or thousands = \"" + sign + "\" in the file of --columns");
+  } else if (!clear && unclear) {
+    ask(unclear, "may be a decimal or thousands: write decimal = \"" + unclear_sign +
+                     "\" or thousands = \"" + unclear_sign + "\" in the file of --columns");
   } else if (comma) {
     form.decimal = ',';
   }
   return form;
-}
-
-std::optional<double> number_of(std::string_view field, const NumberForm& form) {
-  std::array<char, 64> digits{};
-  if (field.size() >= digits.size()) return finite_number(field);
-  if (form.thousands != '\0' && field.find(form.thousands) != std::string_view::npos) {
-    std::string_view whole = field.substr(0, field.find(form.decimal));
-    if (!whole.empty() && (whole.front() == '-' || whole.front() == '+')) whole.remove_prefix(1);
-    if (!is_grouped(whole, form.thousands)) return std::nullopt;
-  }
-  std::size_t size = 0;
-  bool in_fraction = false;
-  for (const char c : field) {
-    if (c == form.thousands && c != '\0' && !in_fraction) continue;
-    if (c == form.decimal) in_fraction = true;
-    if (c == '.' && form.decimal != '.') return std::nullopt;
-    digits[size++] = c == form.decimal ? '.' : c;
-  }
-  return finite_number({digits.data(), size});
 }
 
 }  // namespace thermocomp

@@ -1,29 +1,12 @@
-/// Numbers with a decimal point or comma, and detection of a table's form.
+/// Detection of the form of a table's numbers.
 #pragma once
 
-#include <optional>
-#include <string_view>
-
-#include "config/run_forms/column_map.hpp"
-#include "config/run_forms/problem_list.hpp"
-#include "config/run_forms/spelled_unit.hpp"
+#include "config/run_forms/text_table.hpp"
 
 namespace thermocomp {
 
-struct TextTable;
-
-struct NumberForm {
-  char decimal{'.'};
-  char thousands{'\0'};  ///< none
-};
-
 /// Detects the form of the table's numbers. 1,234 alone is ambiguous (1.234 or 1234); if all are,
 /// it is a problem that shows the line to add to the map.
-/// @param map  may be nullptr
-[[nodiscard]] NumberForm number_form(const TextTable& table, const ColumnMap* map,
-                                     ProblemList& problems);
-
-/// @return nullopt unless `field` is one finite number of that form
-[[nodiscard]] std::optional<double> number_of(std::string_view field, const NumberForm& form);
+[[nodiscard]] NumberForm number_form(const TextTable& table);
 
 }  // namespace thermocomp

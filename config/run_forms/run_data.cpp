@@ -11,9 +11,12 @@ namespace thermocomp {
 std::optional<WallZero> stated_wall_zero(std::string_view text) {
   const std::size_t at = text.find(wall_zero_mark);
   if (at == std::string_view::npos || (at > 0 && text[at - 1] != '\n')) return std::nullopt;
-  std::string_view stated = text.substr(at + wall_zero_mark.size());
-  stated = stated.substr(0, stated.find_first_of("\r\n"));
-  const auto stamp = parse_time_stamp(stated);
+  const std::string_view stated = text.substr(at + wall_zero_mark.size());
+  return wall_time(stated.substr(0, stated.find_first_of("\r\n")));
+}
+
+std::optional<WallZero> wall_time(std::string_view text) {
+  const auto stamp = parse_time_stamp(text);
   const auto seconds = stamp ? seconds_of(*stamp, DateOrder::unknown, false) : std::nullopt;
   if (!seconds) return std::nullopt;
   return WallZero{*seconds, stamp->zone_s.has_value()};

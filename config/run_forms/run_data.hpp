@@ -41,5 +41,7 @@ inline constexpr std::string_view wall_zero_mark = "# 0.000 s: wall time ";
 /// @return nullopt when there is no such comment
 [[nodiscard]] std::optional<WallZero> stated_wall_zero(std::string_view text);
 [[nodiscard]] std::string wall_zero_comment(const WallZero& zero);
+/// @param stamp  a date, or a clock time on 1970-01-01; the first order of the day that it allows
+[[nodiscard]] std::optional<WallZero> wall_time(std::string_view stamp);
 
 }  // namespace thermocomp

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
+#include <utility>
 
 #include "config/run_forms/field_text.hpp"
 #include "config/text/printable_text.hpp"
@@ -14,94 +16,69 @@ constexpr double kelvin_of_0_degC = 273.15;
 constexpr double urad_of_arcsecond = 4.84813681109536;  // pi / 648000 rad
 constexpr double fahrenheit_step = 5.0 / 9.0;
 
-constexpr auto known_units = std::to_array<SpelledUnit>({
-    {"degC", "temperature", 1, 0, "_degC"},
-    {"C", "temperature", 1, 0, "_degC", true},
-    {"K", "temperature", 1, -kelvin_of_0_degC, "_K", true},
-    {"Kelvin", "temperature", 1, -kelvin_of_0_degC, "_K"},
-    {"degF", "temperature", fahrenheit_step, -32 * fahrenheit_step, "_degC"},
-    {"F", "temperature", fahrenheit_step, -32 * fahrenheit_step, "_degC", true},
-    {"delta_degF", "temperature", fahrenheit_step, -kelvin_of_0_degC, "_K"},  // a difference
-    {"um", "length", 1, 0, "_um"},
-    {"µm", "length", 1, 0, "_um"},
-    {"μm", "length", 1, 0, "_um"},
-    {"micron", "length", 1, 0, "_um"},
-    {"microns", "length", 1, 0, "_um"},
-    {"nm", "length", 1e-3, 0, "_um"},
-    {"mm", "length", 1e3, 0, "_mm"},
-    {"cm", "length", 1e4, 0, "_mm", true},
-    {"m", "length", 1e6, 0, "_mm", true},
-    {"in", "length", 25400, 0, "_mm", true},
-    {"inch", "length", 25400, 0, "_mm"},
-    {"inches", "length", 25400, 0, "_mm"},
-    {"mil", "length", 25.4, 0, "_um", true},
-    {"mils", "length", 25.4, 0, "_um", true},
-    {"thou", "length", 25.4, 0, "_um", true},
-    {"uin", "length", 0.0254, 0, "_um"},
-    {"µin", "length", 0.0254, 0, "_um"},
-    {"μin", "length", 0.0254, 0, "_um"},
-    {"microinch", "length", 0.0254, 0, "_um"},
-    {"micrometer", "length", 1, 0, "_um"},
-    {"micrometers", "length", 1, 0, "_um"},
-    {"millimeter", "length", 1e3, 0, "_mm"},
-    {"millimeters", "length", 1e3, 0, "_mm"},
-    {"Millimeters", "length", 1e3, 0, "_mm"},
-    {"urad", "angle", 1, 0, "_urad"},
-    {"µrad", "angle", 1, 0, "_urad"},
-    {"μrad", "angle", 1, 0, "_urad"},
-    {"um/m", "angle", 1, 0, "_urad"},
-    {"µm/m", "angle", 1, 0, "_urad"},
-    {"μm/m", "angle", 1, 0, "_urad"},
-    {"mrad", "angle", 1e3, 0, "_urad"},
-    {"arcsec", "angle", urad_of_arcsecond, 0, "_urad"},
-    {"rpm", "speed", 1, 0, "_rpm"},
-    {"RPM", "speed", 1, 0, "_rpm"},
-    {"1/min", "speed", 1, 0, "_rpm"},
-    {"min-1", "speed", 1, 0, "_rpm"},
-    {"min^-1", "speed", 1, 0, "_rpm"},
-    {"U/min", "speed", 1, 0, "_rpm"},
-    {"tr/min", "speed", 1, 0, "_rpm"},
-    {"r/min", "speed", 1, 0, "_rpm"},
-    {"rev/min", "speed", 1, 0, "_rpm"},
-    {"mm/min", "feed", 1, 0, "_mm_per_min"},
-    {"mm_per_min", "feed", 1, 0, "_mm_per_min"},
-    {"m/min", "feed", 1e3, 0, "_mm_per_min"},
-    {"mm/s", "feed", 60, 0, "_mm_per_min"},
-    {"A", "current", 1, 0, "_A", true},
-    {"mA", "current", 1e-3, 0, "_A", true},
-    {"W", "power", 1, 0, "_W", true},
-    {"kW", "power", 1e3, 0, "_W"},
-    {"V", "voltage", 1, 0, "_V", true},
-    {"VDC", "voltage", 1, 0, "_V"},
-    {"mV", "voltage", 1e-3, 0, "_V", true},
-    {"%", "share", 1, 0, "_percent"},
-    {"percent", "share", 1, 0, "_percent"},
-    {"on", "switch", 1, 0, "_on", true},
-    {"0/1", "switch", 1, 0, "_on"},
-    {"on/off", "switch", 1, 0, "_on"},
-    {"-", "none", 1, 0, "", true},
-    {"1", "none", 1, 0, "", true},
-    {"ns", "time", 1e-9, 0, "_s", true},
-    {"us", "time", 1e-6, 0, "_s", true},
-    {"µs", "time", 1e-6, 0, "_s", true},
-    {"ms", "time", 1e-3, 0, "_s", true},
-    {"msec", "time", 1e-3, 0, "_s", true},
-    {"milliseconds", "time", 1e-3, 0, "_s", true},
-    {"s", "time", 1, 0, "_s", true},
-    {"sec", "time", 1, 0, "_s", true},
-    {"sec.", "time", 1, 0, "_s", true},
-    {"seconds", "time", 1, 0, "_s", true},
-    {"Seconds", "time", 1, 0, "_s", true},
-    {"min", "time", 60, 0, "_s", true},
-    {"minutes", "time", 60, 0, "_s", true},
-    {"Minutes", "time", 60, 0, "_s", true},
-    {"h", "time", 3600, 0, "_s", true},
-    {"hours", "time", 3600, 0, "_s", true},
-    {"Hours", "time", 3600, 0, "_s", true},
-    {"d", "time", 86400, 0, "_s", true},
-    {"day", "time", 86400, 0, "_s", true},
-    {"days", "time", 86400, 0, "_s", true},
+/// A unit in all of its spellings, separated by blanks.
+struct Spellings {
+  std::string_view anywhere;
+  std::string_view in_brackets;  ///< too short to be recognised elsewhere
+  SpelledUnit unit;
+};
+constexpr auto spellings = std::to_array<Spellings>({
+    {"degC", "C", {"", "temperature", 1, 0, "_degC"}},
+    {"Kelvin", "K", {"", "temperature", 1, -kelvin_of_0_degC, "_K"}},
+    {"degF", "F", {"", "temperature", fahrenheit_step, -32 * fahrenheit_step, "_degC"}},
+    // a difference
+    {"delta_degF", "", {"", "temperature", fahrenheit_step, -kelvin_of_0_degC, "_K"}},
+    {"um µm μm micron microns micrometer micrometers", "", {"", "length", 1, 0, "_um"}},
+    {"nm", "", {"", "length", 1e-3, 0, "_um"}},
+    {"mm millimeter millimeters Millimeters", "", {"", "length", 1e3, 0, "_mm"}},
+    {"", "cm", {"", "length", 1e4, 0, "_mm"}},
+    {"", "m", {"", "length", 1e6, 0, "_mm"}},
+    {"inch inches", "in", {"", "length", 25400, 0, "_mm"}},
+    {"", "mil mils thou", {"", "length", 25.4, 0, "_um"}},
+    {"uin µin μin microinch", "", {"", "length", 0.0254, 0, "_um"}},
+    {"urad µrad μrad um/m µm/m μm/m", "", {"", "angle", 1, 0, "_urad"}},
+    {"mrad", "", {"", "angle", 1e3, 0, "_urad"}},
+    {"arcsec", "", {"", "angle", urad_of_arcsecond, 0, "_urad"}},
+    {"rpm RPM 1/min min-1 min^-1 U/min tr/min r/min rev/min", "", {"", "speed", 1, 0, "_rpm"}},
+    {"mm/min mm_per_min", "", {"", "feed", 1, 0, "_mm_per_min"}},
+    {"m/min", "", {"", "feed", 1e3, 0, "_mm_per_min"}},
+    {"mm/s", "", {"", "feed", 60, 0, "_mm_per_min"}},
+    {"", "A", {"", "current", 1, 0, "_A"}},
+    {"", "mA", {"", "current", 1e-3, 0, "_A"}},
+    {"", "W", {"", "power", 1, 0, "_W"}},
+    {"kW", "", {"", "power", 1e3, 0, "_W"}},
+    {"VDC", "V", {"", "voltage", 1, 0, "_V"}},
+    {"", "mV", {"", "voltage", 1e-3, 0, "_V"}},
+    {"% percent", "", {"", "share", 1, 0, "_percent"}},
+    {"0/1 on/off", "on", {"", "switch", 1, 0, "_on"}},
+    {"", "- 1", {"", "none", 1, 0, ""}},
+    {"", "ns", {"", "time", 1e-9, 0, "_s"}},
+    {"", "us µs", {"", "time", 1e-6, 0, "_s"}},
+    {"", "ms msec milliseconds", {"", "time", 1e-3, 0, "_s"}},
+    {"", "s sec sec. seconds Seconds", {"", "time", 1, 0, "_s"}},
+    {"", "min minutes Minutes", {"", "time", 60, 0, "_s"}},
+    {"", "h hours Hours", {"", "time", 3600, 0, "_s"}},
+    {"", "d day days", {"", "time", 86400, 0, "_s"}},
 });
+
+/// By spelling.
+const std::map<std::string_view, SpelledUnit>& known_units() {
+  static const auto known = [] {
+    std::map<std::string_view, SpelledUnit> units;
+    for (const Spellings& each : spellings)
+      for (const bool in_brackets : {false, true}) {
+        std::string_view rest = in_brackets ? each.in_brackets : each.anywhere;
+        std::string_view spelling;
+        while (!rest.empty() && take(rest, ' ', spelling)) {
+          SpelledUnit& unit = units[spelling] = each.unit;
+          unit.spelling = spelling;
+          unit.only_in_brackets = in_brackets;
+        }
+      }
+    return units;
+  }();
+  return known;
+}
 
 /// Encodings of the degree sign, including look-alikes and conversion errors, in UTF-8, Latin-1 and
 /// GBK. Longer ones first.
@@ -129,20 +106,17 @@ std::string_view plain_temperature(std::string_view unit) {
   std::string letters;
   bool has_degree = unit.size() == 2 && unit[0] == 'o' && unit[1] < 'a';  // "oC"; not "of"
   if (has_degree) unit.remove_prefix(1);
-  while (!unit.empty()) {
-    const auto* const sign =
-        std::find_if(degree_signs.begin(), degree_signs.end(),
-                     [&](const DegreeSign& each) { return unit.starts_with(each.bytes); });
-    if (sign != degree_signs.end()) {
-      has_degree = true;
+  const std::string small = small_letters(unit);
+  for (std::string_view rest = small; !rest.empty();) {
+    const auto* const sign = std::ranges::find_if(
+        degree_signs, [&](const DegreeSign& each) { return rest.starts_with(each.bytes); });
+    const bool is_sign = sign != degree_signs.end();
+    has_degree = has_degree || is_sign;
+    if (is_sign)
       letters += sign->letter;
-      unit.remove_prefix(sign->bytes.size());
-      continue;
-    }
-    const char c = unit.front();
-    unit.remove_prefix(1);
-    if (c == ' ' || c == '_' || c == '.') continue;
-    letters += c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+    else if (std::string_view(" _.").find(rest.front()) == std::string_view::npos)
+      letters += rest.front();
+    rest.remove_prefix(is_sign ? sign->bytes.size() : 1);
   }
   std::string_view left = letters;
   for (const std::string_view word : {"degrees", "degree", "deg", "grad", "grd"}) {
@@ -163,28 +137,6 @@ bool is_index(std::string_view text) {
   return !text.empty() && text.find_first_not_of("0123456789, ") == std::string_view::npos;
 }
 
-bool split_blank(std::string_view header, SpelledName& name);
-
-/// "T1 [°C]": unit in brackets at the end.
-bool split_brackets(std::string_view header, SpelledName& name) {
-  for (const auto& [open, close] : {std::pair('[', ']'), {'(', ')'}, {'{', '}'}}) {
-    if (!header.ends_with(close)) continue;
-    const auto begin = header.rfind(open);
-    if (begin == std::string_view::npos) continue;
-    if (header.find('=', begin) != std::string_view::npos) continue;  // labels: {place="bed"}
-    if (open == '(' && is_index(header.substr(begin + 1, header.size() - begin - 2))) continue;
-    const std::string_view base = trimmed(header.substr(0, begin));
-    name.base = base;
-    name.unit = trimmed(header.substr(begin + 1, header.size() - begin - 2));
-    name.known = spelled_unit(name.unit);
-    // "Temp, °C (LGR S/N: 1)": the unit precedes other text.
-    SpelledName before;
-    if (name.known == nullptr && split_blank(base, before)) name = before;
-    return true;
-  }
-  return false;
-}
-
 /// "Temp °C", "Temp, °C", "I / A", "t in s": unit after the last blank.
 bool split_blank(std::string_view header, SpelledName& name) {
   const auto blank = header.rfind(' ');
@@ -203,6 +155,26 @@ bool split_blank(std::string_view header, SpelledName& name) {
   return true;
 }
 
+/// "T1 [°C]": unit in brackets at the end.
+bool split_brackets(std::string_view header, SpelledName& name) {
+  for (const auto& [open, close] : {std::pair('[', ']'), {'(', ')'}, {'{', '}'}}) {
+    if (!header.ends_with(close)) continue;
+    const auto begin = header.rfind(open);
+    if (begin == std::string_view::npos) continue;
+    const std::string_view inside = header.substr(begin + 1, header.size() - begin - 2);
+    if (inside.find('=') != std::string_view::npos) continue;  // labels: {place="bed"}
+    if (open == '(' && is_index(inside)) continue;
+    const std::string_view base = trimmed(header.substr(0, begin));
+    const std::string unit(trimmed(inside));
+    name = {std::string(base), unit, spelled_unit(unit)};
+    // "Temp, °C (LGR S/N: 1)": the unit precedes other text.
+    SpelledName before;
+    if (name.known == nullptr && split_blank(base, before)) name = before;
+    return true;
+  }
+  return false;
+}
+
 /// "T1°C", "z/µm": characters that occur in units only.
 bool split_letters(std::string_view header, SpelledName& name) {
   for (const std::string_view unit : {"°C", "ºC", "℃", "°F", "ºF", "µm", "μm"}) {
@@ -218,13 +190,14 @@ bool split_letters(std::string_view header, SpelledName& name) {
 }  // namespace
 
 const SpelledUnit* spelled_unit(std::string_view unit) {
-  const auto find = [](std::string_view spelling) {
-    return std::find_if(known_units.begin(), known_units.end(),
-                        [&](const SpelledUnit& each) { return each.spelling == spelling; });
-  };
-  const auto* found = find(unit);
-  if (found == known_units.end()) found = find(plain_temperature(unit));
-  return found == known_units.end() ? nullptr : &*found;
+  auto found = known_units().find(unit);
+  if (found == known_units().end()) found = known_units().find(plain_temperature(unit));
+  return found == known_units().end() ? nullptr : &found->second;
+}
+
+const SpelledUnit* time_unit(std::string_view unit) {
+  const SpelledUnit* known = spelled_unit(unit);
+  return known != nullptr && known->dimension == "time" ? known : nullptr;
 }
 
 SpelledName spelled_name(std::string_view header) {
@@ -239,10 +212,8 @@ std::optional<UnitConversion> conversion(const SpelledUnit& from, std::string_vi
   const std::string_view suffix = unit_of(column).suffix;
   if (suffix.empty()) return UnitConversion{};
   if (suffix == from.suffix && from.factor == 1.0) return UnitConversion{};
-  const auto* const to =
-      std::find_if(known_units.begin(), known_units.end(),
-                   [&](const SpelledUnit& each) { return each.spelling == suffix.substr(1); });
-  if (to == known_units.end() || to->dimension != from.dimension) return std::nullopt;
+  const SpelledUnit* to = spelled_unit(suffix.substr(1));
+  if (to == nullptr || to->dimension != from.dimension) return std::nullopt;
   if (to->factor == from.factor && to->offset == from.offset) return UnitConversion{};
   return UnitConversion{from.factor / to->factor, (from.offset - to->offset) / to->factor};
 }
@@ -261,11 +232,30 @@ bool is_grouped(std::string_view text, char sign) {
   std::string_view part;
   bool first = true;
   while (take(text, sign, part)) {
-    const bool digits = std::all_of(part.begin(), part.end(), is_digit);
+    const bool digits = std::ranges::all_of(part, is_digit);
     if (!digits || part.empty() || part.size() > 3 || (!first && part.size() != 3)) return false;
     first = false;
   }
   return true;
+}
+
+std::optional<double> number_of(std::string_view field, const NumberForm& form) {
+  std::array<char, 64> digits{};
+  if (field.size() >= digits.size()) return finite_number(field);
+  if (form.thousands != '\0' && field.find(form.thousands) != std::string_view::npos) {
+    std::string_view whole = field.substr(0, field.find(form.decimal));
+    if (!whole.empty() && (whole.front() == '-' || whole.front() == '+')) whole.remove_prefix(1);
+    if (!is_grouped(whole, form.thousands)) return std::nullopt;
+  }
+  std::size_t size = 0;
+  bool in_fraction = false;
+  for (const char c : field) {
+    if (c == form.thousands && c != '\0' && !in_fraction) continue;
+    if (c == form.decimal) in_fraction = true;
+    if (c == '.' && form.decimal != '.') return std::nullopt;
+    digits[size++] = c == form.decimal ? '.' : c;
+  }
+  return finite_number({digits.data(), size});
 }
 
 NumberText number_text_of(std::string_view field) {
@@ -293,10 +283,8 @@ bool may_be_unit(std::string_view text) {
     const bool is_letter = (c >= 'a' && c <= 'z') || static_cast<unsigned char>(c) >= 0x80;
     if (is_letter) word += c;
     if (is_letter || word.empty()) continue;
-    const auto is_word = [&](const SpelledUnit& each) {
-      return small_letters(each.spelling) == word;
-    };
-    if (std::any_of(known_units.begin(), known_units.end(), is_word)) return true;
+    const auto is_word = [&](const auto& known) { return small_letters(known.first) == word; };
+    if (std::ranges::any_of(known_units(), is_word)) return true;
     word.clear();
   }
   return false;
@@ -322,9 +310,8 @@ bool looks_like_number(std::string_view field) {
   const std::string_view digits = field.substr(0, exponent);
   return !digits.empty() && digits.find_first_of("+-") == std::string_view::npos &&
          digits.find_first_of("0123456789") != std::string_view::npos &&
-         (std::count(digits.begin(), digits.end(), '.') <= 1 ||
-          std::count(digits.begin(), digits.end(), ',') <= 1) &&
-         !(std::count(digits.begin(), digits.end(), '.') > 1 && !is_grouped(digits, '.'));
+         (std::ranges::count(digits, '.') <= 1 || std::ranges::count(digits, ',') <= 1) &&
+         !(std::ranges::count(digits, '.') > 1 && !is_grouped(digits, '.'));
 }
 
 }  // namespace thermocomp

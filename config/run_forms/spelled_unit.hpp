@@ -1,4 +1,4 @@
-/// Units in other spellings, and numbers with a unit.
+/// Units in other spellings; numbers with a unit, with a decimal point or comma.
 #pragma once
 
 #include <optional>
@@ -16,6 +16,11 @@ struct SpelledUnit {
   double offset{0.0};
   std::string_view suffix;       ///< nearest suffix of ours, "_degC"; empty: a signal without unit
   bool only_in_brackets{false};  ///< too short to be recognised elsewhere
+
+  /// Whether it is the same unit, in any spelling.
+  [[nodiscard]] bool measures_as(const SpelledUnit& other) const {
+    return dimension == other.dimension && factor == other.factor && offset == other.offset;
+  }
 };
 
 /// Parts of a header's name.
@@ -30,6 +35,8 @@ struct SpelledName {
 /// Accepts temperatures with any form of the degree sign or in words ("ºC", "Deg. C").
 /// @return nullptr when it is not a unit
 [[nodiscard]] const SpelledUnit* spelled_unit(std::string_view unit);
+/// @return nullptr when it is not a unit of time
+[[nodiscard]] const SpelledUnit* time_unit(std::string_view unit);
 
 /// Whether text in brackets has a degree or percent sign, or a word that is a unit in some case:
 /// "0.1 °C", "1/10 MM"; not "bed 1".
@@ -58,6 +65,14 @@ struct NumberText {
   const SpelledUnit* unit{nullptr};
 };
 [[nodiscard]] NumberText number_text_of(std::string_view field);
+
+struct NumberForm {
+  char decimal{'.'};
+  char thousands{'\0'};  ///< none
+};
+
+/// @return nullopt unless `field` is one finite number of that form
+[[nodiscard]] std::optional<double> number_of(std::string_view field, const NumberForm& form);
 
 /// Whether it may be a number of either form, with or without unit.
 [[nodiscard]] bool looks_like_number(std::string_view field);

@@ -1,12 +1,73 @@
 #include "config/run_forms/text_lines.hpp"
 
 #include <algorithm>
+#include <cstdint>
 
 #include "config/run_forms/field_text.hpp"
 #include "config/text/printable_text.hpp"
+#include "config/text/problems.hpp"
 
 namespace thermocomp {
 namespace {
+
+bool is_utf8(std::string_view text) {
+  int more = 0;  // bytes that continue a letter
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    const bool is_next = byte >= 0x80 && byte < 0xc0;
+    if (is_next != (more > 0) || byte == 0xc0 || byte == 0xc1 || byte >= 0xf8) return false;
+    more = is_next ? more - 1 : byte >= 0xf0 ? 3 : byte >= 0xe0 ? 2 : byte >= 0xc0 ? 1 : 0;
+  }
+  return more == 0;
+}
+
+void append_letter(std::string& text, std::uint32_t letter) {
+  const auto byte = [&](std::uint32_t value) { text += static_cast<char>(value); };
+  if (letter < 0x80) {
+    byte(letter);
+  } else if (letter < 0x800) {
+    byte(0xc0 | (letter >> 6));
+    byte(0x80 | (letter & 0x3f));
+  } else {
+    byte(0xe0 | (letter >> 12));
+    byte(0x80 | ((letter >> 6) & 0x3f));
+    byte(0x80 | (letter & 0x3f));
+  }
+}
+
+/// Code points above 0xFFFF, which logs do not contain, become '?'.
+std::string utf8_of_utf16(std::string_view bytes, bool low_first) {
+  std::string text;
+  for (std::size_t i = 0; i + 1 < bytes.size(); i += 2) {
+    const auto a = static_cast<unsigned char>(bytes[i + (low_first ? 1 : 0)]);
+    const auto b = static_cast<unsigned char>(bytes[i + (low_first ? 0 : 1)]);
+    const std::uint32_t letter = (std::uint32_t{a} << 8) | b;
+    append_letter(text, letter >= 0xd800 && letter < 0xe000 ? std::uint32_t{'?'} : letter);
+  }
+  return text;
+}
+
+/// Old Macintosh lines end with a carriage return only.
+std::string with_line_ends(std::string text) {
+  if (text.find('\n') == std::string::npos) std::ranges::replace(text, '\r', '\n');
+  return text;
+}
+
+struct Binary {
+  std::string_view begin;
+  const char* rule;
+};
+constexpr Binary binaries[] = {
+    {"PK\x03\x04", "is an Excel workbook or another archive: save its sheet as CSV"},
+    {"\xD0\xCF\x11\xE0", "is an Excel workbook of the old form (.xls): save its sheet as CSV"},
+    {"\x1F\x8B", "is packed: unpack it with gunzip"},
+    {"SQLite format 3", "is a database; a history becomes a run file by thermocomp export"},
+    {"TDSm", "is LabVIEW's TDMS: save it as LVM or CSV"},
+    {"\x89HDF", "is HDF5 (MATLAB's .mat too): save its table as CSV"},
+    {"MATLAB 5.0", "is a MAT file: save its table as CSV (writetable)"},
+    {"MDF ", "is ASAM's MDF: export its channels as CSV"},
+    {"PAR1", "is Parquet: save its table as CSV"},
+    {"%PDF", "is a PDF: the table itself is needed, as CSV"}};
 
 /// Before a digit: replaces a typeset minus by '-', removes a blank that groups digits.
 std::string with_plain_letters(std::string_view all) {
@@ -63,14 +124,11 @@ bool is_end(std::string_view line) {
 std::string_view with_quoted_ends(std::string& text, std::string_view line, std::string_view& rest,
                                   int& number) {
   constexpr int lines_max = 8;
-  const auto is_open = [](std::string_view part) {
-    return std::count(part.begin(), part.end(), '"') % 2 == 1;
-  };
+  const auto is_open = [](std::string_view part) { return std::ranges::count(part, '"') % 2 == 1; };
   std::string_view longer = line;
   std::string_view behind = rest;
   for (int more = 1; more <= lines_max && is_open(longer) && !behind.empty(); ++more) {
-    std::string_view next;
-    static_cast<void>(take(behind, '\n', next));
+    const std::string_view next = take_line(behind);
     longer = {line.data(), static_cast<std::size_t>(next.data() + next.size() - line.data())};
     if (is_open(longer)) continue;
     const auto begin = static_cast<std::size_t>(line.data() - text.data());
@@ -85,16 +143,37 @@ std::string_view with_quoted_ends(std::string& text, std::string_view line, std:
 
 }  // namespace
 
+bool is_workbook(std::string_view bytes) {
+  return bytes.starts_with(binaries[0].begin);
+}
+
+RunText run_text(std::string_view bytes, const std::string& name) {
+  const auto refuse = [&](const char* rule) {
+    throw ConfigurationError({Problem{name, 0, "", "(binary)", rule}});
+  };
+  for (const Binary& binary : binaries)
+    if (bytes.starts_with(binary.begin)) refuse(binary.rule);
+  if (bytes.starts_with("\xFF\xFE") || bytes.starts_with("\xFE\xFF"))
+    return {utf8_of_utf16(bytes.substr(2), bytes.front() == '\xFF'), false};
+  if (bytes.starts_with(byte_order_mark)) bytes.remove_prefix(byte_order_mark.size());
+  // A logger that lost power leaves preallocated zeros.
+  while (!bytes.empty() && bytes.back() == '\0') bytes.remove_suffix(1);
+  if (bytes.substr(0, 4096).find('\0') != std::string_view::npos)
+    refuse("is neither text nor a known form; docs/run_files.md lists them");
+  if (is_utf8(bytes)) return {with_line_ends(std::string(bytes)), false};
+  RunText converted{{}, true};
+  converted.text.reserve(bytes.size() + bytes.size() / 8);
+  for (const char c : bytes) append_letter(converted.text, static_cast<unsigned char>(c));
+  return converted;
+}
+
 TextLines find_lines(std::string& text, int lines_above, int first_line) {
   spell_numbers_plainly(text);
   TextLines found;
   std::vector<TextLine>& lines = found.lines;
   std::string_view rest = text;
-  std::string_view line;
   for (int number = 1 + lines_above; !rest.empty(); ++number) {
-    static_cast<void>(take(rest, '\n', line));
-    line = with_quoted_ends(text, line, rest, number);
-    if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+    const std::string_view line = with_quoted_ends(text, take_line(rest), rest, number);
     if (number < first_line) continue;
     const bool is_comment = line.starts_with('#');
     if (is_comment && lines.empty()) found.last_comment = {number, line};
@@ -111,14 +190,19 @@ TextLines find_lines(std::string& text, int lines_above, int first_line) {
   return found;
 }
 
+std::vector<std::string_view> words_of(std::string_view line) {
+  std::vector<std::string_view> words;
+  for (line = trimmed(line); !line.empty(); line = trimmed(line)) {
+    words.push_back(line.substr(0, line.find_first_of(" \t")));
+    line.remove_prefix(words.back().size());
+  }
+  return words;
+}
+
 bool split_line(std::string_view line, char separator, std::vector<std::string_view>& fields) {
   fields.clear();
   if (separator == ' ') {
-    for (line = trimmed(line); !line.empty(); line = trimmed(line)) {
-      const auto end = std::min(line.find_first_of(" \t"), line.size());
-      fields.push_back(line.substr(0, end));
-      line.remove_prefix(end);
-    }
+    fields = words_of(line);
     return true;
   }
   for (bool more = true; more;) {

@@ -1,4 +1,4 @@
-/// The lines of a text table, and their fields.
+/// The text of a log: decoding of its bytes, its lines, and their fields.
 #pragma once
 
 #include <optional>
@@ -7,6 +7,18 @@
 #include <vector>
 
 namespace thermocomp {
+
+struct RunText {
+  std::string text;  ///< UTF-8, without a byte order mark
+  bool from_latin1{false};
+};
+
+/// UTF-8, UTF-16 with a byte order mark, else Latin-1.
+/// @throws ConfigurationError when the bytes are not text (a workbook, an archive, a database)
+[[nodiscard]] RunText run_text(std::string_view bytes, const std::string& name);
+
+/// Whether bytes are an Excel workbook or a similar archive.
+[[nodiscard]] bool is_workbook(std::string_view bytes);
 
 struct TextLine {
   int number{0};  ///< counted from 1
@@ -23,6 +35,9 @@ struct TextLines {
 /// @param lines_above  lines of the file before `text`
 /// @param first_line  earlier ones are left out
 [[nodiscard]] TextLines find_lines(std::string& text, int lines_above, int first_line);
+
+/// Splits at blanks and tabs.
+[[nodiscard]] std::vector<std::string_view> words_of(std::string_view line);
 
 /// A quoted field may contain the separator and doubled quotes. A quote with text behind it is a
 /// part of its field: "AI".Bed.

@@ -1,10 +1,16 @@
 #include "config/run_forms/text_table.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <iterator>
 #include <map>
+#include <utility>
 
-#include "config/run_forms/table_header.hpp"
+#include "config/run_forms/field_text.hpp"
+#include "config/run_forms/spelled_unit.hpp"
 #include "config/run_forms/text_lines.hpp"
+#include "config/run_forms/time_stamp.hpp"
 
 namespace thermocomp {
 namespace {
@@ -13,100 +19,219 @@ constexpr std::string_view separators = ";\t,|";
 constexpr std::size_t rows_judged = 200;
 constexpr std::size_t fields_max = 1024;  // as in our own form
 constexpr double values_share_min = 0.2;
+constexpr std::size_t header_rows_max = 10;
+
+/// Kinds of values in a row of types, and statistics of a column.
+constexpr std::string_view type_words =
+    "|smp|avg|std|tot|string|text|double|float|real|int|integer|long|bool|boolean"
+    "|datetime|";
+constexpr std::string_view statistic_words =
+    "|min|max|mean|average|minimum|maximum|mittelwert|lower limit|upper limit|";
+
+enum class FieldKind { text, nothing, number, time };
+
+using TableFields = std::vector<std::string_view>;
+
+FieldKind kind_of_field(std::string_view field) {
+  if (is_missing(field)) return FieldKind::nothing;
+  if (looks_like_number(field)) return FieldKind::number;
+  return parse_time_stamp(field) ? FieldKind::time : FieldKind::text;
+}
+
+/// One of the first lines.
+struct HeadLine {
+  bool is_closed{true};  ///< no quote is open
+  TableFields fields;
+  std::vector<FieldKind> kinds;
+
+  [[nodiscard]] bool has(FieldKind kind) const {
+    return std::ranges::find(kinds, kind) != kinds.end();
+  }
+  /// Whether no field is a number or a time.
+  [[nodiscard]] bool is_all_words() const {
+    return !has(FieldKind::number) && !has(FieldKind::time);
+  }
+};
+
+/// The column that tells rows from other lines: the first of times, else the first of numbers.
+std::optional<std::size_t> key_column(const std::vector<FieldKind>& kinds) {
+  for (const FieldKind kind : {FieldKind::time, FieldKind::number})
+    if (const auto found = std::ranges::find(kinds, kind); found != kinds.end())
+      return static_cast<std::size_t>(found - kinds.begin());
+  return std::nullopt;
+}
+
+/// Names of columns that are not a quantity: time stamp, record number.
+bool is_word_of_logger(std::string_view field) {
+  return field == "TS" || field == "RN" || field == "NO." || field == "Time";
+}
+
+/// The unit in a field of a row of units, without brackets; empty: none.
+std::string_view unit_in_row(std::string_view field) {
+  if (is_word_of_logger(field)) return {};
+  const bool has = field.size() > 2 && (field.front() == '[' || field.front() == '(');
+  return has ? trimmed(field.substr(1, field.size() - 2)) : field;
+}
+
+/// A row of units has more units than other fields.
+bool is_row_of_units(const TableFields& fields) {
+  std::size_t known = 0;
+  std::size_t other = 0;
+  for (const std::string_view field : fields) {
+    if (field.empty() || field == "-") continue;
+    ++(is_word_of_logger(field) || spelled_unit(unit_in_row(field)) != nullptr ? known : other);
+  }
+  return known > other;
+}
+
+bool is_row_of_types(const TableFields& fields) {
+  return std::ranges::all_of(fields, [](std::string_view field) {
+    return field.empty() || is_one_of(type_words, field.substr(0, field.find(':')));
+  });
+}
+
+/// Channel numbers, 1 2 3, or the statistics of each column.
+bool is_known_row_of_numbers(const HeadLine& line) {
+  const std::string_view first = line.fields[0];
+  if (is_one_of(statistic_words, first.substr(0, first.find_first_of(".:")))) return true;
+  if (line.has(FieldKind::time)) return false;
+  std::vector<double> numbers;
+  for (std::size_t i = 0; i < line.kinds.size(); ++i)
+    if (line.kinds[i] == FieldKind::number)
+      numbers.push_back(finite_number(line.fields[i]).value_or(NAN));
+  return numbers.size() > 1 && (numbers[0] == 0 || numbers[0] == 1) &&
+         std::ranges::adjacent_find(numbers, [](double a, double b) { return !(b == a + 1); }) ==
+             numbers.end();
+}
+
+/// Whether the key column has its kind, or is missing in a line without any word.
+bool may_be_row(const HeadLine& line, const std::vector<FieldKind>& kinds, std::size_t key) {
+  if (line.kinds.size() != kinds.size()) return false;
+  if (line.kinds[key] != FieldKind::nothing) return line.kinds[key] == kinds[key];
+  return kinds[key] == FieldKind::number && !line.is_all_words() &&
+         !is_known_row_of_numbers(line) && !line.has(FieldKind::text);
+}
+
+/// Whether also half of the numbers are there.
+bool is_row(const HeadLine& line, const std::vector<FieldKind>& kinds, std::size_t key) {
+  if (!may_be_row(line, kinds, key)) return false;
+  std::ptrdiff_t alike = 0;
+  for (std::size_t k = 0; k < kinds.size(); ++k)
+    if (kinds[k] == FieldKind::number && line.kinds[k] == FieldKind::number) ++alike;
+  return 2 * alike >= std::ranges::count(kinds, FieldKind::number);
+}
+
+/// 1 0.1 0.1 below a row of units.
+bool may_be_factors(const TableFields& fields) {
+  constexpr std::array powers{0.001, 0.01, 0.1, 1.0, 10.0, 100.0, 1000.0};
+  bool all_one = true;
+  for (const std::string_view field : fields) {
+    const auto number = finite_number(field);
+    if (!number || std::ranges::find(powers, *number) == powers.end()) return false;
+    all_one = all_one && *number == 1.0;
+  }
+  return !all_one;
+}
+
+/// "Scale,0.1,0.1" above the names.
+bool is_named_row_of_factors(const TableFields& fields) {
+  constexpr std::string_view names = "|scale|scaling|factor|gain|multiplier|skalierung|faktor|";
+  if (fields.empty() || !is_one_of(names, fields[0])) return false;
+  return std::any_of(fields.begin() + 1, fields.end(), [](std::string_view field) {
+    const auto number = finite_number(field);
+    return number && *number != 1.0;
+  });
+}
+
+bool names_time_or_unit(const TableFields& fields) {
+  return std::ranges::any_of(fields, [](std::string_view field) {
+    return names_time(field) || !unit_of_time_name(field).empty() ||
+           spelled_name(field).known != nullptr;
+  });
+}
 
 class TableReader {
  public:
-  TableReader(const ColumnMap* map, int lines_above, ProblemList& problems)
-      : map_(map), lines_above_(lines_above), problems_(problems) {}
+  TableReader(const ColumnMap& map, ProblemList& problems)
+      : map_(map), problems_(problems), table_(map, problems) {}
 
-  TextTable read(std::string text) {
+  TextTable read(std::string text, int lines_above) {
     table_.text = std::move(text);
     // Heap-allocated, so that moving the table keeps pointers into it valid.
     table_.text.reserve(64);
-    const int first_line = map_ == nullptr ? 0 : map_->header_line;
-    TextLines found = find_lines(table_.text, lines_above_, first_line);
-    lines_ = std::move(found.lines);
-    last_comment_ = found.last_comment;
-    given_separator_ = found.separator;
+    found_ = find_lines(table_.text, lines_above, map_.header_line);
     if (lines_.empty()) {
       problems_.add(0, "", "", "has no header row");
-      return std::move(table_);
+    } else if (choose_separator()) {
+      widen_to_header();
+      find_header();
+      if (take_header()) read_rows();
     }
-    if (!choose_separator()) return std::move(table_);
-    widen_to_header();
-    if (find_header()) read_rows();
     return std::move(table_);
   }
 
  private:
-  /// The result of splitting all lines by one separator.
+  /// The result of splitting the first lines by one separator.
   struct Cut {
     char separator{','};
+    std::vector<HeadLine> lines;
     std::size_t fields{1};
     std::size_t begin{0};  ///< first line with this number of fields
     double score{0.0};
     double values{0.0};  ///< share of fields that are numbers or times
   };
 
-  [[nodiscard]] std::size_t judged() const { return std::min(lines_.size(), rows_judged); }
-
   [[nodiscard]] Cut cut_by(char separator) const {
+    Cut cut{separator, {}};
     std::map<std::size_t, std::size_t> lines_of;
-    std::vector<TableFields> cut(judged());
-    for (std::size_t i = 0; i < cut.size(); ++i) {
-      static_cast<void>(split_line(lines_[i].text, separator, cut[i]));
-      ++lines_of[cut[i].size()];
+    for (std::size_t i = 0; i < std::min(lines_.size(), rows_judged); ++i) {
+      HeadLine& line = cut.lines.emplace_back();
+      line.is_closed = split_line(lines_[i].text, separator, line.fields);
+      std::ranges::transform(line.fields, std::back_inserter(line.kinds), kind_of_field);
+      ++lines_of[line.fields.size()];
     }
-    Cut best;
-    best.separator = separator;
     std::size_t most = 0;
     for (const auto& [fields, lines] : lines_of) {
       if (fields < 2 || lines < most) continue;
       most = lines;
-      best.fields = fields;
+      cut.fields = fields;
     }
-    if (best.fields < 2) return best;
-    while (cut[best.begin].size() != best.fields) ++best.begin;
-    std::size_t values = 0;
-    std::size_t texts = 0;
-    for (std::size_t i = (best.begin + cut.size()) / 2; i < cut.size(); ++i) {
-      if (cut[i].size() != best.fields) continue;
-      for (const std::string_view field : cut[i]) {
-        const FieldKind kind = kind_of_field(field);
-        if (kind != FieldKind::nothing) ++(kind == FieldKind::text ? texts : values);
-      }
+    if (cut.fields < 2) return cut;
+    while (cut.lines[cut.begin].fields.size() != cut.fields) ++cut.begin;
+    std::ptrdiff_t filled = 0;
+    std::ptrdiff_t texts = 0;
+    for (std::size_t i = (cut.begin + cut.lines.size()) / 2; i < cut.lines.size(); ++i) {
+      const std::vector<FieldKind>& kinds = cut.lines[i].kinds;
+      if (kinds.size() != cut.fields) continue;
+      filled += std::ssize(kinds) - std::ranges::count(kinds, FieldKind::nothing);
+      texts += std::ranges::count(kinds, FieldKind::text);
     }
-    best.values = static_cast<double>(values) / std::max<double>(1.0, double(values + texts));
-    best.score = static_cast<double>(most) / static_cast<double>(cut.size() - best.begin) *
-                 (0.1 + best.values);
-    return best;
+    cut.values = static_cast<double>(filled - texts) / std::max(1.0, static_cast<double>(filled));
+    cut.score = static_cast<double>(most) / static_cast<double>(cut.lines.size() - cut.begin) *
+                (0.1 + cut.values);
+    return cut;
   }
 
   bool choose_separator() {
-    if (map_ != nullptr && map_->separator) given_separator_ = map_->separator;
-    if (given_separator_) {
-      cut_ = cut_by(*given_separator_);
+    if (const auto given = map_.separator ? map_.separator : found_.separator) {
+      cut_ = cut_by(*given);
     } else {
       for (const char separator : separators) {
-        const Cut cut = cut_by(separator);
-        if (cut.fields > 1 && cut.score > cut_.score) cut_ = cut;
+        Cut cut = cut_by(separator);
+        if (cut.fields > 1 && cut.score > cut_.score) cut_ = std::move(cut);
       }
       if (cut_.fields < 2) cut_ = cut_by(' ');
     }
     table_.separator = cut_.separator;
-    const bool is_table = cut_.fields > 1 && (cut_.values >= values_share_min || judged() == 1);
+    const bool is_table =
+        cut_.fields > 1 && (cut_.values >= values_share_min || cut_.lines.size() == 1);
     if (!is_table)
       problems_.add(lines_[0].number, "", lines_[0].text,
                     "is not a known table: rows of numbers and times between ; , tab | "
                     "or blanks; docs/run_files.md lists the forms that are read");
+    for (HeadLine& line : cut_.lines)
+      if (!line.is_closed) line = {};
     return is_table;
-  }
-
-  TableFields fields_of(std::size_t line) {
-    TableFields fields;
-    if (!split_line(lines_[line].text, table_.separator, fields)) fields.clear();
-    fill_up(fields);
-    return fields;
   }
 
   /// Missing last columns of a row are empty.
@@ -119,74 +244,152 @@ class TableReader {
   void widen_to_header() {
     if (cut_.separator == ' ' || cut_.begin < 2) return;
     const std::size_t line = cut_.begin - 2;
-    const TableFields names = fields_of(line);
+    const TableFields& names = head_[line].fields;
     if (names.size() != cut_.fields + 1 || !names.back().starts_with("Serial") ||
-        !is_all_words(names) || fields_of(line + 1).size() != names.size())
+        !head_[line].is_all_words() || head_[line + 1].fields.size() != names.size())
       return;
     narrowest_ = cut_.fields;
     cut_.fields = names.size();
     cut_.begin = line;
+    for (HeadLine& each : cut_.lines) {
+      fill_up(each.fields);
+      each.kinds.resize(each.fields.size(), FieldKind::nothing);
+    }
   }
 
-  bool find_header() {
-    std::vector<TableFields> fields;
-    for (std::size_t i = 0; i < judged(); ++i) fields.push_back(fields_of(i));
-    const bool is_first = map_ != nullptr && map_->header_line > 0;
-    header_ = find_table_header(fields, cut_.begin, cut_.fields, is_first);
-    row_begin_ = header_.row_begin;
-    const TextLine& first = lines_[row_begin_ < lines_.size() ? row_begin_ : 0];
-    const bool has_given = map_ != nullptr && !map_->names.empty();
+  // ---- header
+  /// The kind of each column in the lower half of the lines.
+  [[nodiscard]] std::vector<FieldKind> column_kinds() const {
+    std::vector<std::array<std::size_t, 4>> counts(cut_.fields);
+    for (std::size_t i = (cut_.begin + head_.size()) / 2; i < head_.size(); ++i)
+      for (std::size_t k = 0; k < cut_.fields && head_[i].kinds.size() == cut_.fields; ++k)
+        ++counts[k][static_cast<std::size_t>(head_[i].kinds[k])];
+    std::vector<FieldKind> kinds;
+    for (const auto& [texts, nothing, numbers, times] : counts)
+      kinds.push_back(times > texts + numbers                   ? FieldKind::time
+                      : numbers >= texts + times && numbers > 0 ? FieldKind::number
+                                                                : FieldKind::text);
+    return kinds;
+  }
+
+  /// The first row from `begin` on, with those before it whose values are missing.
+  [[nodiscard]] std::size_t first_row(std::size_t begin) const {
+    const std::vector<FieldKind> kinds = column_kinds();
+    const auto key = key_column(kinds);
+    for (const auto& is : {is_row, may_be_row}) {
+      std::size_t row = key ? begin : head_.size();
+      while (row < head_.size() && !is(head_[row], kinds, *key)) ++row;
+      if (row == head_.size()) continue;
+      while (row > begin && may_be_row(head_[row - 1], kinds, *key)) --row;
+      return row;
+    }
+    return std::min(begin + 1, head_.size());
+  }
+
+  /// Finds names and units above the first row.
+  void find_names() {
+    bool is_found = false;
+    for (std::size_t up = 1; up <= std::min(row_begin_, header_rows_max); ++up) {
+      const std::size_t i = row_begin_ - up;
+      const HeadLine& line = head_[i];
+      if (line.fields.size() != cut_.fields) {
+        // Names of another count: one too few is explained, others are refused.
+        if (!names_line_ && line.is_all_words()) names_line_ = i;
+        return;
+      }
+      if (is_row_of_units(line.fields) && i > 0) {
+        if (!units_line_) units_line_ = i;
+        continue;
+      }
+      const std::size_t named =
+          cut_.fields - static_cast<std::size_t>(std::ranges::count(line.fields, ""));
+      const bool has_names = named >= 2 || 2 * named >= cut_.fields;
+      if (is_found || !has_names || line.has(FieldKind::time) || is_row_of_types(line.fields))
+        continue;
+      is_found = names_time_or_unit(line.fields);
+      if (is_found || (!names_line_ && line.is_all_words())) names_line_ = i;
+    }
+  }
+
+  /// The header is the lowest line above the first row that names the time or a unit, else the
+  /// lowest one of words; it has as many fields as the rows. Lines of units, types, channel numbers
+  /// and statistics between it and the first row are recognised; other numbers there are unclear.
+  void find_header() {
+    const bool is_first = map_.header_line > 0;
+    row_begin_ = first_row(is_first ? 1 : cut_.begin);
+    if (!is_first) find_names();
+    if (is_first) names_line_ = 0;
+    for (std::size_t i = 1; is_first && i < row_begin_; ++i)
+      if (head_[i].fields.size() == cut_.fields && is_row_of_units(head_[i].fields))
+        units_line_ = i;
+    if (!names_line_) {
+      if (row_begin_ > 0 && head_[row_begin_ - 1].fields.size() == cut_.fields &&
+          !head_[row_begin_ - 1].is_all_words())
+        unclear_line_ = row_begin_ - 1;
+      return;
+    }
+    for (std::size_t i = 0; i < *names_line_; ++i)
+      if (is_named_row_of_factors(head_[i].fields)) unclear_line_ = i;
+    for (std::size_t i = *names_line_ + 1; i < row_begin_; ++i)
+      if (!unclear_line_ && !head_[i].is_all_words() && i != units_line_ &&
+          !is_known_row_of_numbers(head_[i]))
+        unclear_line_ = i;
+    if (units_line_ && row_begin_ + 1 < head_.size() && may_be_factors(head_[row_begin_].fields) &&
+        !may_be_factors(head_[row_begin_ + 1].fields))
+      unclear_line_ = row_begin_;
+  }
+
+  bool take_header() {
     if (cut_.fields > fields_max) {
-      problems_.add(first.number, "columns", std::to_string(cut_.fields),
-                    "must be at most " + std::to_string(fields_max));
-    } else if (header_.unclear) {
-      const TextLine& line = lines_[*header_.unclear];
+      problems_.add(lines_[row_begin_ < lines_.size() ? row_begin_ : 0].number, "columns",
+                    std::to_string(cut_.fields), "must be at most " + std::to_string(fields_max));
+    } else if (unclear_line_) {
+      const TextLine& line = lines_[*unclear_line_];
       const std::string rule =
-          header_.names ? "delete the line; where it holds factors also write \"T1\" = { name = "
-                          "\"t1_degC\", unit = \"0.1 degC\" } under [columns]"
-                        : "delete the line or, if it holds the names, write header_line = " +
-                              std::to_string(line.number);
+          names_line_ ? "delete the line; where it holds factors also write \"T1\" = { name = "
+                        "\"t1_degC\", unit = \"0.1 degC\" } under [columns]"
+                      : "delete the line or, if it holds the names, write header_line = " +
+                            std::to_string(line.number);
       problems_.add(line.number, "", line.text,
                     "is neither a row like those below nor names, units or numbers of channels: " +
                         rule + " in the file of --columns");
-    } else if (header_.names && !(has_given && fields[*header_.names].size() != cut_.fields)) {
-      if (header_.units)
-        for (const std::string_view field : fields[*header_.units])
-          table_.units.emplace_back(unit_in_row(field));
-      return take_names(*header_.names) && names_are_clear();
+    } else if (names_line_ &&
+               (map_.names.empty() || head_[*names_line_].fields.size() == cut_.fields)) {
+      return take_names(*names_line_) && make_columns();
     } else if (take_commented_names() || take_given_names()) {
-      if (row_begin_ == 0 || is_all_words(fields[row_begin_ - 1])) return names_are_clear();
+      if (row_begin_ == 0 || head_[row_begin_ - 1].is_all_words()) return make_columns();
       problems_.add(lines_[row_begin_ - 1].number, "",
-                    std::to_string(fields[row_begin_ - 1].size()) + " fields",
+                    std::to_string(head_[row_begin_ - 1].fields.size()) + " fields",
                     "must have " + std::to_string(cut_.fields) + ", as the rows below");
     }
     return false;
   }
 
   /// Whether the first column of the rows is a time, or counts them.
-  bool begins_with_count_or_time() {
+  [[nodiscard]] bool begins_with_count_or_time() const {
     std::optional<double> last;
-    for (std::size_t i = row_begin_; i < judged(); ++i) {
-      const TableFields fields = fields_of(i);
-      if (fields.size() != cut_.fields) continue;
-      if (kind_of_field(fields[0]) == FieldKind::time) return true;
-      const auto number = finite_number(fields[0]);
+    for (std::size_t i = row_begin_; i < head_.size(); ++i) {
+      if (head_[i].fields.size() != cut_.fields) continue;
+      if (head_[i].kinds[0] == FieldKind::time) return true;
+      const auto number = finite_number(head_[i].fields[0]);
       if (!number || (last ? *number != *last + 1 : *number != 0 && *number != 1)) return false;
       last = number;
     }
     return true;
   }
 
-  static std::string more_lines(std::size_t count) {
-    if (count == 0) return {};
-    return " and " + std::to_string(count) + (count == 1 ? " more line" : " more lines");
+  void note_left_out(const std::string& where, std::size_t line, std::size_t count) {
+    if (count == 0) return;
+    std::string note = where + " left out: '" + shortened(lines_[line].text) + "'";
+    if (count > 1) note += " and " + std::to_string(count - 1) + " more line";
+    table_.notes.push_back(note + (count > 2 ? "s" : ""));
   }
 
   bool take_names(std::size_t line) {
-    TableFields fields = fields_of(line);
+    TableFields fields = head_[line].fields;
     while (fields.size() > cut_.fields && fields.back().empty()) fields.pop_back();
     if (fields.size() + 1 == cut_.fields) {
-      const TableFields row = fields_of(row_begin_);
+      const TableFields row = row_begin_ < head_.size() ? head_[row_begin_].fields : TableFields{};
       if (row.size() == cut_.fields && row.back().empty())
         fields.emplace_back();  // a separator at the end of each row
       else if (begins_with_count_or_time())
@@ -205,69 +408,64 @@ class TableReader {
     }
     table_.has_header = true;
     table_.header_line = lines_[line].number;
-    for (const std::string_view field : fields) table_.header.push_back(unquoted(field));
+    for (const std::string_view field : fields) names_.push_back(unquoted(field));
     header_text_ = lines_[line].text;
-    if (line > 0)
-      table_.notes.push_back("above the header in line " + std::to_string(table_.header_line) +
-                             " left out: '" + shortened(lines_[0].text) + "'" +
-                             more_lines(line - 1));
-    const std::size_t between = row_begin_ - line - 1 - (header_.units > line ? 1 : 0);
-    if (between > 0)
-      table_.notes.push_back("between the header and the first row left out: '" +
-                             shortened(lines_[row_begin_ - 1].text) + "'" +
-                             more_lines(between - 1));
+    note_left_out("above the header in line " + std::to_string(table_.header_line), 0, line);
+    note_left_out("between the header and the first row", row_begin_ - 1,
+                  row_begin_ - line - 1 - (units_line_ > line ? 1 : 0));
     return true;
   }
 
   /// "# time t1 z": names in the last comment before rows without a header.
   bool take_commented_names() {
-    std::string_view text = last_comment_.text;
+    const std::string_view text = found_.last_comment.text;
     if (row_begin_ > 0 || text.empty()) return false;
     TableFields fields;
-    static_cast<void>(split_line(text, table_.separator, fields));
-    if (fields.size() != cut_.fields) {
-      static_cast<void>(split_line(trimmed(text.substr(1)), table_.separator, fields));
-    } else {
+    split_line(text, table_.separator, fields);
+    if (fields.size() != cut_.fields)
+      split_line(trimmed(text.substr(1)), table_.separator, fields);
+    else
       fields[0] = trimmed(fields[0].substr(1));
-    }
-    if (fields.size() != cut_.fields || !std::all_of(fields.begin(), fields.end(), [](auto field) {
+    if (fields.size() != cut_.fields || !std::ranges::all_of(fields, [](std::string_view field) {
           return kind_of_field(field) == FieldKind::text || field.empty();
         }))
       return false;
     table_.has_header = true;
-    table_.header_line = last_comment_.number;
-    for (const std::string_view field : fields) table_.header.emplace_back(field);
+    table_.header_line = found_.last_comment.number;
+    names_.assign(fields.begin(), fields.end());
     return true;
   }
 
   bool take_given_names() {
     row_begin_ = row_begin_ < lines_.size() ? row_begin_ : 0;
-    table_.header.assign(cut_.fields, "");
-    const bool has_names = map_ != nullptr && !map_->names.empty();
-    if (!has_names) return true;
-    if (map_->names.size() != cut_.fields) {
-      problems_.add(
-          lines_[row_begin_].number, "names", std::to_string(map_->names.size()) + " names",
-          "must be one for each of the " + std::to_string(cut_.fields) + " fields of a row");
-      return false;
-    }
-    table_.header = map_->names;
-    return true;
+    names_ = map_.names;
+    if (names_.empty()) names_.resize(cut_.fields);
+    if (names_.size() == cut_.fields) return true;
+    problems_.add(
+        lines_[row_begin_].number, "names", std::to_string(names_.size()) + " names",
+        "must be one for each of the " + std::to_string(cut_.fields) + " fields of a row");
+    return false;
   }
 
-  bool names_are_clear() {
-    if (table_.has_header && map_ != nullptr && !map_->names.empty())
-      problems_.add(table_.header_line, "names", map_->names.front(),
+  /// Makes the columns of `names_`.
+  bool make_columns() {
+    if (table_.has_header && !map_.names.empty())
+      problems_.add(table_.header_line, "names", map_.names.front(),
                     "are for a table without a header; this one has names in this line");
-    for (std::size_t i = 0; i < table_.header.size(); ++i)
-      if (table_.header[i].empty()) table_.header[i] = unnamed(i);
+    table_.has_unit_row = !header_text_.empty() && units_line_;
+    for (std::size_t i = 0; i < names_.size(); ++i) {
+      TextColumn& column = table_.columns.emplace_back();
+      column.header = names_[i].empty() ? unnamed(i) : names_[i];
+      if (table_.has_unit_row) column.unit_in_row = unit_in_row(head_[*units_line_].fields[i]);
+    }
     return problems_.empty();
   }
 
   void read_rows() {
     TableFields fields;
+    const std::size_t columns = table_.columns.size();
     const std::size_t rows = lines_.size() - std::min(row_begin_, lines_.size());
-    table_.fields.reserve(rows * table_.columns());
+    for (TextColumn& column : table_.columns) column.fields.reserve(rows);
     table_.lines.reserve(rows);
     for (std::size_t i = row_begin_; i < lines_.size() && !problems_.full(); ++i) {
       const TextLine& line = lines_[i];
@@ -276,62 +474,60 @@ class TableReader {
         problems_.add(line.number, "", line.text, "has a quote that is not closed");
         continue;
       }
-      while (fields.size() > table_.columns() && fields.back().empty()) fields.pop_back();
+      while (fields.size() > columns && fields.back().empty()) fields.pop_back();
       fill_up(fields);
       const bool is_cut_off = i + 1 == lines_.size() && table_.text.back() != '\n';
-      if (is_cut_off && fields.size() < table_.columns() && table_.rows() > 0) {
+      if (is_cut_off && fields.size() < columns && table_.rows() > 0) {
         table_.notes.push_back("the last line, " + std::to_string(line.number) +
                                ", is cut off: left out");
-        continue;
-      }
-      if (fields.size() != table_.columns()) {
+      } else if (fields.size() != columns) {
         problems_.add(line.number, "", std::to_string(fields.size()) + " fields",
-                      "must have " + std::to_string(table_.columns()) + ", as the header");
-        continue;
+                      "must have " + std::to_string(columns) + ", as the header");
+      } else {
+        for (std::size_t k = 0; k < columns; ++k) table_.columns[k].fields.push_back(fields[k]);
+        table_.lines.push_back(line.number);
       }
-      table_.fields.insert(table_.fields.end(), fields.begin(), fields.end());
-      table_.lines.push_back(line.number);
     }
     if (table_.rows() == 0 && problems_.empty()) problems_.add(0, "", "", "has no row of data");
   }
 
-  const ColumnMap* map_;
-  int lines_above_;
+  const ColumnMap& map_;
   ProblemList& problems_;
   TextTable table_;
-  std::vector<TextLine> lines_;
-  TextLine last_comment_;
-  std::optional<char> given_separator_;
+  TextLines found_;
+  const std::vector<TextLine>& lines_{found_.lines};
   Cut cut_;
+  const std::vector<HeadLine>& head_{cut_.lines};
   std::size_t narrowest_{0};  ///< required fields of a row; 0: all
   std::size_t row_begin_{0};
-  TableHeader header_;
+  std::optional<std::size_t> names_line_;  ///< index; nullopt: none
+  std::optional<std::size_t> units_line_;  ///< a row of units below the names
+  std::optional<std::size_t>
+      unclear_line_;  ///< factors, or numbers below the names that are no row
+  std::vector<std::string> names_;
   std::string_view header_text_;
 };
 
 }  // namespace
 
-void TextTable::leave_out(const std::vector<bool>& left_out) {
-  TextTable kept;
-  for (std::size_t i = 0; i < columns(); ++i) {
-    if (left_out[i]) continue;
-    kept.header.push_back(header[i]);
-    if (!units.empty()) kept.units.push_back(units[i]);
-  }
-  for (std::size_t k = 0; k < fields.size(); ++k)
-    if (!left_out[k % columns()]) kept.fields.push_back(fields[k]);
-  header = std::move(kept.header);
-  units = std::move(kept.units);
-  fields = std::move(kept.fields);
+std::size_t TextTable::find(std::string_view header) const {
+  const auto found = std::ranges::find(columns, header, &TextColumn::header);
+  return static_cast<std::size_t>(found - columns.begin());
 }
 
-TextTable read_text_table(std::string text, const ColumnMap* map, int lines_above,
+void TextTable::refuse_field(std::size_t row, std::size_t column, std::string rule) const {
+  problems.add(lines[row], columns[column].header, columns[column].fields[row], std::move(rule));
+}
+
+void TextTable::refuse_column(std::size_t column, std::string rule) const {
+  const std::string& header = columns[column].header;
+  problems.add(header_line, "column " + std::to_string(column + 1),
+               header.empty() ? "(empty)" : header, std::move(rule));
+}
+
+TextTable read_text_table(std::string text, const ColumnMap& map, int lines_above,
                           ProblemList& problems) {
-  return TableReader(map, lines_above, problems).read(std::move(text));
-}
-
-std::string separator_name(char separator) {
-  return separator == '\t' ? "tab" : separator == ' ' ? "blank" : std::string(1, separator);
+  return TableReader(map, problems).read(std::move(text), lines_above);
 }
 
 }  // namespace thermocomp

@@ -1,46 +1,109 @@
-/// A text table of another program, with its columns not yet interpreted.
+/// A text table of another program, on its way to a run: its columns, the user's statements on
+/// them, and what was found out.
 #pragma once
 
+#include <algorithm>
 #include <deque>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "config/run_forms/column_map.hpp"
-#include "config/run_forms/problem_list.hpp"
+#include "config/run_forms/field_text.hpp"
+#include "config/run_forms/spelled_unit.hpp"
+#include "config/text/problems.hpp"
 
 namespace thermocomp {
 
+/// Problems of one run file, up to a limit.
+class ProblemList {
+ public:
+  explicit ProblemList(std::string file) : file_(std::move(file)) {}
+
+  void add(int line, std::string key, std::string_view value, std::string rule) {
+    if (full()) return;  // checked here too, for rows of many columns
+    problems_.push_back({file_, line, std::move(key), shortened(value), std::move(rule)});
+  }
+  /// Adds a problem of another, related file.
+  void add(Problem problem) {
+    if (!full()) problems_.push_back(std::move(problem));
+  }
+  [[nodiscard]] const std::string& file() const noexcept { return file_; }
+  [[nodiscard]] bool empty() const noexcept { return problems_.empty(); }
+  [[nodiscard]] bool full() const noexcept { return problems_.size() >= problems_max; }
+  /// @throws ConfigurationError if there are problems
+  void throw_any() {
+    if (!problems_.empty()) throw ConfigurationError(std::move(problems_));
+  }
+
+ private:
+  static constexpr std::size_t problems_max = 100;
+  std::string file_;
+  std::vector<Problem> problems_;
+};
+
+struct TextColumn {
+  std::string header;       ///< without surrounding quotes and blanks; "column 3": no name
+  std::string unit_in_row;  ///< from a row of units; empty: none
+  std::string unit;     ///< as written in the header, the row of units or the cells; empty: none
+  bool is_time{false};  ///< a part of the time
+  std::vector<std::string_view> fields;  ///< by row, without quotes and blanks
+
+  [[nodiscard]] bool has_one_value() const {
+    return std::ranges::all_of(fields, [&](std::string_view field) { return field == fields[0]; });
+  }
+};
+
+/// Whether `value_of` each field has a value, greater than that of the field before.
+template <typename ValueOf>
+[[nodiscard]] bool increases(const TextColumn& column, ValueOf value_of) {
+  std::optional<double> last;
+  return std::ranges::all_of(column.fields, [&](std::string_view field) {
+    const std::optional<double> value = value_of(field);
+    return value && value > std::exchange(last, value);
+  });
+}
+
 struct TextTable {
-  std::string text;                 ///< UTF-8; storage of the fields
-  std::vector<std::string> header;  ///< without surrounding quotes and blanks; "column 3": no name
-  std::vector<std::string> units;   ///< from a row of units; empty: none
-  bool has_header{false};
+  TextTable(const ColumnMap& column_map, ProblemList& problem_list)
+      : map(column_map), problems(problem_list) {}
+
+  const ColumnMap& map;
+  ProblemList& problems;
+  std::string text;  ///< UTF-8; storage of the fields
+  std::vector<TextColumn> columns;
+  std::vector<int> lines;  ///< line number of each row, counted from 1
   int header_line{0};
-  std::vector<std::string_view> fields;  ///< shape (rows, columns), without quotes and blanks
-  std::vector<int> lines;                ///< line number of each row, counted from 1
+  bool has_header{false};
+  bool has_unit_row{false};
+  bool has_own_names{false};  ///< it comes from a form whose names are ours
   char separator{','};
-  std::vector<std::string> notes;  ///< text skipped around the table
+  NumberForm form;
+  std::vector<std::string> notes;  ///< how it was read, and text skipped around it
   std::deque<std::string> joined;  ///< storage of fields made of a value and its unit
 
-  [[nodiscard]] std::size_t columns() const noexcept { return header.size(); }
   [[nodiscard]] std::size_t rows() const noexcept { return lines.size(); }
-  [[nodiscard]] std::string_view field(std::size_t row, std::size_t column) const {
-    return fields[row * columns() + column];
+  /// The number in a field; nullopt: none.
+  [[nodiscard]] std::optional<double> number(std::string_view field) const {
+    return number_of(field, form);
   }
-  /// Removes the columns for which `left_out` is true.
-  void leave_out(const std::vector<bool>& left_out);
+  /// First column of that name; the number of columns: none.
+  [[nodiscard]] std::size_t find(std::string_view header) const;
+
+  void refuse_field(std::size_t row, std::size_t column, std::string rule) const;
+  void refuse_column(std::size_t column, std::string rule) const;
+  void refuse_map(std::string key, std::string_view value, std::string rule) const {
+    problems.add({map.file, 0, std::move(key), std::string(value), std::move(rule)});
+  }
 };
 
 /// The separator is the one of `;`, tab, `,`, `|` and blank that gives rows of equal length with
 /// mostly numbers or times. The header precedes the first row of values, possibly with a row of
 /// units between; title lines may precede it, and comments may be anywhere.
-/// @param map  may be nullptr
 /// @param lines_above  lines of the file before `text`
-[[nodiscard]] TextTable read_text_table(std::string text, const ColumnMap* map, int lines_above,
+[[nodiscard]] TextTable read_text_table(std::string text, const ColumnMap& map, int lines_above,
                                         ProblemList& problems);
-
-/// Name of a separator in a ColumnMap's file: "tab" or the character.
-[[nodiscard]] std::string separator_name(char separator);
 
 }  // namespace thermocomp

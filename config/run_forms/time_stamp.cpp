@@ -8,6 +8,7 @@
 #include <string>
 
 #include "config/run_forms/field_text.hpp"
+#include "config/run_forms/spelled_unit.hpp"
 #include "config/text/printable_text.hpp"
 
 namespace thermocomp {
@@ -37,7 +38,7 @@ bool take_char(std::string_view& text, std::string_view any_of) {
 std::optional<int> take_month_name(std::string_view& text) {
   if (text.size() < 3) return std::nullopt;
   const std::string name = small_letters(text.substr(0, 3));
-  const auto* const found = std::find(month_names.begin(), month_names.end(), name);
+  const auto* const found = std::ranges::find(month_names, name);
   if (found == month_names.end()) return std::nullopt;
   text.remove_prefix(3);
   return static_cast<int>((found - month_names.begin()) % 12) + 1;
@@ -45,8 +46,7 @@ std::optional<int> take_month_name(std::string_view& text) {
 
 bool take_day_name(std::string_view& text) {
   constexpr std::array<std::string_view, 7> days{"Mon", "Tue", "Wed", "Thu", "Fri", "Sat", "Sun"};
-  if (std::none_of(days.begin(), days.end(), [&](auto day) { return text.starts_with(day); }))
-    return false;
+  if (std::ranges::none_of(days, [&](auto day) { return text.starts_with(day); })) return false;
   text = trimmed(text.substr(3));
   take_char(text, ",");
   text = trimmed(text);
@@ -77,8 +77,7 @@ void find_orders(const std::array<DatePart, 3>& parts, char separator, TimeStamp
     const bool in_range = parts[month].value <= 12 && parts[day].value <= 31;
     if (parts[year].digits == 4 || in_range) stamp.allows[static_cast<std::size_t>(order)] = true;
   };
-  const bool is_long =
-      std::any_of(parts.begin(), parts.end(), [](auto p) { return p.digits == 4; });
+  const bool is_long = std::ranges::any_of(parts, [](auto p) { return p.digits == 4; });
   const auto year_is = [&](std::size_t i) { return !is_long || parts[i].digits == 4; };
   if (year_is(2)) {
     const bool by_points = separator == '.';
@@ -91,11 +90,6 @@ void find_orders(const std::array<DatePart, 3>& parts, char separator, TimeStamp
   stamp.has_points = separator == '.' && !is_long;
 }
 
-/// 20260301123000
-bool is_all_digits_of_time(std::string_view text) {
-  return text.size() == 14 && std::all_of(text.begin(), text.end(), is_digit);
-}
-
 /// 2026-03-01, 01.03.2026, 3/1/26, 01-Mar-2026, Mar 1, 2026, 20260301.
 bool take_date(std::string_view& text, TimeStamp& stamp) {
   std::string_view rest = text;
@@ -103,9 +97,8 @@ bool take_date(std::string_view& text, TimeStamp& stamp) {
   std::array<DatePart, 3> parts{};
   char separator = ' ';
   const auto compact = rest.substr(0, 8);
-  if (compact.size() == 8 && std::all_of(compact.begin(), compact.end(), is_digit) &&
-      (rest.size() == 8 || is_all_digits_of_time(rest) ||
-       std::string_view("T_ -").find(rest[8]) != std::string_view::npos)) {
+  if (compact.size() == 8 && std::ranges::all_of(compact, is_digit) &&
+      (rest.size() == 8 || std::string_view("T_ -").find(rest[8]) != std::string_view::npos)) {
     parts[0] = {*take_digits(rest, 4), 4};
     parts[1] = {*take_digits(rest, 2), 2};
     parts[2] = {*take_digits(rest, 2), 2};
@@ -129,11 +122,10 @@ bool take_date(std::string_view& text, TimeStamp& stamp) {
   }
   const bool named = parts[0].digits == 0 || parts[1].digits == 0;
   if ((separator == ' ' && !named) || separator == ',' || parts[2].digits == 0 ||
-      (!rest.empty() && is_digit(rest.front()) && !is_all_digits_of_time(text)))
+      (!rest.empty() && is_digit(rest.front())))
     return false;
   find_orders(parts, separator, stamp);
-  if (std::none_of(stamp.allows.begin(), stamp.allows.end(), [](bool each) { return each; }))
-    return false;
+  if (std::ranges::none_of(stamp.allows, [](bool each) { return each; })) return false;
   for (std::size_t i = 0; i < 3; ++i) stamp.date[i] = parts[i].value;
   stamp.has_date = true;
   text = rest;
@@ -175,8 +167,7 @@ bool take_clock(std::string_view& text, TimeStamp& stamp) {
   std::string_view rest = text;
   const std::string_view compact = rest.substr(0, 6);
   std::string spelled;
-  if (stamp.has_date && compact.size() == 6 &&
-      std::all_of(compact.begin(), compact.end(), is_digit)) {
+  if (stamp.has_date && compact.size() == 6 && std::ranges::all_of(compact, is_digit)) {
     for (const std::size_t at : {0U, 2U, 4U})
       spelled.append(at > 0 ? ":" : "").append(compact.substr(at, 2));
     spelled.append(rest.substr(6));
@@ -224,12 +215,54 @@ std::string year_in_front(std::string_view text) {
   if (text.size() < 18 || text[text.size() - 5] != ' ') return {};
   const std::string_view year = text.substr(text.size() - 4);
   const auto clock = text.find(':');
-  if (clock == std::string_view::npos || clock < 6 ||
-      !std::all_of(year.begin(), year.end(), is_digit))
+  if (clock == std::string_view::npos || clock < 6 || !std::ranges::all_of(year, is_digit))
     return {};
   const std::string_view day = trimmed(text.substr(0, clock - 2));
   return std::string(day) + " " + std::string(year) + " " +
          std::string(text.substr(clock - 2, text.size() - 5 - (clock - 2)));
+}
+
+constexpr std::string_view time_names =
+    "|time|zeit|timestamp|zeitstempel|datetime|date|datum|uhrzeit|elapsed"
+    "|elapsed time|date time|date/time|datum/uhrzeit|t_s|laufzeit|ts|_time"
+    "|x_value|unixtime|unix_time|epoch|seconds|last_changed|elapsed_time"
+    "|time stamp|scan time|date_time|sample time|sec|clock|unix|";
+constexpr std::string_view date_names =
+    "|date|datum|datetime|date time|date/time|datum/uhrzeit|time|zeit|timestamp"
+    "|zeitstempel|";
+
+constexpr double s_per_day = 86400.0;
+
+constexpr std::array<Epoch, 8> epochs{{
+    {"s since 1970", 1e9, 2.5e9, 1, 0, false, true},
+    {"ms since 1970", 1e12, 2.5e12, 1e3, 0, false, true},
+    {"us since 1970", 1e15, 2.5e15, 1e6, 0, false, true},
+    {"ns since 1970", 1e18, 2.5e18, 1e9, 0, false, true},
+    {"s since 1904", 3.1e9, 4.6e9, 1, -2082844800.0, true, true},
+    {"100 ns since 1601", 1.25e17, 1.42e17, 1e7, -11644473600.0, false, true},
+    {"day", 20000, 80000, 1 / s_per_day, -25569 * s_per_day, true, false},
+    {"days since the year 0", 7.2e5, 7.6e5, 1 / s_per_day, -719529 * s_per_day, true, false},
+}};
+
+/// True if two neighbours differ by at most `step_max`, or no two differ.
+bool has_steps_below(double step_max, const std::vector<double>& numbers) {
+  double least = INFINITY;
+  for (std::size_t i = 1; i < numbers.size(); ++i)
+    if (const double step = std::abs(numbers[i] - numbers[i - 1]); step > 0)
+      least = std::min(least, step);
+  return std::isinf(least) || least <= step_max;
+}
+
+bool are_multiples_of(double unit, const std::vector<double>& numbers) {
+  return std::ranges::all_of(numbers, [unit](double number) {
+    return std::abs(number / unit - std::round(number / unit)) < 1e-6;
+  });
+}
+
+/// "Date Time, GMT+01:00" without what follows the comma.
+bool is_named_like(std::string_view names, std::string_view header) {
+  const std::string base = spelled_name(header).base;
+  return is_one_of(names, std::string_view(base).substr(0, base.find(',')));
 }
 
 }  // namespace
@@ -239,15 +272,15 @@ std::optional<TimeStamp> parse_time_stamp(std::string_view text) {
   TimeStamp stamp;
   // Quick rejection: most fields of text are not dates.
   if (text.size() < 4 || text.size() > 64) return std::nullopt;
-  const std::string_view whole = text;
   std::string turned;
-  if (!is_digit(text.front())) {
+  if (!is_digit(text.front()))
     turned = year_in_front(text);
-    if (!turned.empty()) text = turned;
-  }
+  else if (text.size() == 14 && std::ranges::all_of(text, is_digit))  // 20260301123000
+    turned = std::string(text).insert(8, " ");
+  if (!turned.empty()) text = turned;
   if (take_date(text, stamp)) {
     if (trimmed(text).empty()) return stamp;
-    if (!is_all_digits_of_time(whole) && !take_char(text, "T _-,")) return std::nullopt;
+    if (!take_char(text, "T _-,")) return std::nullopt;
     text = trimmed(text);
   }
   if (!take_clock(text, stamp)) return std::nullopt;
@@ -260,30 +293,27 @@ std::optional<TimeStamp> parse_time_stamp(std::string_view text) {
   return stamp;
 }
 
-std::optional<double> parse_zone(std::string_view text) {
-  const auto zone = take_zone(text);
-  return trimmed(text).empty() ? zone : std::nullopt;
+std::optional<double> seconds_of_day(int year, int month, int day) {
+  if (year < 100) year += year < 70 ? 2000 : 1900;
+  const std::chrono::year_month_day date{std::chrono::year{year},
+                                         std::chrono::month{static_cast<unsigned>(month)},
+                                         std::chrono::day{static_cast<unsigned>(day)}};
+  if (!date.ok()) return std::nullopt;
+  return 86400.0 * static_cast<double>(std::chrono::sys_days(date).time_since_epoch().count());
 }
 
 std::optional<double> seconds_of(const TimeStamp& stamp, DateOrder order, bool minutes_first) {
   double seconds = 0.0;
   if (stamp.has_date) {
-    for (const DateOrder each :
-         {DateOrder::year_month_day, DateOrder::day_month_year, DateOrder::month_day_year})
+    for (const DateOrder each : date_orders)
       if (order == DateOrder::unknown && stamp.allows_order(each)) order = each;
-    if (!stamp.allows_order(order)) return std::nullopt;
-    const std::array<std::size_t, 3> at =
-        order == DateOrder::day_month_year   ? std::array<std::size_t, 3>{0, 1, 2}
-        : order == DateOrder::month_day_year ? std::array<std::size_t, 3>{1, 0, 2}
-                                             : std::array<std::size_t, 3>{2, 1, 0};
-    int year = stamp.date[at[2]];
-    if (year < 100) year += year < 70 ? 2000 : 1900;
-    const std::chrono::year_month_day date{
-        std::chrono::year{year}, std::chrono::month{static_cast<unsigned>(stamp.date[at[1]])},
-        std::chrono::day{static_cast<unsigned>(stamp.date[at[0]])}};
-    if (!date.ok() || (stamp.has_clock && stamp.clock_a > 24)) return std::nullopt;
-    const auto days = std::chrono::sys_days(date).time_since_epoch().count();
-    seconds = 86400.0 * static_cast<double>(days);
+    if (!stamp.allows_order(order) || (stamp.has_clock && stamp.clock_a > 24)) return std::nullopt;
+    const auto& [a, b, c] = stamp.date;
+    const auto day = order == DateOrder::day_month_year   ? seconds_of_day(c, b, a)
+                     : order == DateOrder::month_day_year ? seconds_of_day(c, a, b)
+                                                          : seconds_of_day(a, b, c);
+    if (!day) return std::nullopt;
+    seconds = *day;
   }
   if (stamp.has_clock && stamp.clock_parts == 2 && minutes_first)
     seconds += 60.0 * stamp.clock_a + stamp.clock_b;
@@ -302,6 +332,51 @@ std::string date_text(double seconds_since_1970) {
                 static_cast<unsigned>(date.month()), static_cast<unsigned>(date.day()),
                 second / 3600, second / 60 % 60, second % 60);
   return text;
+}
+
+bool names_time(std::string_view header) {
+  return is_named_like(time_names, header);
+}
+
+bool names_date(std::string_view header) {
+  return is_named_like(date_names, header);
+}
+
+std::string_view unit_of_time_name(std::string_view header) {
+  const auto bar = header.rfind('_');
+  if (bar == std::string_view::npos || bar == 0 || !names_time(header.substr(0, bar))) return {};
+  const SpelledUnit* unit = time_unit(header.substr(bar + 1));
+  return unit != nullptr ? unit->spelling : std::string_view();
+}
+
+std::optional<double> zone_of_header(std::string_view header) {
+  for (const std::string_view name : {"GMT", "UTC"}) {
+    const auto at = header.find(name);
+    if (at == std::string_view::npos) continue;
+    std::string_view zone = header.substr(at);
+    zone = zone.substr(0, zone.find_first_of(" )]"));
+    const auto seconds = take_zone(zone);
+    return trimmed(zone).empty() ? seconds : std::nullopt;
+  }
+  return std::nullopt;
+}
+
+const Epoch* epoch_of(const std::vector<double>& numbers, bool is_named, bool has_unit) {
+  constexpr double step_s_max = 3600.0;
+  for (const Epoch& epoch : epochs) {
+    if (epoch.only_named && !is_named) continue;
+    // Whole numbers of that size may be ms of a counter of 32 bits.
+    if (epoch.only_named && epoch.per_second == 1 && !has_unit && are_multiples_of(1, numbers))
+      continue;
+    // No clock goes in steps of 86.4 s: these are seconds.
+    if (epoch.per_second < 1 && !has_unit && are_multiples_of(0.001, numbers)) continue;
+    if (!has_unit && !has_steps_below(step_s_max * epoch.per_second * 1.001, numbers)) continue;
+    if (!numbers.empty() && std::ranges::all_of(numbers, [&](double number) {
+          return number >= epoch.low && number < epoch.high;
+        }))
+      return &epoch;
+  }
+  return nullptr;
 }
 
 }  // namespace thermocomp

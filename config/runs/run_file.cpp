@@ -14,7 +14,7 @@
 
 #include "config/run_forms/field_text.hpp"
 #include "config/run_forms/foreign_run.hpp"
-#include "config/run_forms/run_text.hpp"
+#include "config/run_forms/text_lines.hpp"
 #include "config/text/printable_text.hpp"
 #include "config/text/units.hpp"
 #include "config/toml/toml_reader.hpp"

@@ -43,38 +43,37 @@ class PartReader {
   explicit PartReader(const std::string& path)
       : path_(path),
         problems_(path),
-        table_(read_text_table(read_text_file(path, run_bytes_max), nullptr, 0, problems_)) {
+        table_(read_text_table(read_text_file(path, run_bytes_max), no_map_, 0, problems_)) {
     problems_.throw_any();
-    form_ = number_form(table_, nullptr, problems_);
+    table_.form = number_form(table_);
     problems_.throw_any();
   }
 
   /// @param axes  out: letters of the columns found
   std::vector<Feature> read(std::vector<std::string>& axes) {
-    const std::size_t repeat = column("repeat");
-    const std::size_t state = column("state");
-    const std::size_t feature = column("feature");
+    const auto& repeats = column("repeat");
+    const auto& states = column("state");
+    const auto& features = column("feature");
     std::vector<std::size_t> columns;
     for (const char axis : {'x', 'y', 'z'}) {
-      const auto found =
-          std::find(table_.header.begin(), table_.header.end(), std::string(1, axis) + "_um");
-      if (found == table_.header.end()) continue;
+      const std::size_t found = table_.find(std::string(1, axis) + "_um");
+      if (found == table_.columns.size()) continue;
       axes.emplace_back(1, static_cast<char>(axis - 'a' + 'A'));
-      columns.push_back(static_cast<std::size_t>(found - table_.header.begin()));
+      columns.push_back(found);
     }
     if (axes.empty()) refuse(0, "x_um, y_um, z_um", "(missing)", "one of them must be a column");
     for (std::size_t row = 0; row < table_.rows(); ++row) {
-      const std::string word(table_.field(row, state));
+      const std::string word(states[row]);
       if (word != "cold" && word != "warm")
         refuse(table_.lines[row], "state", word, "must be cold or warm");
-      Feature& known = feature_of(std::string(table_.field(row, feature)), axes.size());
+      Feature& known = feature_of(std::string(features[row]), axes.size());
       for (std::size_t i = 0; i < columns.size(); ++i) {
-        const std::string_view field = table_.field(row, columns[i]);
+        const std::string_view field = table_.columns[columns[i]].fields[row];
         if (field.empty()) continue;
-        const auto number = number_of(field, form_);
-        const std::string& name = table_.header[columns[i]];
+        const auto number = table_.number(field);
+        const std::string& name = table_.columns[columns[i]].header;
         if (!number) refuse(table_.lines[row], name, std::string(field), "must be a number");
-        Pair& pair = known.axes[i][std::string(table_.field(row, repeat))];
+        Pair& pair = known.axes[i][std::string(repeats[row])];
         std::optional<double>& place = word == "warm" ? pair.warm : pair.cold;
         if (place)
           refuse(table_.lines[row], name, std::string(field),
@@ -91,12 +90,12 @@ class PartReader {
     throw ConfigurationError({Problem{path_, line, key, value, rule}});
   }
 
-  std::size_t column(const std::string& name) const {
-    const auto found = std::find(table_.header.begin(), table_.header.end(), name);
-    if (found == table_.header.end())
+  const std::vector<std::string_view>& column(const std::string& name) const {
+    const std::size_t found = table_.find(name);
+    if (found == table_.columns.size())
       refuse(table_.header_line, name, "(missing)",
              "must be a column; thermal-test plan --test part writes the sheet");
-    return static_cast<std::size_t>(found - table_.header.begin());
+    return table_.columns[found].fields;
   }
 
   Feature& feature_of(const std::string& name, std::size_t axes) {
@@ -108,8 +107,8 @@ class PartReader {
 
   const std::string& path_;
   ProblemList problems_;
+  ColumnMap no_map_;
   TextTable table_;
-  NumberForm form_;
   std::vector<Feature> features_;
 };
 

@@ -1,9 +1,12 @@
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <utility>
 #include <vector>
 
 #include "config/run_forms/field_text.hpp"
 #include "config/run_forms/log_form.hpp"
+#include "config/run_forms/text_lines.hpp"
 #include "config/text/printable_text.hpp"
 #include "config/text/units.hpp"
 
@@ -12,30 +15,43 @@ namespace {
 
 struct Samples {
   std::vector<std::vector<double>> rows;
-  std::vector<bool> after_overrun;
+  std::size_t overruns{0};
 };
+
+bool is_overrun(const std::vector<std::string_view>& words) {
+  return words.size() == 1 && words[0] == "overrun";
+}
+
+/// Whether the text has only numbers and blanks, in at least one row.
+bool is_halsampler(std::string_view text) {
+  constexpr int rows_judged = 20;
+  int rows = 0;
+  while (!text.empty() && rows < rows_judged) {
+    const std::vector<std::string_view> words = words_of(take_line(text));
+    if (words.empty() || is_overrun(words)) continue;
+    if (!std::ranges::all_of(words, [](auto word) { return finite_number(word).has_value(); }))
+      return false;
+    ++rows;
+  }
+  return rows > 0;
+}
 
 Samples samples_of(const Log& log) {
   std::string_view text = log.text;
   Samples samples;
   bool overrun = false;
   for (int line = 1; !text.empty(); ++line) {
-    std::string_view rest;
-    static_cast<void>(take(text, '\n', rest));
-    rest = trimmed(rest);
-    if (rest.empty()) continue;
-    if (rest == "overrun") {
+    const std::vector<std::string_view> words = words_of(take_line(text));
+    if (words.empty()) continue;
+    if (is_overrun(words)) {
       overrun = !samples.rows.empty();  // rows before the first one are not part of the file
       continue;
     }
     std::vector<double> row;
-    while (!rest.empty()) {
-      const std::size_t end = std::min(rest.find_first_of(" \t"), rest.size());
-      const auto number = finite_number(rest.substr(0, end));
-      if (!number)
-        log.refuse(line, "", std::string(rest.substr(0, end)), "must be a number, as before");
+    for (const std::string_view word : words) {
+      const auto number = finite_number(word);
+      if (!number) log.refuse(line, "", std::string(word), "must be a number, as before");
       row.push_back(*number);
-      rest = trimmed(rest.substr(end));
     }
     if (!samples.rows.empty() && row.size() != samples.rows.front().size()) {
       // The last line may be cut when the program is stopped.
@@ -45,7 +61,7 @@ Samples samples_of(const Log& log) {
           "must be as many as in the rows before, " + std::to_string(samples.rows.front().size()));
     }
     samples.rows.push_back(std::move(row));
-    samples.after_overrun.push_back(overrun);
+    if (overrun) ++samples.overruns;
     overrun = false;
   }
   return samples;
@@ -89,44 +105,22 @@ bool is_numbered(const Samples& samples, const Log& log) {
 
 void check_names(const Log& log) {
   const std::vector<std::string>& names = log.map.names;
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    if (!is_column_name(names[i]))
-      log.refuse(0, "--names", names[i], std::string(column_name_rule));
-    for (std::size_t j = 0; j < i; ++j)
-      if (names[i] == names[j]) log.refuse(0, "--names", names[i], "is listed twice");
+  for (auto name = names.begin(); name != names.end(); ++name) {
+    if (!is_column_name(*name)) log.refuse(0, "--names", *name, std::string(column_name_rule));
+    if (std::find(names.begin(), name, *name) != name)
+      log.refuse(0, "--names", *name, "is listed twice");
   }
-}
-
-/// Whether a name is a time, possibly in another unit: "t [ms]" of a map, "time_s".
-bool has_time(const std::vector<std::string>& names) {
-  return std::find(names.begin(), names.end(), "time_s") != names.end();
 }
 
 }  // namespace
 
-/// Whether the text has only numbers and blanks, in at least one row.
-bool is_halsampler(std::string_view text) {
-  constexpr int rows_judged = 20;
-  int rows = 0;
-  while (!text.empty() && rows < rows_judged) {
-    std::string_view line = trimmed(take_line(text));
-    if (line.empty() || line == "overrun") continue;
-    while (!line.empty()) {
-      const std::size_t end = std::min(line.find_first_of(" \t"), line.size());
-      if (!finite_number(line.substr(0, end))) return false;
-      line = trimmed(line.substr(end));
-    }
-    ++rows;
-  }
-  return rows > 0;
-}
-
-PlainTable plain_halsampler(const Log& log) {
+std::optional<PlainTable> halsampler(const Log& log) {
+  if (!is_halsampler(log.text)) return std::nullopt;
   const Samples samples = samples_of(log);
   const bool numbered = is_numbered(samples, log);
   check_names(log);
   const std::vector<std::string>& names = log.map.names;
-  const bool timed = has_time(names);
+  const bool timed = std::ranges::find(names, "time_s") != names.end();
   if (!timed && !log.map.period_s)
     log.refuse(1, "--period-s", "(missing)",
                "a log of halsampler has no time: write --period-s S with the seconds between two "
@@ -136,88 +130,64 @@ PlainTable plain_halsampler(const Log& log) {
   if (!timed) table.text = "time_s";
   for (const std::string& name : names)
     table.text.append(table.text.empty() ? "" : ",").append(name);
-  std::size_t overruns = 0;
   for (std::size_t row = 0; row < samples.rows.size(); ++row) {
     const std::vector<double>& numbers = samples.rows[row];
-    table.text += '\n';
-    if (samples.after_overrun[row]) ++overruns;
     const double count =
         numbered ? numbers.front() - samples.rows.front().front() : static_cast<double>(row);
-    if (!timed) append_number(table.text, count * *log.map.period_s);
-    for (std::size_t i = numbered ? 1 : 0; i < numbers.size(); ++i) {
-      if (i > (numbered ? 1U : 0U) || !timed) table.text += ',';
-      append_number(table.text, numbers[i]);
-    }
+    char before = '\n';
+    const auto append = [&](double number) {
+      append_number(table.text += std::exchange(before, ','), number);
+    };
+    if (!timed) append(count * *log.map.period_s);
+    std::for_each(numbers.begin() + (numbered ? 1 : 0), numbers.end(), append);
   }
   table.text += '\n';
-  if (overruns > 0 && !numbered)
-    log.refuse(0, "", std::to_string(overruns) + " overruns",
+  const std::string overruns = std::to_string(samples.overruns);
+  if (samples.overruns > 0 && !numbered)
+    log.refuse(0, "", overruns + " overruns",
                "lost an unknown number of samples: record with halsampler -t, which numbers them");
-  table.notes.push_back(std::string("numbers between blanks, ") +
-                        (numbered ? "samples numbered (-t)" : "samples not numbered"));
+  table.notes.push_back(std::string("numbers between blanks, samples ") +
+                        (numbered ? "numbered (-t)" : "not numbered"));
   if (!timed)
     table.notes.push_back("time_s: a sample each " + number_text(*log.map.period_s) +
                           " s, from the first row");
   for (std::size_t i = 0; i < names.size(); ++i)
     table.notes.push_back("number " + std::to_string(i + (numbered ? 2 : 1)) + " is " + names[i] +
                           (unit_of(names[i]).suffix.empty() ? ", a signal without unit" : ""));
-  if (overruns > 0)
-    table.notes.push_back("lost: " + std::to_string(overruns) +
-                          " times the buffer ran over; a gap each");
+  if (samples.overruns > 0)
+    table.notes.push_back("lost: " + overruns + " times the buffer ran over; a gap each");
   return table;
 }
 
-namespace {
-
-constexpr std::string_view mark = "Sampling period is ";
-
-}  // namespace
-
-bool is_halscope(std::string_view text) {
-  return trimmed(text).starts_with(mark);
-}
-
-PlainTable plain_halscope(const Log& log) {
+std::optional<PlainTable> halscope(const Log& log) {
+  constexpr std::string_view mark = "Sampling period is ";
   std::string_view rest = trimmed(log.text);
+  if (!rest.starts_with(mark)) return std::nullopt;
   const std::string_view first = trimmed(take_line(rest)).substr(mark.size());
   const auto period_ns = finite_number(first.substr(0, first.find(' ')));
   if (!period_ns || !(*period_ns > 0))
     log.refuse(1, "", std::string(first), "must be the sampling period in ns");
-  std::vector<std::string> labels;
-  std::vector<std::vector<std::string_view>> values;
+  NamedColumns columns;
+  const std::size_t time = columns.add("time_s");
+  std::map<std::size_t, std::size_t> rows;  // of each column
   for (int line = 2; !rest.empty(); ++line) {
-    std::string_view words = trimmed(take_line(rest));
-    while (!words.empty()) {
-      const auto blank = words.find(' ');
-      const std::string label(words.substr(0, blank));
-      words = blank == std::string_view::npos ? std::string_view() : trimmed(words.substr(blank));
-      const std::string_view value = words.substr(0, words.find(' '));
-      if (!finite_number(value))
-        log.refuse(line, label, std::string(value), "must be a label and its value, in turn");
-      words = trimmed(words.substr(value.size()));
-      std::size_t i = 0;
-      while (i < labels.size() && labels[i] != label) ++i;
-      if (i == labels.size()) {
-        labels.push_back(label);
-        values.emplace_back();
-      }
-      values[i].push_back(value);
+    std::vector<std::string_view> words = words_of(take_line(rest));
+    words.resize(words.size() + words.size() % 2);
+    for (std::size_t i = 0; i < words.size(); i += 2) {
+      if (!finite_number(words[i + 1]))
+        log.refuse(line, std::string(words[i]), std::string(words[i + 1]),
+                   "must be a label and its value, in turn");
+      const std::size_t column = columns.find_or_add(std::string(words[i]));
+      columns.cell(rows[column]++, column) = words[i + 1];
     }
   }
-  if (labels.empty()) log.refuse(0, "", "", "has no row of data");
-  PlainTable table;
-  table.text = "time_s";
-  for (const std::string& label : labels) table.text.append(",").append(in_quotes(label));
-  for (std::size_t row = 0; row < values[0].size(); ++row) {
-    table.text += '\n';
-    append_number(table.text, static_cast<double>(row) * *period_ns * 1e-9);
-    for (const auto& column : values)
-      table.text.append(",").append(row < column.size() ? column[row] : "");
-  }
-  table.text += '\n';
-  table.notes.push_back("halscope of LinuxCNC, a sample each " + number_text(*period_ns * 1e-9) +
-                        " s");
-  return table;
+  if (rows.empty()) log.refuse(0, "", "", "has no row of data");
+  columns.keep_rows(rows.begin()->second);
+  for (std::size_t row = 0; row < columns.rows(); ++row)
+    columns.cell(row, time) = number_text(static_cast<double>(row) * *period_ns * 1e-9);
+  return PlainTable{
+      columns.text(),
+      {"halscope of LinuxCNC, a sample each " + number_text(*period_ns * 1e-9) + " s"}};
 }
 
 }  // namespace thermocomp::forms

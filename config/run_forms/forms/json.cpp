@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <set>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
@@ -29,22 +31,6 @@ json parsed(const Log& log, std::string_view text, int line) {
 
 // ---- Moonraker's temperature store
 
-/// Shortens "temperature_sensor chamber" to chamber, unless ambiguous.
-std::map<std::string, std::string> short_names(const json& store) {
-  std::map<std::string, std::string> names;
-  const auto last_word = [](const std::string& full) {
-    const std::size_t blank = full.rfind(' ');
-    return blank == std::string::npos ? full : full.substr(blank + 1);
-  };
-  for (const auto& [full, object] : store.items()) {
-    int same = 0;
-    for (const auto& [other, ignored] : store.items())
-      if (last_word(other) == last_word(full)) ++same;
-    names[full] = plain_name(same == 1 ? last_word(full) : full);
-  }
-  return names;
-}
-
 struct Series {
   const char* key;
   const char* end;
@@ -56,57 +42,51 @@ constexpr Series series[] = {{"temperatures", "_degC", 1.0, ""},
                              {"powers", "_power_percent", 100.0, ", times 100"},
                              {"speeds", "_speed_percent", 100.0, ", times 100"}};
 
-struct NamedValues {
-  std::string name;
-  std::vector<std::string> values;
-};
-
-void add_series(const Log& log, const std::string& full, const std::string& plain,
-                const json& object, std::vector<NamedValues>& columns, PlainTable& table) {
-  for (const Series& one : series) {
-    const auto found = object.find(one.key);
-    if (found == object.end()) continue;
-    const std::string key = full + "." + one.key;
-    if (!found->is_array()) log.refuse(0, key, found->type_name(), "must be a list of numbers");
-    NamedValues column{plain + one.end, {}};
-    for (const json& value : *found) {
-      if (!value.is_number() && !value.is_null())
-        log.refuse(0, key, value.dump(), "must be a number or null");
-      column.values.push_back(value.is_null() ? "" : number_text(one.factor * value.get<double>()));
-    }
-    if (!columns.empty() && column.values.size() != columns.front().values.size())
-      log.refuse(
-          0, key, std::to_string(column.values.size()) + " values",
-          "must be as many as the others have, " + std::to_string(columns.front().values.size()));
-    table.notes.push_back("'" + full + "' " + one.key + " is " + column.name + one.note);
-    columns.push_back(std::move(column));
-  }
-}
-
 bool is_store(const json& store) {
-  return store.is_object() && std::any_of(store.begin(), store.end(), [](const json& object) {
+  return store.is_object() && std::ranges::any_of(store, [](const json& object) {
            return object.is_object() && object.contains("temperatures");
          });
 }
 
+/// "temperature_sensor chamber" is called chamber, unless ambiguous.
 PlainTable plain_store(const Log& log, const json& store) {
+  const auto last_word = [](const std::string& full) { return full.substr(full.rfind(' ') + 1); };
+  std::map<std::string, int> same;
+  for (const auto& [full, object] : store.items()) ++same[last_word(full)];
   PlainTable table;
   table.has_own_names = true;
   const double period_s = log.map.period_s.value_or(1.0);
   table.notes.push_back("temperature store of Moonraker, a row each " + number_text(period_s) +
                         " s" + (log.map.period_s ? "" : " (its own period)") +
                         "; it has no time of day");
-  std::vector<NamedValues> columns;
-  const auto names = short_names(store);
+  NamedColumns columns;
+  const std::size_t time = columns.add("time_s");
+  std::optional<std::size_t> size;
   for (const auto& [full, object] : store.items())
-    if (object.is_object()) add_series(log, full, names.at(full), object, columns, table);
-  table.text = "time_s";
-  for (const NamedValues& column : columns) table.text.append(",").append(column.name);
-  for (std::size_t row = 0; row < columns.front().values.size(); ++row) {
-    table.text.append("\n").append(number_text(static_cast<double>(row) * period_s));
-    for (const NamedValues& column : columns) table.text.append(",").append(column.values[row]);
-  }
-  table.text += '\n';
+    for (const Series& one : series) {
+      if (!object.is_object() || !object.contains(one.key)) continue;
+      const json& list = object[one.key];
+      const std::string key = full + "." + one.key;
+      if (!list.is_array()) log.refuse(0, key, list.type_name(), "must be a list of numbers");
+      const std::string name = last_word(full);
+      const std::string column_name = plain_name(same[name] == 1 ? name : full) + one.end;
+      const std::size_t column = columns.add(column_name);
+      for (std::size_t row = 0; row < list.size(); ++row) {
+        const json& value = list[row];
+        if (!value.is_number() && !value.is_null())
+          log.refuse(0, key, value.dump(), "must be a number or null");
+        columns.cell(row, column) =
+            value.is_null() ? "" : number_text(one.factor * value.get<double>());
+      }
+      if (list.size() != size.value_or(list.size()))
+        log.refuse(0, key, std::to_string(list.size()) + " values",
+                   "must be as many as the others have, " + std::to_string(*size));
+      size = list.size();
+      table.notes.push_back("'" + full + "' " + one.key + " is " + column_name + one.note);
+    }
+  for (std::size_t row = 0; row < columns.rows(); ++row)
+    columns.cell(row, time) = number_text(static_cast<double>(row) * period_s);
+  table.text = columns.text();
   return table;
 }
 
@@ -141,69 +121,46 @@ std::map<std::string, std::string> stated_units(const json& document) {
 
 class Records {
  public:
-  explicit Records(const Log& log) : log_(log) {}
+  /// @param units  by name
+  explicit Records(const Log& log, std::map<std::string, std::string> units = {})
+      : log_(log), columns_(std::move(units)) {}
 
   /// @param time  given outside of the record; empty: one of its values
   void add(const json& record, const std::string& time = {}) {
-    std::map<std::size_t, std::string> row;
-    if (!time.empty()) row[column("time")] = time;
-    add_values(record, "", row);
-    if (!row.empty()) rows_.push_back(std::move(row));
+    row_ = columns_.rows();
+    if (!time.empty()) set("time", time);
+    add_members("", record);
   }
 
-  [[nodiscard]] bool empty() const { return rows_.empty(); }
-
-  [[nodiscard]] std::string text(const std::map<std::string, std::string>& units) const {
-    std::string text;
-    for (std::size_t i = 0; i < names_.size(); ++i) {
-      const auto unit = units.find(names_[i]);
-      text.append(i > 0 ? "," : "")
-          .append(with_unit(names_[i], unit == units.end() ? "" : unit->second));
-    }
-    for (const auto& row : rows_) {
-      text += '\n';
-      for (std::size_t i = 0; i < names_.size(); ++i) {
-        const auto found = row.find(i);
-        if (i > 0) text += ',';
-        if (found != row.end()) text += found->second;
-      }
-    }
-    return text + '\n';
-  }
+  [[nodiscard]] bool empty() const { return columns_.rows() == 0; }
+  [[nodiscard]] std::string text() const { return columns_.text(); }
 
  private:
-  std::size_t column(const std::string& name) {
-    const auto [found, is_new] = index_.emplace(name, names_.size());
-    if (is_new) names_.push_back(name);
-    return found->second;
+  void set(const std::string& name, const std::string& text) {
+    columns_.cell(row_, columns_.find_or_add(name)) = text;
   }
 
-  void add_values(const json& record, const std::string& before,
-                  std::map<std::size_t, std::string>& row) {
-    for (const auto& [key, value] : record.items()) add_value(before + key, value, row);
+  void add_members(const std::string& before, const json& record) {
+    for (const auto& [key, value] : record.items()) add_value(before + key, value);
   }
 
-  void add_value(const std::string& name, const json& value,
-                 std::map<std::size_t, std::string>& row) {
-    if (value.is_array()) {
-      add_list(name, value, row);
-    } else if (value.is_object()) {
-      if (const std::string with_unit = value_with_unit(value); !with_unit.empty())
-        row[column(name)] = in_quotes(with_unit);
-      else
-        add_values(value, name + ".", row);
-    } else if (value.is_number() || value.is_boolean()) {
-      row[column(name)] = value.is_number_float() ? number_text(value.get<double>())
-                          : value.is_boolean()    ? (value.get<bool>() ? "1" : "0")
-                                                  : value.dump();
-    } else if (value.is_string()) {
-      row[column(name)] = in_quotes(value.get<std::string>());
-    }
+  void add_value(const std::string& name, const json& value) {
+    if (value.is_array())
+      add_list(name, value);
+    else if (const std::string with_unit = value_with_unit(value); !with_unit.empty())
+      set(name, in_quotes(with_unit));
+    else if (value.is_object())
+      add_members(name + ".", value);
+    else if (value.is_boolean())
+      set(name, value.get<bool>() ? "1" : "0");
+    else if (value.is_number())
+      set(name, value.is_number_float() ? number_text(value.get<double>()) : value.dump());
+    else if (value.is_string())
+      set(name, in_quotes(value.get<std::string>()));
   }
 
   /// The elements are called as they say themselves, else by their number.
-  void add_list(const std::string& name, const json& list,
-                std::map<std::size_t, std::string>& row) {
+  void add_list(const std::string& name, const json& list) {
     bool has_names = !list.empty();
     std::set<std::string> seen;
     for (std::size_t i = 0; i < list.size(); ++i) {
@@ -212,7 +169,7 @@ class Records {
       const std::string element = own.is_string() ? own.get<std::string>() : std::to_string(i + 1);
       if (!seen.insert(element).second)
         log_.refuse(0, name, element, "must be the name of one element of a list");
-      add_value(name + "." + element, list[i], row);
+      add_value(name + "." + element, list[i]);
     }
     const std::size_t expected = lengths_.emplace(name, list.size()).first->second;
     if (!has_names && list.size() != expected)
@@ -223,12 +180,19 @@ class Records {
 
   const Log& log_;
   std::map<std::string, std::size_t> lengths_;  ///< of lists, by their name
-  std::vector<std::string> names_;
-  std::map<std::string, std::size_t> index_;
-  std::vector<std::map<std::size_t, std::string>> rows_;
+  NamedColumns columns_;
+  std::size_t row_{0};
 };
 
 constexpr int depth_max = 5;
+
+/// The record of a list of values and one of their names.
+json record_of(const json& names, const json& values) {
+  json record;
+  for (std::size_t i = 0; values.is_array() && i < std::min(names.size(), values.size()); ++i)
+    if (names[i].is_string()) record[names[i].get<std::string>()] = values[i];
+  return record;
+}
 
 /// Tables with the names once: by rows (InfluxDB 1, pandas "split"), by columns, or as series of
 /// times and values (Prometheus).
@@ -239,15 +203,12 @@ bool add_table(const json& object, Records& records) {
     return found != object.end() && found->is_array() ? &*found : nullptr;
   };
   const json* rows = list("values") != nullptr ? list("values") : list("data");
-  if (rows != nullptr && list("columns") != nullptr) {
+  const json* names = list("columns");
+  if (rows != nullptr && names != nullptr) {
+    const json* index = list("index");
     for (std::size_t i = 0; i < rows->size(); ++i) {
-      json record;
-      const std::size_t columns = std::min((*rows)[i].size(), list("columns")->size());
-      for (std::size_t k = 0; k < columns; ++k)
-        if (const json& name = (*list("columns"))[k]; name.is_string() && (*rows)[i].is_array())
-          record[name.get<std::string>()] = (*rows)[i][k];
-      if (list("index") != nullptr && i < list("index")->size())
-        record["time"] = (*list("index"))[i];
+      json record = record_of(*names, (*rows)[i]);
+      if (index != nullptr && i < index->size()) record["time"] = (*index)[i];
       records.add(record);
     }
     return true;
@@ -262,11 +223,11 @@ bool add_table(const json& object, Records& records) {
     }
     return true;
   }
-  const bool has_columns =
-      object.size() > 1 && std::all_of(object.begin(), object.end(), [&](const json& each) {
-        return each.is_array() && each.size() > 1 && each.size() == object.front().size() &&
-               each.front().is_primitive();
-      });
+  const bool has_columns = object.size() > 1 && std::ranges::all_of(object, [&](const json& each) {
+                             return each.is_array() && each.size() > 1 &&
+                                    each.size() == object.front().size() &&
+                                    each.front().is_primitive();
+                           });
   for (std::size_t i = 0; has_columns && i < object.front().size(); ++i) {
     json record;
     for (const auto& [name, values] : object.items()) record[name] = values[i];
@@ -275,31 +236,18 @@ bool add_table(const json& object, Records& records) {
   return has_columns;
 }
 
-/// Collects the tables anywhere in a document.
-void collect_tables(const json& value, int depth, Records& records) {
+/// Collects the tables anywhere in a document or, without `tables`, the records in lists or keyed
+/// by their time.
+void collect(const json& value, bool tables, int depth, Records& records) {
   if (depth > depth_max || !value.is_structured() ||
-      (value.is_object() && add_table(value, records)))
+      (tables && value.is_object() && add_table(value, records)))
     return;
-  for (const json& each : value) collect_tables(each, depth + 1, records);
-}
-
-/// Collects records in lists, or keyed by time.
-void collect(const json& value, int depth, Records& records) {
-  if (depth > depth_max) return;
-  if (value.is_array()) {
-    for (const json& each : value) {
-      if (each.is_object())
-        records.add(each);
-      else
-        collect(each, depth + 1, records);
-    }
-  } else if (value.is_object()) {
-    for (const auto& [key, each] : value.items()) {
-      if (each.is_object() && parse_time_stamp(key))
-        records.add(each, in_quotes(key));
-      else
-        collect(each, depth + 1, records);
-    }
+  for (const auto& [key, each] : value.items()) {
+    const bool is_timed = value.is_object() && parse_time_stamp(key);
+    if (!tables && each.is_object() && (value.is_array() || is_timed))
+      records.add(each, is_timed ? in_quotes(key) : "");
+    else
+      collect(each, tables, depth + 1, records);
   }
 }
 
@@ -313,14 +261,8 @@ PlainTable plain_lines(const Log& log) {
     if (!record.is_object()) log.refuse(line, "", "(other JSON)", "must be an object, {...}");
     records.add(record);
   }
-  PlainTable table;
-  table.text = records.text({});
-  table.lines_above = -1;
-  table.notes.emplace_back("JSON, a record a line; what a record does not have is missing");
-  return table;
+  return {records.text(), {"JSON, a record a line; what a record does not have is missing"}, -1};
 }
-
-}  // namespace
 
 bool is_json(std::string_view text) {
   const std::string_view first = trimmed(text.substr(0, text.find('\n')));
@@ -330,34 +272,32 @@ bool is_json(std::string_view text) {
   return first.starts_with('[') && next != std::string_view::npos && text[next] == '{';
 }
 
-PlainTable plain_json(const Log& log) {
+}  // namespace
+
+std::optional<PlainTable> json_log(const Log& log) {
+  if (!is_json(log.text)) return std::nullopt;
   std::string_view rest = log.text;
   const std::string_view first = trimmed(take_line(rest));
   const bool is_lines = first.starts_with('{') && first.ends_with('}') &&
                         rest.find_first_not_of(" \t\r\n") != std::string_view::npos;
   if (is_lines) return plain_lines(log);
   json document = parsed(log, log.text, 0);
-  if (document.is_object() && document.contains("result")) {
-    json result = document["result"];
-    document = std::move(result);
-  }
+  if (document.is_object() && document.contains("result"))
+    document = json(std::move(document["result"]));
   if (is_store(document)) return plain_store(log, document);
-  PlainTable table;
-  Records records(log);
-  collect_tables(document, 0, records);
+  Records records(log, stated_units(document));
+  collect(document, true, 0, records);
   const bool has_tables = !records.empty();
-  if (!has_tables) collect(document, 0, records);
+  if (!has_tables) collect(document, false, 0, records);
   if (records.empty())
     log.refuse(
         0, "", "(other JSON)",
         "must be records (a line each, a list, or each under its time), lists of values with "
         "their names, or the answer of Moonraker's server/temperature_store, a list "
         "\"temperatures\" for each heater and sensor");
-  table.text = records.text(stated_units(document));
-  table.notes.emplace_back(has_tables
-                               ? "JSON, names once and lists of values"
-                               : "JSON, a row a record; what a record does not have is missing");
-  return table;
+  return PlainTable{records.text(),
+                    {has_tables ? "JSON, names once and lists of values"
+                                : "JSON, a row a record; what a record does not have is missing"}};
 }
 
 }  // namespace thermocomp::forms

@@ -2,7 +2,7 @@
 #include <array>
 #include <map>
 
-#include "config/run_forms/column_roles.hpp"
+#include "config/run_forms/column_meanings.hpp"
 #include "config/run_forms/field_text.hpp"
 #include "config/run_forms/log_form.hpp"
 #include "config/run_forms/spelled_unit.hpp"
@@ -17,16 +17,9 @@ struct Labelled {
   std::vector<std::pair<std::string, std::string>> values;  ///< name and its number or word
   std::string words;  ///< in front of the first name, without levels such as INFO
   [[nodiscard]] bool has_number() const {
-    return std::any_of(values.begin(), values.end(),
-                       [](const auto& value) { return looks_like_number(value.second); });
+    return std::ranges::any_of(values,
+                               [](const auto& value) { return looks_like_number(value.second); });
   }
-};
-
-/// One time of the log with its values, which may stand in several lines.
-struct LabelledRow {
-  std::string time;
-  int line{0};
-  std::vector<std::string> values;
 };
 
 /// Takes the leading time off a line: in brackets, or the longest prefix that is a time.
@@ -79,8 +72,7 @@ std::string_view unit_after(std::string_view rest) {
 
 /// The words of a text, without digits and without the levels of a log.
 std::string words_of(std::string_view text) {
-  constexpr auto levels = std::to_array<std::string_view>(
-      {"info", "warn", "warning", "error", "debug", "trace", "notice"});
+  constexpr std::string_view levels = "|info|warn|warning|error|debug|trace|notice|";
   std::string words;
   std::string word;
   for (const char c : std::string(text) + ' ') {
@@ -103,7 +95,7 @@ class WordsBesideNames {
     auto& counts = counts_[names];
     ++counts[found.words];
     const auto repeated = [](const auto& each) { return each.second > 1; };
-    const auto first = std::find_if(counts.begin(), counts.end(), repeated);
+    const auto first = std::ranges::find_if(counts, repeated);
     const auto second =
         first == counts.end() ? first : std::find_if(std::next(first), counts.end(), repeated);
     if (second == counts.end()) return;
@@ -140,8 +132,6 @@ Labelled labelled_of(std::string_view line) {
   return found;
 }
 
-}  // namespace
-
 bool is_labelled(std::string_view text) {
   constexpr int lines_judged = 20;
   int lines = 0;
@@ -156,13 +146,19 @@ bool is_labelled(std::string_view text) {
   return labelled > 0 && 2 * labelled >= lines;
 }
 
-PlainTable plain_labelled(const Log& log) {
+}  // namespace
+
+std::optional<PlainTable> labelled(const Log& log) {
+  if (!is_labelled(log.text)) return std::nullopt;
   std::map<std::string, bool> has_number;
   for (std::string_view rest = log.text; !rest.empty();)
     for (const auto& [name, value] : labelled_of(take_line(rest)).values)
       has_number[name] |= looks_like_number(value);
-  std::vector<std::string> names;
-  std::vector<LabelledRow> rows;
+  NamedColumns columns;
+  const std::size_t time = columns.add("time");
+  std::vector<int> lines;  // of each row
+  std::string last;        // time, with its values
+  std::map<std::string, std::string> values;
   std::size_t left_out = 0;
   WordsBesideNames words;
   std::string_view rest = log.text;
@@ -175,35 +171,24 @@ PlainTable plain_labelled(const Log& log) {
     }
     words.add(log, line, found);
     // Lines of equal time form one row.
-    if (rows.empty() || rows.back().time != found.time) rows.push_back({found.time, line, {}});
-    std::vector<std::string>& row = rows.back().values;
+    if (lines.empty() || last != found.time) {
+      lines.push_back(line);
+      values.clear();
+    }
+    last = found.time;
+    const std::size_t row = lines.size() - 1;
+    columns.cell(row, time) = in_quotes(last);
     for (const auto& [name, value] : found.values) {
-      const auto i =
-          static_cast<std::size_t>(std::find(names.begin(), names.end(), name) - names.begin());
-      if (i == names.size()) names.push_back(name);
-      row.resize(names.size());
-      if (!row[i].empty() && row[i] != value)
+      const auto [earlier, is_new] = values.emplace(name, value);
+      if (!is_new && earlier->second != value)
         log.refuse(line, name, value,
                    "must be there once at a time, under a name of one word; an earlier value of "
                    "that time is " +
-                       shortened(row[i]));
-      row[i] = value;
+                       shortened(earlier->second));
+      columns.cell(row, columns.find_or_add(name)) = in_quotes(value);
     }
   }
-  PlainTable table;
-  table.lines_above = -1;
-  table.text = "time";
-  for (const std::string& name : names) table.text.append(",").append(in_quotes(name));
-  int line = 0;
-  for (LabelledRow& row : rows) {
-    row.values.resize(names.size());
-    // Empty lines keep the log's line numbers.
-    table.text.append(static_cast<std::size_t>(row.line - line), '\n').append(in_quotes(row.time));
-    for (const std::string& value : row.values) table.text.append(",").append(in_quotes(value));
-    line = row.line;
-  }
-  table.text += '\n';
-  table.notes.emplace_back("lines of a time and named values");
+  PlainTable table{columns.text(lines), {"lines of a time and named values"}, -1};
   if (left_out > 0)
     table.notes.push_back(std::to_string(left_out) + " lines without these left out");
   for (const auto& [name, is_number] : has_number)

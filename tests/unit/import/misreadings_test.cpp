@@ -393,7 +393,14 @@ TEST_CASE("TwinCAT's scope: groups of thousands are read, a scale is refused", "
       {{"groups", head + "\n0\t20,5\t0\t1.234,5\n500\t20,75\t500\t1.234,6\n",
         "time_s,Bed,Way\n0,20.5,1234.5\n0.5,20.75,1234.6\n", ""},
        {"a scale", head + "ScaleFactor\t0,1\tScaleFactor\t1\n\n0\t205\t0\t1\n500\t206\t500\t2\n",
-        "log:4: ScaleFactor = 0,1: may be in the values or not", ""}});
+        "log:4: ScaleFactor = 0,1: may be in the values or not", ""},
+       {"blanks and an empty line", "Name Bed\n\nSampleTime[ms] 500\n0 20.5\n500 20.75\n",
+        "time_s,Bed\n0,20.5\n0.5,20.75\n", ""}});
+}
+
+TEST_CASE("halsampler's lines may end with CR LF", "[import]") {
+  check_all({{"two rows", "20.5\r\n20.75\r\n", "time_s,t1_degC\n0,20.5\n1,20.75\n",
+              "names = [\"t1_degC\"]\nperiod_s = 1\n"}});
 }
 
 TEST_CASE("the comments of an LVM are left out", "[import]") {
