@@ -302,6 +302,12 @@ void Operations::note_reference(const PersistentState& state, ReferenceOrigin or
   parts_.keeper.note_reference({wall_now_s(), origin});
 }
 
+void Operations::doubt_reference(const std::string& changed) {
+  ReferenceRecord record = parts_.keeper.reference();
+  record.changed = changed;
+  parts_.keeper.note_reference(record);
+}
+
 void Operations::note_asked(const Command& asked, const CycleHandle::Tracked& outcome) {
   std::erase_if(asked_, [](const Asked& old) { return *old.outcome == Outcome::withdrawn; });
   asked_.push_back({asked, outcome, asking()});
@@ -334,8 +340,6 @@ void Operations::save_state(bool at_once) {
   note_reference(state, ReferenceOrigin::first_values);
   if (const auto& candidate = parts_.cycle.parts().candidate) candidate->add_to(state.correction);
   state.controller = controller_identity(parts_.config.controller);
-  state.good.wall_s = wall_now_s();
-  state.good.config = parts_.config.checksum;
   if (parts_.config.dry_run) {
     // A dry run sends nothing: the saved offsets stay valid.
     const PersistentState& before = parts_.keeper.on_disk().state;

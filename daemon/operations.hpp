@@ -44,6 +44,8 @@ class Operations {
   Operations(const Operations&) = delete;
   Operations& operator=(const Operations&) = delete;
 
+  /// The reference was taken by itself, and then this changed: "bed_degC +12.0 K/h".
+  void doubt_reference(const std::string& changed);
   /// The person for whom the client gives the next command or reload.
   void note_asked_for(const std::string& name) { asked_for_ = name; }
   /// @throws RpcError when the command cannot be queued

@@ -135,17 +135,6 @@ void refuse_impossible_offsets(const DaemonConfig& config, StartState& start) {
   }
 }
 
-/// After a longer stop a machine can have any temperature.
-constexpr double short_stop_s = 600.0;
-
-/// Values of other sensors, or of a time that is not surely a short while ago, mean nothing.
-void judge_good_values(const DaemonConfig& config, GoodValues& good) {
-  good.unread_s = wall_now_s() - good.wall_s;
-  if (good.config == config.checksum && good.unread_s >= 0.0 && good.unread_s <= short_stop_s)
-    return;
-  good = {};
-}
-
 StartState find(const DaemonConfig& config) {
   StartState start;
   PersistentState first;
@@ -178,7 +167,6 @@ StartState find(const DaemonConfig& config) {
 StartState find_start_state(const DaemonConfig& config, Offsets recorded) {
   StartState start = find(config);
   refuse_impossible(config, start);
-  judge_good_values(config, start.state.good);
   // The record is newer than the saved corridor.
   for (const auto& [axis, offset_um] : recorded)
     if (std::isnan(offset_um)) start.state.corridor_um.erase(axis);

@@ -72,7 +72,8 @@ constexpr std::size_t recent_max = 8;
 
 }  // namespace
 
-Supervisor::Supervisor(const Parts& parts) : parts_(parts), events_(parts.journal) {
+Supervisor::Supervisor(const Parts& parts)
+    : parts_(parts), events_(parts.journal), reference_wall_s_(parts.keeper.reference().wall_s) {
   add_status_methods(parts_.server, [this] { return view(); });
   parts_.server.add_method("events", AccessClass::read, [this](const nlohmann::json&) {
     return json_of(EventsAnswer{{parts_.journal.events().begin(), parts_.journal.events().end()}});
@@ -139,18 +140,20 @@ bool Supervisor::take_signals() {
   return asked.stop != 0;
 }
 
-/// A reference from the first values of this start is only as good as the machine was even then:
+/// A reference from the first values of a start is only as good as the machine was even then:
 /// judged once, when a change can be told from the resolution of a module.
 void Supervisor::judge_reference(const Report& report) {
-  constexpr double judged_after_s = 120.0;
-  const double uptime_s = std::chrono::duration<double>(Clock::now() - started_).count();
-  if (reference_judged_ || uptime_s < judged_after_s) return;
-  reference_judged_ = true;
-  ReferenceRecord record = parts_.keeper.reference();
-  const bool is_of_this_start = wall_now_s() - record.wall_s < uptime_s;
-  if (record.origin != ReferenceOrigin::first_values || !is_of_this_start) return;
-  record.changed = change_since_start(parts_.config.model, report, trend_);
-  if (!record.changed.empty()) parts_.keeper.note_reference(record);
+  constexpr std::chrono::seconds judged_after{120};
+  const ReferenceRecord& record = parts_.keeper.reference();
+  if (record.wall_s != reference_wall_s_) {
+    const bool is_by_itself = record.origin == ReferenceOrigin::first_values;
+    reference_wall_s_ = record.wall_s;
+    reference_due_ = is_by_itself ? std::optional(Clock::now() + judged_after) : std::nullopt;
+  }
+  if (!reference_due_ || Clock::now() < *reference_due_) return;
+  reference_due_.reset();
+  const std::string changed = change_since_start(parts_.config.model, report, trend_);
+  if (!changed.empty()) parts_.operations.doubt_reference(changed);
 }
 
 void Supervisor::note_report() {

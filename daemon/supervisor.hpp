@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -102,7 +103,8 @@ class Supervisor {
   Clock::time_point next_health_{};
   Clock::time_point next_note_{};
   Clock::time_point idle_until_{Clock::now()};
-  bool reference_judged_{false};
+  double reference_wall_s_;                         ///< of the newest reference seen
+  std::optional<Clock::time_point> reference_due_;  ///< when it is judged
   std::uint64_t cycles_seen_{0};
   std::vector<BusHealth> buses_;
   ControllerHealth controller_health_;

@@ -166,7 +166,7 @@ enum class Reason : std::uint32_t {
   operator_disabled = 1u << 0,
   controller_disabled = 1u << 1,  ///< disable_signal is 1
   block_lost = 1u << 2,           ///< no good sensor in a block that the model needs
-  signal_lost = 1u << 3,  ///< a signal that the model needs, or disable_signal, is missing
+  signal_lost = 1u << 3,          ///< a signal that the model needs, or disable_signal, is missing
   no_reference = 1u << 4,
   controller_offline = 1u << 5,
   not_synced = 1u << 6,  ///< the applied offset is not known yet

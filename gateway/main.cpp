@@ -145,9 +145,7 @@ std::string ask_device_file(const GatewaySettings& settings) {
 
 /// Runs until a signal. @throws std::exception if a port or file cannot be used
 void run_gateway(const GatewaySettings& settings) {
-  // Blocked before the first thread starts, so that only sigtimedwait() receives them.
   const sigset_t signals = ending_signals();
-  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   Gateway gateway(settings);
   std::printf("%s\n", gateway.ready_line().c_str());
   std::fflush(stdout);
@@ -195,6 +193,9 @@ int run(const GatewayOptions& options) {
     std::printf("%s", ask_device_file(settings).c_str());
     return 0;
   }
+  // Blocked before the first thread starts, so that only sigtimedwait() receives them.
+  const sigset_t signals = ending_signals();
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   set_up_log(settings.log_level);
   run_gateway(settings);
   return 0;

@@ -16,7 +16,8 @@
 namespace thermocomp::cli {
 namespace {
 
-constexpr double week_s = 7.0 * 86400.0;
+constexpr double day_s = 86400.0;
+constexpr double week_s = 7.0 * day_s;
 
 struct ReportOptions {
   std::string history;
@@ -43,7 +44,9 @@ int run_report(const ReportOptions& options) {
   const WallSpan recorded = recorded_span(options.history);
   WallSpan span;
   span.to_s = moment_of(options.to, recorded.to_s, recorded);
-  span.from_s = moment_of(options.from, std::max(recorded.from_s, span.to_s - week_s), recorded);
+  // Of a daemon that stopped long ago its last day is shown too.
+  const double week_before_s = std::min(span.to_s - week_s, recorded.to_s - day_s);
+  span.from_s = moment_of(options.from, std::max(recorded.from_s, week_before_s), recorded);
   if (!(span.to_s > span.from_s)) throw Failure("--from must be before --to");
   if (!(span.within(recorded).length_s() > 0.0))
     throw Failure(options.history + ": nothing was recorded in this period");

@@ -347,7 +347,6 @@ DaemonConfig build(const TomlDocument& document, const fs::path& folder, Files f
   DaemonConfig config;
   config.file = document.name();
   config.text = document.text();
-  config.checksum = sha256_hex(config.text);
   const TomlTable root = document.root();
   const TomlTable model_table = root.table("model");
   config.model_file = read_path(model_table, "file", "model.toml", folder);

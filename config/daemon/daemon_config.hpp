@@ -70,8 +70,7 @@ struct DaemonConfig {
   /// The texts as read, stored in the history to make a replay self-contained.
   std::string text;
   std::string model_text;
-  std::string checksum;        ///< SHA-256 of the text, hexadecimal
-  std::string model_checksum;  ///< ... of the model file
+  std::string model_checksum;  ///< SHA-256 of the model file, hexadecimal
   /// Warnings, one line each: such as flaws of bus files in unused entries.
   std::vector<std::string> remarks;
   ThermalModel model;

@@ -36,23 +36,32 @@ bool same_file(const std::string& a, const std::string& b) {
 constexpr std::size_t same_rows_min = 10;
 constexpr double same_share_min = 0.25;  ///< of the shorter run
 
-/// One number for each stretch of same_rows_min rows that differ from the row before.
-std::vector<std::size_t> stretches_of(const RunFile& run, const std::vector<std::string>& columns) {
-  const auto combine = [](std::size_t hash, std::size_t next) {
-    return hash * 0x9E3779B97F4A7C15U + next;
+/// One number for each stretch of same_rows_min selected rows that differ from the row before, with
+/// the time between them: coarse values of two warm-ups are alike, not their times.
+std::vector<std::size_t> stretches_of(const RunFile& run, const std::vector<std::string>& names) {
+  const auto combine = [](std::size_t hash, double next) {
+    return hash * 0x9E3779B97F4A7C15U + std::hash<double>{}(next);
   };
+  std::vector<const std::vector<double>*> columns;
+  for (const std::string& name : names) columns.push_back(&run.column(name));
+  constexpr double per_s = 1000.0;  // times may be counted from another start
   std::vector<std::size_t> rows;
-  for (std::size_t row = 0; row < run.rows(); ++row) {
+  std::size_t last = 0;
+  double last_s = not_a_number;
+  for (std::size_t row = run.selected_begin; row < run.selected_end; ++row) {
     std::size_t hash = 0;
-    for (const std::string& column : columns)
-      hash = combine(hash, std::hash<double>{}(run.column(column)[row]));
-    if (rows.empty() || rows.back() != hash) rows.push_back(hash);
+    for (const std::vector<double>* column : columns) hash = combine(hash, (*column)[row]);
+    if (hash == last) continue;
+    const double time_s = run.time_s()[row];
+    if (std::isfinite(last_s)) rows.push_back(combine(hash, std::round(per_s * (time_s - last_s))));
+    last = hash;
+    last_s = time_s;
   }
   std::vector<std::size_t> stretches;
   for (std::size_t begin = 0; begin + same_rows_min <= rows.size(); ++begin) {
     std::size_t hash = 0;
     for (std::size_t row = begin; row < begin + same_rows_min; ++row)
-      hash = combine(hash, rows[row]);
+      hash = hash * 0x9E3779B97F4A7C15U + rows[row];
     stretches.push_back(hash);
   }
   return stretches;

@@ -96,9 +96,6 @@ std::string to_text(const PersistentState& state, bool reference_lost,
   file["corridor_um"] = numbers(state.corridor_um);
   file["temp_degC"] = numbers(state.temp_degC);
   if (!state.jumped_from_degC.empty()) file["jumped_from_degC"] = numbers(state.jumped_from_degC);
-  file["good_degC"] = numbers(state.good.temp_degC);
-  if (std::isfinite(state.good.wall_s)) file["good_wall_s"] = state.good.wall_s;
-  file["config"] = state.good.config;
   file["held_degC"] = numbers(state.held_degC);
   file["held_signals"] = numbers(state.held_signals);
   file["correction"] = numbers(state.correction);
@@ -137,9 +134,6 @@ PersistentState from_text(const std::string& text, bool& reference_lost,
   state.controller = file.value("controller", "");
   if (file.contains("corridor_um")) state.corridor_um = numbers(file, "corridor_um");
   if (file.contains("jumped_from_degC")) state.jumped_from_degC = numbers(file, "jumped_from_degC");
-  if (file.contains("good_degC")) state.good.temp_degC = numbers(file, "good_degC");
-  state.good.wall_s = file.value("good_wall_s", not_a_number);
-  state.good.config = file.value("config", "");
   return state;
 }
 

@@ -60,6 +60,11 @@ CorrectionStatus correction_of(const CorrectionConfig& config, const CorrectionR
   return status;
 }
 
+/// What an absent controller reported last is not what it does now.
+bool is_absent(const StatusView& view) {
+  return has_reason(view.report.reasons, Reason::controller_offline);
+}
+
 AxisStatus axis_of(const StatusView& view, const AxisConfig& config, const AxisReport& report) {
   AxisStatus axis{.name = config.name,
                   .unit = unit_of(config.output),
@@ -67,7 +72,7 @@ AxisStatus axis_of(const StatusView& view, const AxisConfig& config, const AxisR
                   .target = report.target_um,
                   .offset = report.offset_um,
                   .offset_max = config.limiter.offset_um_max,
-                  .applied = report.applied_um,
+                  .applied = is_absent(view) ? not_a_number : report.applied_um,
                   .measured = report.measured_um,
                   .synced = report.synced,
                   .driven = report.driven,
@@ -246,10 +251,9 @@ ControllerStatus controller_of(const StatusView& view) {
                           .write = write_of(view)};
   // While it is online, the text is one of Status::warnings.
   if (!status.online && status.last_error.empty()) status.last_error = slow_link_text(view);
-  const bool is_absent = has_reason(view.report.reasons, Reason::controller_offline);
   for (std::size_t i = 0; i < view.config.estimator.signals.size(); ++i)
     status.signals[view.config.estimator.signals[i]] =
-        is_absent ? not_a_number : view.controller.signals[i];
+        is_absent(view) ? not_a_number : view.controller.signals[i];
   if (health.shown_um) {
     status.shown.emplace();
     for (std::size_t i = 0; i < view.config.estimator.axes.size(); ++i)

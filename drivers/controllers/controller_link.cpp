@@ -25,7 +25,7 @@ std::uint32_t WriteGate::synchronised() noexcept {
   in_sync_ = true;
   last_sent_.reset();
   looks_ = 0;
-  unseen_ = false;
+  unseen_.fill(false);
   sent_ = {};
   applied_um_.fill(not_a_number);
   unchanged_since_.fill(++look_);
@@ -40,7 +40,7 @@ std::uint32_t WriteGate::synchronised(const std::array<double, axes_max>& applie
   for (std::size_t axis = 0; axis < axes_max && is_same_link; ++axis) {
     if (std::isfinite(applied_um[axis]) || !std::isfinite(before_um[axis])) continue;
     applied_um_[axis] = before_um[axis];
-    unseen_ = true;
+    unseen_[axis] = true;
   }
   return epoch_;
 }
@@ -68,11 +68,11 @@ nanoseconds WriteGate::next_pause() noexcept {
 bool WriteGate::explains(const std::array<double, axes_max>& applied_um) noexcept {
   bool explained = true;
   ++look_;
-  unseen_ = false;
+  unseen_.fill(false);
   for (std::size_t axis = 0; axis < axes_max; ++axis) {
     const double before_um = applied_um_[axis];
     if (!std::isfinite(applied_um[axis])) {
-      unseen_ = unseen_ || std::isfinite(before_um);
+      unseen_[axis] = std::isfinite(before_um);
       continue;
     }
     const SentLately& lately = sent_[axis];
@@ -110,7 +110,9 @@ void WriteGate::offered(const OffsetCommand& command, nanoseconds computed_at) n
 
 SendVerdict WriteGate::verdict(nanoseconds now) const noexcept {
   if (!in_sync_ || command_.link_epoch != epoch_) return SendVerdict::nothing_to_send;
-  if (unseen_ || now - computed_at_ > renewal_max) return SendVerdict::nothing_to_send;
+  if (now - computed_at_ > renewal_max) return SendVerdict::nothing_to_send;
+  for (std::size_t axis = 0; axis < axes_max; ++axis)
+    if (unseen_[axis] && command_.valid[axis]) return SendVerdict::nothing_to_send;
   if (last_sent_ && now - *last_sent_ > patience()) return SendVerdict::resynchronise;
   for (std::size_t axis = 0; axis < axes_max; ++axis)
     if (starts_elsewhere(axis)) return SendVerdict::resynchronise;

@@ -145,7 +145,7 @@ class WriteGate {
   [[nodiscard]] nanoseconds next_pause() noexcept;
 
   /// @param applied_um  just read [um]; NaN: unknown. An axis that was read back and now is not
-  ///                    may have been moved: nothing is sent until it is read back again.
+  ///                    may have been moved: nothing is sent while such an axis is driven.
   /// @return false: no offset sent explains that of a driven axis (re-homed, overridden). An offset
   ///         under way would be a jump from there: synchronised() must come before the next send.
   [[nodiscard]] bool explains(const std::array<double, axes_max>& applied_um) noexcept;
@@ -175,7 +175,7 @@ class WriteGate {
   };
   std::array<SentLately, axes_max> sent_{};
   std::array<double, axes_max> applied_um_{};  ///< last read-back with a number
-  bool unseen_{false};                         ///< an axis that was read back is not now
+  std::array<bool, axes_max> unseen_{};        ///< was read back and is not now
   /// look() at which the read-back of an axis last jumped.
   std::array<std::uint64_t, axes_max> unchanged_since_{};
   std::array<double, axes_max> slack_um_{};

@@ -204,7 +204,8 @@ void AxisChannel::follow(const AxisInput& input) noexcept {
   const bool reaches = (input.online && input.written) || reads_back_;
   if (is_refused && std::isfinite(input.applied_um)) {
     const auto [low_um, high_um] = std::minmax({limiter_.offset_um(), input.applied_um});
-    limiter_.step(std::clamp(state_.target_um, low_um, high_um), input.dt_s);
+    const double back_um = std::clamp(state_.target_um, low_um, high_um);
+    limiter_.step(in_corridor() ? within_corridor(back_um) : back_um, input.dt_s);
   } else if (state_.read_backs_awaited == 0 && reaches) {
     limiter_.step(in_corridor() ? within_corridor(state_.target_um) : state_.target_um, input.dt_s);
   }

@@ -328,8 +328,7 @@ void report_axis(const Stages& stages, std::size_t axis, AxisReport& out) noexce
   out.displacement_um = stages.prediction.axis_um(axis, stages.learned);
   out.target_um = channel.target_um();
   out.offset_um = channel.offset_um();
-  const bool is_absent = has_reason(stages.record.reasons, Reason::controller_offline);
-  out.applied_um = is_absent ? not_a_number : channel.applied_um();
+  out.applied_um = channel.applied_um();
   out.measured_um = stages.learned.measured_um(axis);
   out.synced = channel.synced();
   out.driven = stages.axes.driven(axis);
@@ -491,11 +490,7 @@ std::vector<std::string> Estimator::restore(const PersistentState& state) {
   stages.mode.enable(state.enabled && refused.empty());
   if (refused.empty() && state.model_reference_degC == reference_numbers(stages.model))
     stages.reference.restore(state.reference_degC, state.reference_signals);
-  stages.sensing.restore(state.temp_degC);
-  for (const auto& [sensor, good_degC] : state.good.temp_degC)
-    stages.sensing.restore(sensor, good_degC, to_nanoseconds(state.good.unread_s));
-  for (const auto& [sensor, from_degC] : state.jumped_from_degC)
-    stages.sensing.restore(sensor, from_degC, nanoseconds{0});
+  stages.sensing.restore(state.temp_degC, state.jumped_from_degC);
   restore_held(stages, state);
   for (std::size_t i = 0; i < stages.axes.size(); ++i) {
     const std::string& name = stages.config.axes[i].name;

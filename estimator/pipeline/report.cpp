@@ -91,12 +91,8 @@ PersistentState persistent_state(const EstimatorConfig& config, const ThermalMod
     add(state.held_signals, signals[i], report.signals[i].held);
   }
   THERMOCOMP_ENSURE(config.sensors.size() == report.sensors.size());
-  for (std::size_t i = 0; i < report.sensors.size(); ++i) {
-    const SensorReport& sensor = report.sensors[i];
-    add(state.jumped_from_degC, config.sensors[i].name, sensor.jumped_from_degC);
-    if (sensor.fault == Fault::none)
-      add(state.good.temp_degC, config.sensors[i].name, sensor.raw_degC);
-  }
+  for (std::size_t i = 0; i < report.sensors.size(); ++i)
+    add(state.jumped_from_degC, config.sensors[i].name, report.sensors[i].jumped_from_degC);
   THERMOCOMP_ENSURE(config.axes.size() == report.axes.size());
   for (std::size_t i = 0; i < report.axes.size(); ++i) {
     state.sign[config.axes[i].name] = config.axes[i].sign;

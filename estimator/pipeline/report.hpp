@@ -90,14 +90,6 @@ struct Report {
   DomainReport domain;
 };
 
-/// Last good value of each sensor, so that a short stop of the daemon is an outage like any other.
-struct GoodValues {
-  std::map<std::string, double> temp_degC;
-  double wall_s{not_a_number};  ///< when, seconds since 1970
-  std::string config;           ///< checksum of the configuration that they were read with
-  double unread_s{0.0};         ///< since then; known at the start only
-};
-
 /// State that survives a restart, by name (the state file).
 struct PersistentState {
   bool enabled{true};
@@ -116,7 +108,6 @@ struct PersistentState {
   std::map<std::string, double> temp_degC;    ///< in use, by temperature column
   /// By sensor with a jump: its value before, so that a restart does not confirm the jump.
   std::map<std::string, double> jumped_from_degC;
-  GoodValues good;
   std::map<std::string, double> held_degC;     ///< InputReport::held_degC, by column
   std::map<std::string, double> held_signals;  ///< SignalReport::held, by column
   /// RunningCorrection::persistent(), "z.gain1" and so on.

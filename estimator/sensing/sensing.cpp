@@ -107,7 +107,9 @@ bool Sensing::all_good() const noexcept {
   return std::all_of(good.begin(), good.end(), [](std::uint8_t each) { return each != 0; });
 }
 
-void Sensing::restore(const std::map<std::string, double>& temps_degC) {
+void Sensing::restore(const std::map<std::string, double>& temps_degC,
+                      const std::map<std::string, double>& jumped_from_degC) {
+  for (const auto& [sensor, from_degC] : jumped_from_degC) blocks_.restore_jump(sensor, from_degC);
   for (std::size_t i = 0; i < columns_.size(); ++i) {
     double temp_degC = not_a_number;
     take_if_finite(temps_degC, columns_[i], temp_degC);
@@ -296,9 +298,9 @@ bool BlockBank::has_other_witness(std::size_t module) const noexcept {
   return false;
 }
 
-void BlockBank::restore(const std::string& name, double good_degC, nanoseconds unread) {
+void BlockBank::restore_jump(const std::string& name, double from_degC) {
   for (Sensor& sensor : sensors_)
-    if (sensor.config.name == name) sensor.screening.restore(good_degC, unread);
+    if (sensor.config.name == name) sensor.screening.restore_jump(from_degC);
 }
 
 bool BlockBank::accept(std::size_t index) noexcept {

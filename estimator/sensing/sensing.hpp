@@ -32,7 +32,7 @@ class BlockBank {
   /// @param expected_degC, sd_K  of a column; NaN: no expectation
   void surround(std::span<const double> expected_degC, std::span<const double> sd_K) noexcept;
   /// Before the first step: the sensor's value before an unconfirmed jump of the previous run.
-  void restore(const std::string& sensor, double good_degC, nanoseconds unread);
+  void restore_jump(const std::string& name, double from_degC);
   /// Confirms the sensor's newest value. @return true if one was waiting
   bool accept(std::size_t sensor) noexcept;
   /// Shape (columns): start of the last confirmed jump of a sensor, which shows that the values
@@ -145,12 +145,10 @@ class Sensing {
   [[nodiscard]] const LostBlocks& lost() const noexcept { return lost_; }
   [[nodiscard]] bool all_good() const noexcept;
 
-  /// Before the first step: temperatures at the end of the previous run, by column.
-  void restore(const std::map<std::string, double>& temps_degC);
-  /// ... the last confirmed value of a sensor, see Screening::restore().
-  void restore(const std::string& sensor, double good_degC, nanoseconds unread) {
-    blocks_.restore(sensor, good_degC, unread);
-  }
+  /// Before the first step: temperatures at the end of the previous run, by column, and the values
+  /// of sensors before an unconfirmed jump.
+  void restore(const std::map<std::string, double>& temps_degC,
+               const std::map<std::string, double>& jumped_from_degC);
   void plan_adoption(const Sensing& previous);
   void adopt(const Sensing& previous) noexcept;
   void visit_state(StateArchive& archive) {

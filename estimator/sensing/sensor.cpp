@@ -138,10 +138,9 @@ void Screening::count(bool refutes) noexcept {
   surroundings_ = {};  // renewed for the next wait
 }
 
-void Screening::restore(double good_degC, nanoseconds unread) noexcept {
-  if (!(good_degC >= config_.temp_degC_min && good_degC <= config_.temp_degC_max)) return;
-  state_.good = {true, good_degC, long_ago};
-  state_.unread = unread;
+void Screening::restore_jump(double from_degC) noexcept {
+  if (!(from_degC >= config_.temp_degC_min && from_degC <= config_.temp_degC_max)) return;
+  state_.good = {true, from_degC, long_ago};
   state_.waiting = true;
 }
 

@@ -77,9 +77,8 @@ class Screening {
     bool module_not_ready{false};
   };
   void surround(const Surroundings& surroundings) noexcept { surroundings_ = surroundings; }
-  /// Before the first reading: the last confirmed value, and the time in which nothing was read
-  /// since; 0 for the value before a jump, which no pause explains.
-  void restore(double good_degC, nanoseconds unread) noexcept;
+  /// Before the first reading: the last confirmed value, of unknown age.
+  void restore_jump(double from_degC) noexcept;
   /// Confirms the newest value in spite of all checks. @return true if one was waiting
   bool accept() noexcept;
 
@@ -95,7 +94,7 @@ class Screening {
   [[nodiscard]] double good_degC() const noexcept { return state_.good.temp_degC; }
   [[nodiscard]] nanoseconds good_at() const noexcept { return state_.good.at; }
   [[nodiscard]] std::uint64_t rejected() const noexcept { return state_.rejected; }
-  /// An unconfirmed value is present, or awaited after restore().
+  /// An unconfirmed value is present, or awaited after restore_jump().
   [[nodiscard]] bool waiting() const noexcept { return state_.waiting; }
   [[nodiscard]] bool shows_unconfirmed() const noexcept {
     return state_.waiting && state_.newest.known;

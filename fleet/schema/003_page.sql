@@ -13,7 +13,7 @@ CREATE VIEW fleet.last_probing WITH (security_invoker = true) AS
 -- the last night's remainder among the machines of the type, 1 the smallest.
 CREATE FUNCTION fleet.page_machines() RETURNS json LANGUAGE sql STABLE AS $$
   WITH shown AS (
-    SELECT state.id, state.name, state.type, state.hall, state.seen, state.departs, state.probability, state.release,
+    SELECT state.id, state.name, state.type, state.hall, state.seen, state.newest, state.night, state.departs, state.probability, state.release,
       state.release_step, probing.at, probing.output, probing.remainder_um, probing.claimed_um,
       (SELECT count(DISTINCT (event.at AT TIME ZONE 'UTC')::date) FROM fleet.event
        WHERE event.machine = state.id AND record->>'name' = 'outside_domain'

@@ -124,7 +124,8 @@ std::vector<AlarmChange> AlarmWatch::update(double now_s, const std::vector<Alar
       place.turned_s = now_s;
     }
     const double lasts_s = now_s - place.turned_s;
-    if (place.is_wrong && !place.is_raised && lasts_s >= raise_after_s_) {
+    const bool is_seen = named.count(entry->first) > 0;
+    if (is_seen && !place.is_raised && lasts_s >= raise_after_s_) {
       place.is_raised = true;
       changes.push_back({true, place.alarm});
     }

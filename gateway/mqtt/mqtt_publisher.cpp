@@ -208,17 +208,17 @@ void MqttPublisher::Parts::retire(const std::vector<TopicState>& present,
     return std::any_of(present.begin(), present.end(),
                        [&](const TopicState& each) { return each.topic == topic; });
   };
-  std::erase_if(last_state, [&](auto& last) {
-    auto& [topic, state] = last;
-    if (is_present(topic)) return false;
-    if (snapshot.is_here) {
+  for (auto last = last_state.begin(); last != last_state.end();) {
+    auto& [topic, state] = *last;
+    const bool is_gone = snapshot.is_here && !is_present(topic);
+    if (is_gone) {
       buffer.push({topic, ""});  // clears it at the broker
-    } else if (state != unknown) {
+    } else if (!is_present(topic) && state != unknown) {
       buffer.push({topic, payload_of(unknown, snapshot.wall_s)});
       state = unknown;
     }
-    return snapshot.is_here;
-  });
+    last = is_gone ? last_state.erase(last) : std::next(last);
+  }
 }
 
 void MqttPublisher::show(const SnapshotPointer& snapshot) {

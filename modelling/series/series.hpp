@@ -29,7 +29,7 @@ struct OutputSeries {
 
 struct Series {
   std::vector<std::string> machines;
-  std::string past_of;  ///< machine of an own past; empty: series of a type
+  std::string past_of;            ///< machine of an own past; empty: series of a type
   std::vector<std::string> runs;  ///< that a model as prior was made from; else empty
   double hours{0.0};
   Columns columns;

@@ -40,8 +40,9 @@ BUGS = [
      "input.controller_written;",
      "(input.controller_written || {P});"),
     ("refused_offset_pent_up", "estimator/axes/axis_bank.cpp",
-     "input.may_change && state_.read_backs_awaited == 0 && reaches)",
-     "input.may_change && (state_.read_backs_awaited == 0 || {P}) && reaches)"),
+     "const double back_um = std::clamp(state_.target_um, low_um, high_um);",
+     "const double back_um =\n"
+     "        {P} ? state_.target_um : std::clamp(state_.target_um, low_um, high_um);"),
     ("new_link_believed_blindly", "estimator/axes/axis_bank.cpp",
      "if (state_.driven_once && !check_.agrees_after_absence(input.applied_um))",
      "if (state_.driven_once && !{P} && !check_.agrees_after_absence(input.applied_um))"),

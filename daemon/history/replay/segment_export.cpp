@@ -142,7 +142,7 @@ void SegmentExport::fill(std::vector<double>& row, std::uint64_t cycle) {
   for (std::size_t i = 0; i < places_.offsets.size(); ++i) {
     row[places_.offsets[i]] = offset_um_[i];
     // The offset shown in a dry run was not applied.
-    row[places_.applied[i]] = dry_run_ ? not_a_number : read_back_um(i, cycle);
+    row[places_.applied[i]] = dry_run_ || !is_read ? not_a_number : read_back_um(i);
     row[places_.measured[i]] = measured_um_[i];
     if (places_.displacement[i] != none) row[places_.displacement[i]] = displacement_um_[i];
   }
@@ -284,10 +284,8 @@ bool SegmentExport::reads_controller(std::uint64_t cycle) const {
 
 /// NaN without read-back: the registers' content, which the record has then, can be an older
 /// offset.
-double SegmentExport::read_back_um(std::size_t axis, std::uint64_t cycle) const {
-  return config_.controller_reads_back && reads_controller(cycle)
-             ? inputs_.controller.applied_um[axis]
-             : not_a_number;
+double SegmentExport::read_back_um(std::size_t axis) const {
+  return config_.controller_reads_back ? inputs_.controller.applied_um[axis] : not_a_number;
 }
 
 /// Offset in effect; with nodes, interpolated at the slide's position.
@@ -295,7 +293,7 @@ double SegmentExport::effect_um(std::size_t axis) const {
   const AxisSpan span = span_of(config_.axes, axis);
   std::array<double, axes_max> nodes_um{};
   for (std::size_t i = 0; i < span.count; ++i) {
-    const double applied_um = read_back_um(span.first + i, record_.cycle);
+    const double applied_um = read_back_um(span.first + i);
     nodes_um[i] = std::isfinite(applied_um) ? applied_um : offset_um_[span.first + i];
   }
   if (span.count == 1) return nodes_um[0];

@@ -83,7 +83,7 @@ class SegmentExport {
   void take_command();
   void take_measured();
   [[nodiscard]] bool reads_controller(std::uint64_t cycle) const;
-  [[nodiscard]] double read_back_um(std::size_t axis, std::uint64_t cycle) const;
+  [[nodiscard]] double read_back_um(std::size_t axis) const;
   [[nodiscard]] double effect_um(std::size_t axis) const;
   void follow(std::uint64_t cycle);
   void give_up_following(const std::string& why);

@@ -59,7 +59,7 @@ struct OpenSegment {
   ChunkEncoder encoder;
 };
 
-/// More than a clock that is slewed drifts in a segment's time.
+/// Smaller steps matter to no report.
 constexpr std::int64_t clock_set_ns = 30'000'000'000;
 
 struct KnownSession {

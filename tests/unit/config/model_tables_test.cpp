@@ -162,6 +162,14 @@ TEST_CASE("a copy, and an export that overlaps another, are of one measurement",
   CHECK(share_rows(run("later.csv", 60, 200, -60.0), day));
   CHECK_FALSE(share_rows(day, run("next.csv", 100, 200, 0.0)));
   CHECK_FALSE(share_rows(day, run("other.csv", 0, 100, 0.0, 3)));
+  // Coarse steps of two warm-ups: the same values, at other times.
+  std::string slow = "time_s,a_degC\n", fast = slow;
+  for (int row = 0; row < 100; ++row) {
+    const std::string value = std::to_string(20.0 + 0.1 * row) + "\n";
+    slow += std::to_string(10 * row + row % 7) + "," + value;
+    fast += std::to_string(9 * row + row % 3) + "," + value;
+  }
+  CHECK_FALSE(share_rows(parse_run(slow, "slow.csv"), parse_run(fast, "fast.csv")));
   CHECK_THROWS_WITH(refuse_overlap(std::vector<RunFile>{day, run("copy.csv", 0, 100, 0.0)}),
                     Catch::Contains("copy.csv") && Catch::Contains("a.csv"));
 }

@@ -189,6 +189,10 @@ TEST_CASE("an axis on its way to an offset sent lately is explained, one elsewhe
   applied_um[0] = not_a_number;
   CHECK(gate.explains(applied_um));
   CHECK(gate.verdict(0s) == SendVerdict::nothing_to_send);
+  const OffsetCommand driven = gate.command();
+  gate.offered(of_epoch(gate.epoch()), 0s);  // the axis is not driven: the others are written
+  CHECK(gate.verdict(0s) == SendVerdict::send);
+  gate.offered(driven, 0s);
   applied_um[0] = 11.0;
   CHECK(gate.explains(applied_um));
   CHECK(gate.verdict(0s) == SendVerdict::send);

@@ -293,18 +293,22 @@ TEST_CASE("a wall clock that is set begins a segment with the new time", "[histo
   const HistoryConfig config = history_config(folder / "h.db");
   const double set_by_s = GENERATE(7200.0, -3600.0);
   nanoseconds set_by{0};
-  WriterClocks clocks = system_clocks();
-  clocks.wall = [&set_by, system = clocks.wall] { return system() + set_by; };
-  RecordedMachine machine(config, 1, 65536, clocks);
+  nanoseconds now = std::chrono::hours(7);
+  const nanoseconds wall_minus_now = std::chrono::seconds(1'780'000'000);
+  RecordedMachine machine(config, 1, 65536,
+                          {[&] { return now; }, [&] { return wall_minus_now + now + set_by; }});
   machine.open();
   machine.run(200);
   machine.writer().work();
   set_by = to_nanoseconds(set_by_s);
   for (int i = 0; i < 3; ++i) {
+    now += std::chrono::seconds(10);
     machine.run(200);
     machine.writer().work();
   }
   machine.stop();
+  now += std::chrono::seconds(1);
+  machine.writer().work();
   const HistoryReader reader(config.file);
   REQUIRE(reader.segments().size() == 2);
   const auto& [before, after] = std::pair(reader.segments()[0], reader.segments()[1]);

@@ -172,21 +172,3 @@ TEST_CASE("offsets of a file are checked against this configuration", "[state]")
     CHECK(start.state.corridor_um.empty());
   }
 }
-
-TEST_CASE("good values count after a short stop with the same configuration", "[state]") {
-  const TempFolder folder;
-  DaemonConfig config = in_folder(folder);
-  config.checksum = "sum";
-  const auto started_with = [&](double ago_s, const char* sum) {
-    PersistentState saved;
-    saved.good = {{{"bed", 21.5}}, wall_now_s() - ago_s, sum, 0.0};
-    REQUIRE(save_state_file(config.state_file, saved).empty());
-    return find_start_state(config).state.good;
-  };
-  const GoodValues good = started_with(60.0, "sum");
-  CHECK(good.temp_degC.size() == 1);
-  CHECK(good.unread_s >= 60.0);
-  CHECK(started_with(3600.0, "sum").temp_degC.empty());
-  CHECK(started_with(-60.0, "sum").temp_degC.empty());  // the clock was set
-  CHECK(started_with(60.0, "another").temp_degC.empty());
-}

@@ -23,7 +23,6 @@ PersistentState sample_state() {
   state.controller = "controller at \"CAN\"";
   state.temp_degC = {{"bed_degC", 21.7}};
   state.jumped_from_degC = {{"bed_front", 21.0}};
-  state.good = {{{"bed_back", 21.5}}, 1.7e9, "sum", 0.0};
   state.held_degC = {{"t1_degC", 24.5}};
   state.held_signals = {{"spindle_rpm", 1200.0}};
   state.correction = {{"z.gain1", 1.08}, {"z.gain1_sd", 0.04}};
@@ -49,9 +48,6 @@ TEST_CASE("a saved state is loaded bit for bit", "[state]") {
   CHECK(loaded.state.controller == state.controller);
   CHECK(loaded.state.temp_degC == state.temp_degC);
   CHECK(loaded.state.jumped_from_degC == state.jumped_from_degC);
-  CHECK(loaded.state.good.temp_degC == state.good.temp_degC);
-  CHECK(loaded.state.good.wall_s == state.good.wall_s);
-  CHECK(loaded.state.good.config == state.good.config);
   CHECK(loaded.state.held_degC == state.held_degC);
   CHECK(loaded.state.held_signals == state.held_signals);
   CHECK(loaded.state.correction == state.correction);

@@ -184,24 +184,3 @@ TEST_CASE("a restart confirms no jump", "[estimator]") {
   CHECK(restarted.report().mode == Mode::compensating);
   CHECK(restarted.estimator.persistent_state(restarted.report()).jumped_from_degC.empty());
 }
-
-TEST_CASE("a short stop of the daemon is an outage like any other", "[estimator]") {
-  EstimatorConfig config = usual_config();
-  for (SensorConfig& sensor : config.sensors) sensor.module = "rack";
-  Machine machine(config);
-  machine.steps(60, {20.0, 26.0});
-  PersistentState saved = machine.estimator.persistent_state(machine.report());
-  CHECK(saved.good.temp_degC == std::map<std::string, double>{{"s1", 20.0}, {"s2", 26.0}});
-  saved.good.unread_s = 8.0;
-  Machine restarted(config);
-  restarted.now = machine.now + 8s;
-  REQUIRE(restarted.estimator.restore(saved).empty());
-  // A module that is not ready, then one set to another unit, then the truth.
-  restarted.steps(600, {24.0, 24.0});
-  CHECK(restarted.report().mode == Mode::starting);
-  CHECK_FALSE(restarted.reports(Reason::sensor_unconfirmed));
-  restarted.steps(600, {68.0, 78.8});
-  CHECK(restarted.reports(Reason::sensor_unconfirmed));
-  restarted.steps(60, {20.3, 25.8});
-  CHECK(restarted.report().mode == Mode::compensating);
-}

@@ -130,6 +130,17 @@ TEST_CASE("a start that does not end raises an alarm, and one that begins clears
   snapshot.status.mode_since_s = 61.0;
   CHECK(names(active_conditions(snapshot)) == std::vector<std::string>{"compensation"});
   CHECK(is_judged(snapshot));
+  // Raised before a restart of the daemon, it stays; one that nobody sees is not raised.
+  AlarmWatch watch(2.0, 2.0);
+  const auto raised = active_conditions(snapshot);
+  CHECK(watch.update(0.0, raised, true).empty());
+  CHECK(watch.update(1.0, {}, false).empty());
+  CHECK(watch.update(3.0, {}, false).empty());
+  CHECK(watch.update(4.0, raised, true).size() == 1);
+  CHECK(watch.update(20.0, {}, false).empty());
+  CHECK(watch.active().size() == 1);
+  static_cast<void>(watch.update(21.0, {}, true));
+  CHECK(watch.update(24.0, {}, true).size() == 1);
   Confirmation slow;
   slow.settle_s = 120.0;
   snapshot.status.confirming = {slow};

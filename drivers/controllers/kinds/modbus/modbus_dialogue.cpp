@@ -217,6 +217,14 @@ bool ModbusDialogue::read_written() {
   return true;
 }
 
+/// An unanswered write may have been taken: the registers as last read are not in effect any more.
+void ModbusDialogue::forget_written() noexcept {
+  for (std::size_t axis = 0; axis < written_.size(); ++axis)
+    if (written_[axis])
+      std::fill_n(state_.applied_um.begin() + static_cast<std::ptrdiff_t>(first_[axis]),
+                  config_.axes[axis].offsets(), not_a_number);
+}
+
 void ModbusDialogue::show_written(std::size_t axis, std::span<const std::uint16_t> words) {
   std::vector<double> written_um = written_[axis]->decode(words);
   if (piezos_[axis]) written_um = {resting_um(*config_.axes[axis].piezo, written_um.front())};
@@ -534,6 +542,7 @@ void ModbusDialogue::lose_by_write() {
   write_taken_ = false;
   if (!connection_.connected() || ending_.load()) return lose(false);
   refused_ ? gate_.paused() : gate_.lost();
+  if (!refused_) forget_written();
   publish(true);
 }
 

@@ -68,6 +68,7 @@ class ModbusDialogue final : public LineUser {
   /// Reads the written registers of axes without read-back. @return false to try again
   bool read_written();
   void show_written(std::size_t axis, std::span<const std::uint16_t> words);
+  void forget_written() noexcept;
   /// Checks that registers without read-back hold the values just written: of the first command,
   /// then once in WriteGate::patience().
   [[nodiscard]] bool has_restarted();
