@@ -13,12 +13,13 @@ import argparse
 import concurrent.futures
 import contextlib
 import json
+import multiprocessing
 import os
 import pathlib
 import random
 import signal
-import subprocess
 import sys
+import tempfile
 import threading
 import time
 import traceback
@@ -41,7 +42,7 @@ LAYOUT = "{:36} {:7} {:>5} {:>8} {:>7} {:>8} {:>6} {:>5} {:>9} {:>6} {:>9} {:>7}
 
 
 def run_one(name, link, seed, programs, keep):
-    """Runs one try in this process and prints its result as the last line."""
+    """Runs one try in this process and prints its result."""
     attack = ALL[name]
     result = None
     rig = rig_module.Rig(programs, link, seed, **attack.choices)
@@ -59,28 +60,41 @@ def run_one(name, link, seed, programs, keep):
     rig_module.print_result(result)
 
 
+forking = multiprocessing.get_context("fork")
 one_bus = threading.Lock()  # all CAN tries share two interfaces
 
 
+def run_in_group(name, link, seed, given, output):
+    """In the child: its own process group, its output in a file, no signal handler of the parent."""
+    os.setsid()
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+    for target in (1, 2):
+        os.dup2(output.fileno(), target)
+    sys.stdout, sys.stderr = (open(target, "w", buffering=1, closefd=False) for target in (1, 2))
+    run_one(name, link, seed, given.bin, given.keep)
+
+
 def start_try(name, link, seed, given):
-    """Result of a try in a child process, with all its processes ended."""
-    command = [sys.executable, str(pathlib.Path(__file__)), "--one", name, "--links", link,
-               "--seed", str(seed), "--bin", given.bin] + (["--keep"] if given.keep else [])
+    """Result of a try in a child process, with all its processes ended. Forked: a guest needs seconds to start
+    Python."""
     limit_s = ALL[name].limit_s + 4 * rig_module.PATIENCE_S
-    process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                               stderr=subprocess.PIPE, text=True, start_new_session=True)
-    try:
-        out, output = process.communicate(timeout=limit_s)
-    except subprocess.TimeoutExpired:
-        out, output = "", f"not done after {limit_s:.0f} s"
-    finally:
+    with tempfile.TemporaryFile("w+") as output:
+        child = forking.Process(target=run_in_group, args=(name, link, seed, given, output))
+        child.start()
+        child.join(limit_s)
+        late = f"not done after {limit_s:.0f} s" if child.is_alive() else ""
         with contextlib.suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
-    lines = [line for line in out.splitlines() if line.startswith("RESULT ")]
-    if not lines:
-        tail = output.strip().splitlines()[-1:] or ["no output"]
-        return failed_try("the attack itself failed: " + tail[0]), output
-    return json.loads(lines[-1][len("RESULT "):]), output
+            os.killpg(child.pid, signal.SIGKILL)
+        child.join()
+        output.seek(0)
+        lines = output.read().splitlines()
+    results = [line for line in lines if line.startswith("RESULT ")]
+    said = "\n".join(line for line in lines if line not in results)
+    if late or not results:
+        tail = [late] if late else lines[-1:] or ["no output"]
+        return failed_try("the attack itself failed: " + tail[0]), said
+    return json.loads(results[-1][len("RESULT "):]), said
 
 
 def failed_try(why):
@@ -221,7 +235,6 @@ def read_options():
     options.add_argument("--list", action="store_true")
     options.add_argument("--keep", action="store_true", help="leaves the files of each try")
     options.add_argument("--verbose", action="store_true", help="print the output of each try")
-    options.add_argument("--one", help=argparse.SUPPRESS)
     given = options.parse_args()
     given.links = given.links.split(",")
     given.seed = random.SystemRandom().randrange(1 << 30) if given.seed is None else given.seed
@@ -237,9 +250,6 @@ def main():
     if not (pathlib.Path(given.bin) / "thermocompd").exists():
         print(f"attack.py: there is no {given.bin}/thermocompd", file=sys.stderr)
         return 2
-    if given.one:
-        run_one(given.one, given.links[0], given.seed, given.bin, given.keep)
-        return 0
     print(f"seed {given.seed}", flush=True)
     return 1 if run_all(given) else 0
 

@@ -86,7 +86,7 @@ boot_user_mode_linux() {
   LD_PRELOAD=$run/whole_registers.so TMPDIR=$memory_place \
     exec timeout -k 5 $((limit_s + 60)) linux.uml "mem=$memory" \
     rootfstype=hostfs rootflags=/ rw con=null con0=null,fd:1 quiet loglevel=3 noreboot \
-    "uml_dir=$run" umid=vm "init=$run/init" "VM_RUN=$run"
+    pty.legacy_count=0 "uml_dir=$run" umid=vm "init=$run/init" "VM_RUN=$run"
 }
 
 # Files that the guest needs before it sees the host's.

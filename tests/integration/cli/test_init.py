@@ -31,14 +31,27 @@ def listens(port):
 
 
 @pytest.fixture(scope="module")
-def foreign():
-    ports = free_port(), free_port()
+def machine():
+    """Ports: modules, PLC, the modules behind a gateway."""
+    ports = free_port(), free_port(), free_port()
     machine = subprocess.Popen([sys.executable, HERE / "foreign_machine.py", *map(str, ports)],
                                stderr=subprocess.DEVNULL)
     eventually(lambda: all(map(listens, ports)), "the devices listen")
     yield ports
     machine.kill()
     machine.wait(PATIENCE_S)
+
+
+@pytest.fixture
+def foreign(machine):
+    """A search for units gets an answer for each number."""
+    return machine[2], machine[1]
+
+
+@pytest.fixture
+def silent(machine):
+    """A search for units waits for each number without a unit."""
+    return machine[0], machine[1]
 
 
 @pytest.fixture
@@ -120,8 +133,8 @@ def test_invalid_answers_and_searches_for_presets(foreign, folder):
     assert lists[0] == lists[1] and "pt100" in lists[0].lower() and "rtd" in lists[0].lower()
 
 
-def test_interview_on_a_terminal(foreign, folder):
-    modules, plc = foreign
+def test_interview_on_a_terminal(silent, folder):
+    modules, plc = silent
     config = folder / "thermocompd.toml"
     answers = [f"tcp:127.0.0.1:{modules}", "",  # one bus
                "wago_750_458", NAMES,

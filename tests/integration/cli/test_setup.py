@@ -7,7 +7,7 @@ from conftest import SOURCE
 
 DPKG_QUERY = """#!/bin/sh
 for last; do :; done
-grep -qx "$last" "$FAKE/installed" && printf installed
+[ -e "$FAKE/installed/$last" ] && printf installed
 """
 APT_GET = """#!/bin/sh
 echo "$@" >> "$FAKE/calls"
@@ -16,7 +16,7 @@ case "$*" in
 esac
 [ -e "$FAKE/lists" ] || exit 100
 case "$*" in *--simulate*) exit 0 ;; esac
-for word; do echo "$word" >> "$FAKE/installed"; done
+for word; do : > "$FAKE/installed/$word"; done
 """
 
 
@@ -26,7 +26,8 @@ def system(tmp_path):
                        ("id", "#!/bin/sh\necho 0\n")):
         (tmp_path / name).write_text(text)
         (tmp_path / name).chmod(0o755)
-    (tmp_path / "installed").write_text("cmake\n")
+    (tmp_path / "installed").mkdir()
+    (tmp_path / "installed" / "cmake").touch()
     (tmp_path / "calls").write_text("")
     return tmp_path
 

@@ -28,6 +28,23 @@ def headless(folder, *arguments):
         driver.quit()
 
 
+@contextlib.contextmanager
+def fresh_tab(driver):
+    """A new tab, which has no overrides of an earlier test, in a browser without its cookies, its cache and its
+    messages. Origins differ by their ports."""
+    old = driver.current_window_handle
+    driver.switch_to.new_window("tab")
+    new = driver.current_window_handle
+    driver.switch_to.window(old)
+    driver.close()
+    driver.switch_to.window(new)
+    driver.execute_cdp_cmd("Network.clearBrowserCookies", {})
+    driver.execute_cdp_cmd("Network.clearBrowserCache", {})
+    driver.get_log("browser")
+    yield
+    driver.get("about:blank")  # nothing of this page is running when its gateway ends
+
+
 @functools.cache
 def axe_core(address):
     """Source of axe-core, which Chromium contains for Lighthouse.
