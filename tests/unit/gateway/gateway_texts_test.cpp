@@ -151,8 +151,8 @@ TEST_CASE("adapter lines contain all items once, then changes", "[gateway][shdr]
         "2026-03-01T08:30:00.125Z|system|NORMAL||||\n"
         "2026-03-01T08:30:00.125Z|system|FAULT|block_lost|||an input of the model has no good "
         "sensor left\n"
-        "2026-03-01T08:30:00.125Z|system|FAULT|signal_lost|||a position or operating signal that "
-        "the model needs is missing\n");
+        "2026-03-01T08:30:00.125Z|system|FAULT|signal_lost|||a signal of the controller is missing "
+        "that the model or disable_signal needs\n");
   CHECK(shdr_lines(second, first, snapshot.wall_s) ==
         "2026-03-01T08:30:00.125Z|mode|compensating\n"
         "2026-03-01T08:30:00.125Z|system|NORMAL||||\n");
