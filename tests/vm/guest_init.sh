@@ -11,12 +11,15 @@ mount -t tmpfs tmpfs /dev/shm
 mount -t devpts devpts /dev/pts
 mount -t tmpfs tmpfs /run
 
+if [ -e /proc/sys/kernel/hotplug ]; then echo > /proc/sys/kernel/hotplug; fi  # no such program
 uml_modules=/usr/lib/uml/modules/$(uname -r)/kernel
 if [ -d "$uml_modules" ]; then
   for module in net/can/can net/can/can-raw net/can/can-bcm drivers/net/can/dev/can-dev \
                 drivers/net/can/vcan drivers/net/can/slcan/slcan; do
     insmod "$uml_modules/$module.ko" || echo "guest: insmod $module failed"
   done
+  # The kernel starts it for each name of a missing interface, for a second, and there is nothing it could find.
+  echo > /proc/sys/kernel/modprobe
 fi
 ip link set lo up
 for interface in vcan0 vcan1; do
