@@ -84,10 +84,11 @@ std::string to_text(const PersistentState& state, bool reference_lost,
   file["enabled"] = state.enabled;
   if (reference_lost) file["reference_lost"] = true;
   file["reference_degC"] = numbers(state.reference_degC);
-  if (reference.is_known())
-    file["reference_taken"] = {{"wall_s", reference.wall_s},
-                               {"by", to_string(reference.origin)},
-                               {"changed", reference.changed}};
+  if (reference.is_known()) {
+    json& taken = file["reference_taken"];
+    taken = {{"wall_s", reference.wall_s}, {"by", to_string(reference.origin)}};
+    if (!reference.changed.empty()) taken["changed"] = reference.changed;
+  }
   file["model_reference_degC"] = numbers(state.model_reference_degC);
   file["reference_signals"] = numbers(state.reference_signals);
   file["offset_um"] = numbers(state.offset_um);

@@ -198,11 +198,12 @@ void AxisChannel::move(const AxisInput& input) noexcept {
 /// Without read-back the offset moves only while writes are confirmed: the first offset sent on a
 /// new link must be the one applied last. A controller that refuses an offset, as beyond a limit of
 /// its own, may take the one in effect: the offset goes back to it, no further, if the target is
-/// on that side.
+/// on that side. A value from farther away than the offset went since the last confirmed write is
+/// none of ours, such as another axis' register.
 void AxisChannel::follow(const AxisInput& input) noexcept {
   const bool is_refused = input.online && !input.written;
   const bool reaches = (input.online && input.written) || reads_back_;
-  if (is_refused && std::isfinite(input.applied_um)) {
+  if (is_refused && can_be_ours(input.applied_um)) {
     const auto [low_um, high_um] = std::minmax({limiter_.offset_um(), input.applied_um});
     const double back_um = std::clamp(state_.target_um, low_um, high_um);
     limiter_.step(in_corridor() ? within_corridor(back_um) : back_um, input.dt_s);

@@ -31,7 +31,7 @@ class DaemonFeed {
   [[nodiscard]] SnapshotPointer newest() const;
   /// False if the feed's thread stands still.
   [[nodiscard]] bool follows() const;
-  static constexpr std::chrono::seconds follows_within{4};
+  static constexpr std::chrono::seconds follows_within{10};
   /// History file from the configuration, else from the daemon; empty: unknown.
   [[nodiscard]] std::filesystem::path history_file() const;
 

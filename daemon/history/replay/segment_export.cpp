@@ -136,7 +136,8 @@ void SegmentExport::fill(std::vector<double>& row, std::uint64_t cycle) {
   for (std::size_t i = 0; i < places_.sensors.size(); ++i)
     if (places_.sensors[i] != none) row[places_.sensors[i]] = good_value(inputs_.readings[i]);
   write_faults();
-  const bool is_read = reads_controller(cycle);
+  // What an absent controller reported last is not what it does now.
+  const bool is_read = inputs_.controller.online;
   for (std::size_t i = 0; i < places_.signals.size(); ++i)
     row[places_.signals[i]] = is_read ? inputs_.controller.signals[i] : not_a_number;
   for (std::size_t i = 0; i < places_.offsets.size(); ++i) {
@@ -273,13 +274,6 @@ void SegmentExport::take_measured() {
                        .displacement_um = displacement_um_[axis],
                        .sd_um = command.sd_nm > 0 ? 1e-3 * command.sd_nm : not_a_number,
                        .source = command.source});
-}
-
-/// As in the cycle: what an absent controller reported last is not what it does now.
-bool SegmentExport::reads_controller(std::uint64_t cycle) const {
-  const ControllerState& controller = inputs_.controller;
-  const double age_s = to_seconds(segment_.grid.time_of(cycle) - controller.taken_at);
-  return controller.online && age_s <= config_.compensation.controller_stale_after_s;
 }
 
 /// NaN without read-back: the registers' content, which the record has then, can be an older

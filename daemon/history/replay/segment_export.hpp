@@ -82,7 +82,6 @@ class SegmentExport {
   void take_offsets();
   void take_command();
   void take_measured();
-  [[nodiscard]] bool reads_controller(std::uint64_t cycle) const;
   [[nodiscard]] double read_back_um(std::size_t axis) const;
   [[nodiscard]] double effect_um(std::size_t axis) const;
   void follow(std::uint64_t cycle);

@@ -350,7 +350,7 @@ void HistoryWriter::Parts::request_if_due() {
   const bool large = static_cast<double>(segment->bytes) > config.size_MB_max * 1e6 / 8.0;
   // A segment has the wall time of its begin: a clock that is set later needs another one.
   const std::int64_t set_by_ns = wall_minus_monotonic_ns() - segment->wall_minus_monotonic_ns;
-  const bool was_set = std::abs(set_by_ns) > clock_set_ns;
+  const bool was_set = std::abs(set_by_ns) > clock_set_ns && is_wall_time(clocks.wall().count());
   if (old || large || was_set) request(SegmentReason::periodic);
 }
 

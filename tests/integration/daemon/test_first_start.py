@@ -66,7 +66,8 @@ def test_nothing_moves_before_an_operator_enables_it_and_the_switch_survives(day
     day.show("1:")  # cold now
     eventually(lambda: daemon.axis()["displacement"] == pytest.approx(-WANTED_um, abs=0.05),
                "the model sees it")
-    eventually(lambda: daemon.axis()["driven"], "the controller is back")
+    eventually(lambda: daemon.axis()["driven"] and daemon.axis()["applied"] == 0.0,
+               "the controller is back")
     reported = daemon.status()
     assert reported["axes"][0]["offset"] == 0.0 and reported["axes"][0]["applied"] == 0.0
     assert not reported["model"]["compared"]
