@@ -75,7 +75,7 @@ struct ControllerState {
   /// The newest offsets were confirmed within the last few periods of the link: answered on Modbus,
   /// sent on CAN, taken by the bridge.
   bool written{false};
-  std::array<double, axes_max> applied_um{};  ///< offset in effect, order of the axes [um]
+  std::array<double, axes_max> applied_um{};  ///< in effect; else registers as read last [um]
   std::array<double, signals_max> signals{};  ///< order of the configuration, unit of the name
 
   ControllerState() noexcept {

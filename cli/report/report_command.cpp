@@ -44,7 +44,7 @@ int run_report(const ReportOptions& options) {
   const WallSpan recorded = recorded_span(options.history);
   WallSpan span;
   span.to_s = moment_of(options.to, recorded.to_s, recorded);
-  // Of a daemon that stopped long ago its last day is shown too.
+  // If the daemon stopped long ago, the page includes its last day.
   const double week_before_s = std::min(span.to_s - week_s, recorded.to_s - day_s);
   span.from_s = moment_of(options.from, std::max(recorded.from_s, week_before_s), recorded);
   if (!(span.to_s > span.from_s)) throw Failure("--from must be before --to");

@@ -1,6 +1,6 @@
-/// What each column of a foreign table is, by its name, its content, and the map of --columns: a
-/// quantity in a unit, or what says how values of other columns are to be understood, such as their
-/// unit, whether they are valid, which sensor a row is of.
+/// Meaning of each column of a foreign table, by its name, its content and the map of --columns: a
+/// quantity in a unit, or a statement on the values of other columns (their unit, their validity,
+/// the sensor of a row).
 #pragma once
 
 #include <string>
@@ -46,8 +46,8 @@ struct ColumnMeaning {
   UnitConversion conversion;
 };
 
-/// Of the columns that hold values. Refused columns become problems; notes say what was left out or
-/// taken for granted.
+/// Meanings of the columns that hold values. Refused columns become problems; notes name the
+/// columns left out and the assumptions made.
 [[nodiscard]] std::vector<ColumnMeaning> column_meanings(TextTable& table);
 
 }  // namespace thermocomp

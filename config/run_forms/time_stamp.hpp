@@ -70,7 +70,7 @@ struct TimeStamp {
 /// "Date Time, GMT+01:00": time zone of the column.
 [[nodiscard]] std::optional<double> zone_of_header(std::string_view header);
 
-/// What numbers count from.
+/// Origin and unit of times that are numbers.
 struct Epoch {
   const char* name;
   double low;  ///< the range is the years 2001 to about 2050

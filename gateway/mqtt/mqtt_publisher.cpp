@@ -199,8 +199,8 @@ MqttPublisher::MqttPublisher(const GatewaySettings& settings)
 }
 MqttPublisher::~MqttPublisher() = default;
 
-/// A broker keeps the newest of each topic: while the daemon is away nothing is known of sensors
-/// and axes, and of one that is gone nothing stays.
+/// A broker keeps the newest message of each topic: sensors and axes become unknown while the
+/// daemon is away, and the topic of a removed one is cleared.
 void MqttPublisher::Parts::retire(const std::vector<TopicState>& present,
                                   const Snapshot& snapshot) {
   static const nlohmann::json unknown = {{"known", false}};

@@ -69,9 +69,10 @@ class ModbusDialogue final : public LineUser {
   bool read_written();
   void show_written(std::size_t axis, std::span<const std::uint16_t> words);
   void forget_written() noexcept;
-  /// Checks that registers without read-back hold the values just written: of the first command,
-  /// then once in WriteGate::patience().
+  /// True if registers without read-back hold none of the offsets written.
   [[nodiscard]] bool has_restarted();
+  /// Checks that registers without read-back hold the values just written: of the first command,
+  /// then once in WriteGate::patience(). @return false: the link is lost
   [[nodiscard]] bool compare_written();
   void exchange();
   /// Reads all; begins a new epoch if the read-back is unexplained. @return false if reading failed
