@@ -18,6 +18,8 @@ namespace {
 
 constexpr double day_s = 86400.0;
 constexpr double week_s = 7.0 * day_s;
+/// The newest rows may not be committed yet: an end at most this much after them is their end.
+constexpr double uncommitted_s = 60.0;
 
 struct ReportOptions {
   std::string history;
@@ -44,6 +46,7 @@ int run_report(const ReportOptions& options) {
   const WallSpan recorded = recorded_span(options.history);
   WallSpan span;
   span.to_s = moment_of(options.to, recorded.to_s, recorded);
+  if (span.to_s < recorded.to_s + uncommitted_s) span.to_s = std::min(span.to_s, recorded.to_s);
   // If the daemon stopped long ago, the page includes its last day.
   const double week_before_s = std::min(span.to_s - week_s, recorded.to_s - day_s);
   span.from_s = moment_of(options.from, std::max(recorded.from_s, week_before_s), recorded);
@@ -54,8 +57,8 @@ int run_report(const ReportOptions& options) {
   const double silent_s = static_cast<double>(std::time(nullptr)) - recorded.to_s;
   if (options.to.empty() && silent_s > worth_saying_s)
     std::fprintf(stderr,
-                 "the page ends with the last record, %s ago; --to \"1 min ago\" counts the time "
-                 "since then, in which no daemon ran\n",
+                 "the page ends with the last record, %s ago; --to now counts the time since then, in "
+                 "which no daemon ran\n",
                  duration_text(silent_s).c_str());
   MachineWeek week = machine_week(options.history, span);
   week.machine = options.machine;
