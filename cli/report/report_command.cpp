@@ -56,10 +56,11 @@ int run_report(const ReportOptions& options) {
   constexpr double worth_saying_s = 3600.0;
   const double silent_s = static_cast<double>(std::time(nullptr)) - recorded.to_s;
   if (options.to.empty() && silent_s > worth_saying_s)
-    std::fprintf(stderr,
-                 "the page ends with the last record, %s ago; --to now counts the time since then, in "
-                 "which no daemon ran\n",
-                 duration_text(silent_s).c_str());
+    std::fprintf(
+        stderr,
+        "the page ends with the last record, %s ago; --to now counts the time since then, in "
+        "which no daemon ran\n",
+        duration_text(silent_s).c_str());
   MachineWeek week = machine_week(options.history, span);
   week.machine = options.machine;
   cli::write_file(options.output, week_html(week));

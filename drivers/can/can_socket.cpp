@@ -196,10 +196,16 @@ void CanSocket::look_for_carrier() {
   ifreq request{};
   interface_.copy(std::begin(request.ifr_name), IFNAMSIZ - 1);
   if (::ioctl(socket_, SIOCGIFFLAGS, &request) < 0) return;  // receiving reports the error
-  const bool none = (request.ifr_flags & IFF_RUNNING) == 0;
+  const bool none = (request.ifr_flags & (IFF_UP | IFF_RUNNING)) == IFF_UP;
   if (none == without_carrier_) return;
   without_carrier_ = none;
   enter(none ? CanState::bus_off : CanState::active);
+}
+
+void CanSocket::returned() {
+  without_carrier_ = false;
+  carrier_known_at_ = {};
+  enter(CanState::active);
 }
 
 bool CanSocket::open() {
@@ -213,6 +219,7 @@ bool CanSocket::open() {
   }
   if (!configure()) return false;
   enter(CanState::active);
+  carrier_known_at_ = monotonic_now() + std::chrono::seconds{2};
   look_for_carrier();
   return true;
 }
@@ -266,7 +273,7 @@ void CanSocket::ask_for_room() noexcept {
 std::span<const CanFrame> CanSocket::receive() {
   received_.clear();
   if (!is_open()) return {};
-  if (without_carrier_) look_for_carrier();
+  if (without_carrier_ || monotonic_now() < carrier_known_at_) look_for_carrier();
   buffers_->prepare();
   const int count =
       ::recvmmsg(socket_, buffers_->messages.data(), batch_max, MSG_DONTWAIT, nullptr);
@@ -289,10 +296,7 @@ std::span<const CanFrame> CanSocket::receive() {
       received_.pop_back();
       continue;
     }
-    if (bus_off()) {
-      without_carrier_ = false;
-      enter(CanState::active);
-    }
+    if (bus_off()) returned();
     // The kernel returns a frame of this socket once the interface has sent it.
     if ((buffers_->messages[i].msg_hdr.msg_flags & MSG_CONFIRM) != 0) {
       ++sent_out_;
@@ -328,8 +332,7 @@ void CanSocket::note_error_frame(std::uint32_t error_class, std::span<const std:
   }
   if ((error_class & CAN_ERR_RESTARTED) != 0) {
     ++errors_.restarted;
-    without_carrier_ = false;
-    enter(CanState::active);
+    returned();
   }
   if ((error_class & CAN_ERR_CRTL) != 0 && data.size() >= 2) note_error_state(data[1]);
 }

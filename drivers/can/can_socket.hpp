@@ -136,6 +136,8 @@ class CanSocket {
   void enter(CanState state);
   void report_state();
   void look_for_carrier();
+  /// To the bus, by a frame or the kernel's report; the carrier may follow a second later.
+  void returned();
   void fail(const char* what, int code);
   /// Kernel time stamp of a frame; also records the kernel's count of dropped frames.
   std::optional<nanoseconds> read_control(msghdr& header);
@@ -152,6 +154,9 @@ class CanSocket {
   nanoseconds state_since_;
   /// Opened without a carrier, as a bus-off interface appears; no error frame reports the past.
   bool without_carrier_{false};
+  /// The kernel withdraws the carrier up to a second after a bus-off: an opened socket looks until
+  /// then.
+  nanoseconds carrier_known_at_{};
   bool send_failed_{false};
   std::string error_;
   CanErrors errors_;

@@ -79,7 +79,9 @@ constexpr const char* note_position =
     "UPDATE fleet.uplink SET segment = $3, segment_wall_ns = $4, cycle = $5, sent = sent + $6,"
     " refused = refused + $7, repeated = repeated + $8, newest = greatest(newest, "
     "to_timestamp(nullif($9::float8, 0))),"
-    " seen = now(), program_version = $10 WHERE machine = $1 AND history = $2";
+    " seen = now(), program_version = $10 WHERE machine = $1 AND history = $2"
+    " AND ($11::bigint IS NULL OR (segment, segment_wall_ns, cycle) = ($11, $12::bigint, "
+    "$13::bigint))";
 
 }  // namespace
 
@@ -105,9 +107,8 @@ Progress MachineRows::progress() {
       "SELECT segment, segment_wall_ns, cycle, event_run, event_number FROM fleet.uplink"
       " WHERE machine = $1 AND history = $2",
       machine_, history_);
-  return {{row[0].as<std::int64_t>(), row[1].as<std::int64_t>(), row[2].as<std::uint64_t>()},
-          row[3].as<std::int64_t>(),
-          row[4].as<std::uint64_t>()};
+  position_ = {row[0].as<std::int64_t>(), row[1].as<std::int64_t>(), row[2].as<std::uint64_t>()};
+  return {*position_, row[3].as<std::int64_t>(), row[4].as<std::uint64_t>()};
 }
 
 /// Number of the configuration, model and version; the first row adds them to the store.
@@ -176,10 +177,21 @@ Taken MachineRows::send(const MeansBatch& batch) {
   work.exec_params(insert_probings, machine_, time.text(), output.text(), number.text(),
                    displacement.text(), measured.text(), modelled.text(), claimed.text(), sd.text(),
                    source.text());
-  work.exec_params0(note_position, machine_, history_, batch.after.segment, batch.after.wall_ns,
-                    batch.after.cycle, taken.sent, taken.refused, taken.repeated, end_s,
-                    THERMOCOMP_VERSION);
+  const auto before = [this](auto HistoryPosition::*member) {
+    return position_ ? std::optional((*position_).*member) : std::nullopt;
+  };
+  const pqxx::result noted =
+      work.exec_params(note_position, machine_, history_, batch.after.segment, batch.after.wall_ns,
+                       batch.after.cycle, taken.sent, taken.refused, taken.repeated, end_s,
+                       THERMOCOMP_VERSION, before(&HistoryPosition::segment),
+                       before(&HistoryPosition::wall_ns), before(&HistoryPosition::cycle));
+  if (noted.affected_rows() == 0)
+    throw std::runtime_error(
+        history_ +
+        ": somebody else sends a history of this name as this machine; each machine needs a role "
+        "of its own: thermocomp-fleet add");
   work.commit();
+  if (position_) position_ = batch.after;
   return taken;
 }
 

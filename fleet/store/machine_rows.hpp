@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <pqxx/connection>
 #include <pqxx/transaction>
 #include <string>
@@ -34,7 +35,8 @@ class MachineRows {
   MachineRows(pqxx::connection& store, const std::string& machine, std::string history);
 
   [[nodiscard]] Progress progress();
-  /// @throws pqxx::failure; then nothing was stored, or everything (pqxx::in_doubt_error)
+  /// @throws pqxx::failure; then nothing was stored, or everything (pqxx::in_doubt_error);
+  ///         std::runtime_error if somebody else has sent this history since progress()
   Taken send(const MeansBatch& batch);
   void send(const std::vector<RecordedEvent>& events);
   /// Reports a live uplink without new data.
@@ -47,6 +49,7 @@ class MachineRows {
   pqxx::connection& store_;
   int machine_{0};
   std::string history_;
+  std::optional<HistoryPosition> position_;  ///< in the store; unknown before progress()
 };
 
 }  // namespace thermocomp::fleet

@@ -110,8 +110,9 @@ MigrationResult migrate(pqxx::connection& store, const std::filesystem::path& fo
   return result;
 }
 
-std::string add_machine(pqxx::connection& store, const NewMachine& machine) {
-  std::string password = random_password();
+void add_machine(pqxx::connection& store, const NewMachine& machine,
+                 const std::function<void(const std::string& password)>& keep) {
+  const std::string password = random_password();
   pqxx::work work(store);
   const auto role = work.exec_params1(
                             "INSERT INTO fleet.machine (name, type, hall, approval)"
@@ -126,8 +127,8 @@ std::string add_machine(pqxx::connection& store, const NewMachine& machine) {
                  .append(work.esc(password))
                  .append("'"));
   work.exec0(std::string("ALTER ROLE ").append(name).append(" SET statement_timeout = '60s'"));
+  keep(password);
   work.commit();
-  return password;
 }
 
 }  // namespace thermocomp::fleet

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <pqxx/connection>
 #include <string>
@@ -36,7 +37,9 @@ struct NewMachine {
   bool central_approval{false};
 };
 /// Adds a row, and a role machine_NAME with a generated password.
-/// @return the password. @throws pqxx::sql_error: the name exists or is invalid
-[[nodiscard]] std::string add_machine(pqxx::connection& store, const NewMachine& machine);
+/// @param keep  keeps the password; if it throws, nothing is added
+/// @throws pqxx::sql_error: the name exists or is invalid
+void add_machine(pqxx::connection& store, const NewMachine& machine,
+                 const std::function<void(const std::string& password)>& keep);
 
 }  // namespace thermocomp::fleet

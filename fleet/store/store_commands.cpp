@@ -51,8 +51,8 @@ void write_secret(const fs::path& file, const std::string& text) {
 int add(const std::string& conninfo, const NewMachine& machine, const fs::path& file) {
   if (fs::exists(file)) throw cli::Failure(file.string() + ": already exists");
   pqxx::connection store = open_store(conninfo);
-  const std::string password = add_machine(store, machine);
-  write_secret(file, password + "\n");
+  add_machine(store, machine,
+              [&](const std::string& password) { write_secret(file, password + "\n"); });
   std::printf("added %s; its uplink logs in as machine_%s with the password in %s\n",
               machine.name.c_str(), machine.name.c_str(), file.c_str());
   return cli::exit_success;

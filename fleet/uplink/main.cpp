@@ -29,7 +29,7 @@ int run_once(Uplink& uplink) {
   try {
     while (uplink.send_new()) {
     }
-    return 0;
+    return uplink.all_readable() ? 0 : 1;
   } catch (const std::exception& error) {
     spdlog::error("{}", first_line(error.what()));
     return 1;

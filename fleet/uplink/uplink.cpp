@@ -53,9 +53,28 @@ bool Uplink::send_new() {
                  store_->hostname() != nullptr ? store_->hostname() : "a socket");
   }
   bool is_new = false;
-  for (Source& source : sources_) is_new |= send_new(source);
+  for (Source& source : sources_) is_new |= send_if_readable(source);
   exchange();
   return is_new;
+}
+
+bool Uplink::all_readable() const noexcept {
+  return std::all_of(sources_.begin(), sources_.end(),
+                     [](const Source& source) { return source.error.empty(); });
+}
+
+bool Uplink::send_if_readable(Source& source) {
+  try {
+    const bool is_new = send_new(source);
+    if (!source.error.empty()) spdlog::info("{}: sending again", source.file.string());
+    source.error.clear();
+    return is_new;
+  } catch (const HistoryError& error) {
+    if (source.error != error.what()) spdlog::warn("not sent: {}", error.what());
+    source.error = error.what();
+    source.means.reset();
+    return false;
+  }
 }
 
 /// Problems with a release do not stop the uplink.

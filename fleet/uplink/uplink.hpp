@@ -41,9 +41,12 @@ class Uplink {
  public:
   Uplink(const UplinkSettings& settings, Pace& pace);
 
-  /// Sends new data of all histories. After an error the next call reconnects and resumes.
-  /// @return there was new data. @throws pqxx::failure, HistoryError, Stopped
+  /// Sends new data of all histories; one that cannot be read is reported and does not stop the
+  /// others. After an error the next call reconnects and resumes.
+  /// @return there was new data. @throws pqxx::failure, std::runtime_error, Stopped
   bool send_new();
+  /// At the last send_new().
+  [[nodiscard]] bool all_readable() const noexcept;
   /// Closes the connection; the next send_new() reconnects.
   void hang_up() noexcept;
 
@@ -54,7 +57,9 @@ class Uplink {
     std::optional<HistoryMeans> means;
     std::int64_t event_run{0};
     std::uint64_t event_number{0};
+    std::string error;  ///< why the history cannot be read; empty: it can
   };
+  bool send_if_readable(Source& source);
   bool send_new(Source& source);
   bool send_events(Source& source);
   void exchange();

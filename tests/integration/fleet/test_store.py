@@ -169,10 +169,12 @@ def test_a_migration_that_was_changed_is_refused(store, tmp_path):
     assert store.value("SELECT count(*) FROM pg_tables WHERE tablename = 'half'") == "0"
 
 
-def test_a_password_file_is_never_overwritten(store):
+def test_a_password_is_kept_or_the_machine_is_not_added(store):
     (store.folder / "mill_3.password").write_text("kept")
     assert "already exists" in store.fleet("add", "mill_3", "--type", "mill", "-o", store.folder / "mill_3.password",
                                            status=2)
     assert store.value("SELECT count(*) FROM fleet.machine") == "0"
+    store.fleet("add", "mill_3", "--type", "mill", "-o", store.folder / "no_folder" / "mill_3.password", status=2)
+    assert store.value("SELECT count(*) FROM fleet.machine") == "0"  # its password would be lost
     store.add("mill_4")
     assert (store.folder / "mill_4.password").stat().st_mode & 0o777 == 0o600

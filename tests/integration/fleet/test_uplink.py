@@ -261,6 +261,24 @@ def test_a_damaged_segment_loses_only_itself_and_is_reported(machine):
     assert int(machine.store.value("SELECT damaged FROM fleet.uplink")) > 0
 
 
+def test_a_history_that_cannot_be_read_does_not_stop_the_others(machine):
+    settings = machine.folder / "uplink.toml"
+    unreadable = machine.folder / "other.db"
+    unreadable.write_text("no history")
+    settings.write_text(settings.read_text().replace("history = [", f'history = ["{unreadable}", '))
+    assert f"not sent: {unreadable}" in machine.send(status=1)
+    assert_all_there_once(machine)
+
+
+def test_two_uplinks_with_one_role_are_reported(machine):
+    machine.start()
+    eventually(lambda: machine.count("sample") == len(machine.means), "all rows")
+    # What another computer with a copy of uplink.toml does.
+    machine.store.ask("UPDATE fleet.uplink SET segment_wall_ns = segment_wall_ns + 1")
+    machine.record(hours_ago=5, hours=1)
+    eventually(lambda: "somebody else sends a history of this name" in machine.log.read_text(), "it is reported")
+
+
 def test_a_configuration_is_refused_with_every_problem(machine):
     (machine.folder / "uplink.toml").write_text(
         'format = 1\nmachine = "x"\nstore = "nonsense"\ncpu_percent_max = 0\npassword_file = "none"\nperiod = 3\n')
