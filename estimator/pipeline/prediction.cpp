@@ -77,12 +77,6 @@ void SignalIntake::adopt(const SignalIntake& previous, const std::vector<int>& p
   if (names_ == previous.names_) state_.last = previous.state_.last;
 }
 
-namespace {
-
-constexpr nanoseconds never = nanoseconds::min();
-
-}  // namespace
-
 Reference::Reference(const ThermalModel& model)
     : of_model_file_(model.reference_degC),
       columns_(model.temperature_columns()),

@@ -131,7 +131,6 @@ void Sensing::adopt(const Sensing& previous) noexcept {
 
 namespace {
 
-constexpr nanoseconds never = nanoseconds::min();
 constexpr int no_sensor = -1;
 constexpr int unknown_sensor = -2;  ///< not in the previous bank
 

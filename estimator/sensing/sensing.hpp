@@ -16,6 +16,9 @@
 
 namespace thermocomp {
 
+/// Time of what has not happened.
+inline constexpr nanoseconds never = nanoseconds::min();
+
 /// Block temperatures from sensors: screening, smoothing, differences, mean of a block's sensors.
 /// All sensors and their blocks, in the order of the model's temperature columns.
 class BlockBank {
@@ -36,7 +39,7 @@ class BlockBank {
   /// Confirms the sensor's newest value. @return true if one was waiting
   bool accept(std::size_t sensor) noexcept;
   /// Shape (columns): start of the last confirmed jump of a sensor, which shows that the values
-  /// before it were wrong; min(): none.
+  /// before it were wrong; `never`: none.
   [[nodiscard]] std::span<const nanoseconds> refuted_at() const noexcept { return refuted_at_; }
   /// Screened values before smoothing; one per sensor, NaN: none.
   void screened(nanoseconds now, std::span<double> values_K) const noexcept;
@@ -115,7 +118,7 @@ class BlockBank {
 struct Temperatures {
   std::span<const double> measured_degC;    ///< the last known value where not good
   std::span<const std::uint8_t> good;       ///< measured in this step
-  std::span<const nanoseconds> refuted_at;  ///< start of the last confirmed jump; min(): none
+  std::span<const nanoseconds> refuted_at;  ///< start of the last confirmed jump, or `never`
   std::span<const double> estimated_degC;   ///< measured, or estimated where lost
   bool all_good{false};
   bool complete{false};  ///< each is measured or estimated
