@@ -128,7 +128,7 @@ std::string form_text(std::span<const AxisConfig> nodes) {
   return text.append(number_text(nodes.back().node->position_mm)).append(" mm");
 }
 
-std::string text_of(const DaemonConfig& config, const AxisSpan& span) {
+std::string span_text(const DaemonConfig& config, const AxisSpan& span) {
   const auto nodes = std::span(config.estimator.axes).subspan(span.first, span.count);
   const std::string unit(unit_of(nodes.front().output).symbol);
   Deviations deviations(config, span);
@@ -157,7 +157,7 @@ std::string text_of(const DaemonConfig& config, const AxisSpan& span) {
 std::string travel_deviation_text(const DaemonConfig& config) {
   std::string text;
   for (const AxisSpan& span : axis_spans(config.estimator.axes))
-    if (config.estimator.axes[span.first].node) text += text_of(config, span);
+    if (config.estimator.axes[span.first].node) text += span_text(config, span);
   return text;
 }
 

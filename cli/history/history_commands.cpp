@@ -26,11 +26,6 @@ struct ExportOptions {
   bool sensors{false};
 };
 
-std::optional<HistoryTime> time_or_none(const std::string& text) {
-  if (text.empty()) return std::nullopt;
-  return parse_history_time(text);
-}
-
 /// @return the exit status
 int report_damage(const std::string& history, const std::vector<HistoryDamage>& damage) {
   constexpr std::size_t shown_max = 20;

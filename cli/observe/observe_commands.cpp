@@ -56,11 +56,6 @@ struct EventsOptions {
   bool as_json{false};
 };
 
-std::optional<HistoryTime> time_or_none(const std::string& text) {
-  if (text.empty()) return std::nullopt;
-  return parse_history_time(text);
-}
-
 /// @return the daemon's answer, or the same from a history with the run of each event
 json events_of(const GlobalOptions& global, const EventsOptions& options) {
   if (options.history.empty()) {

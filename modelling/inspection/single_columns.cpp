@@ -91,9 +91,9 @@ std::vector<double> moves_of(const std::vector<double>& values) {
 }
 
 /// The smallest change of a column; 0 with fewer changes than needed to show it.
-double least_step(const std::vector<double>& values, std::size_t changes_min) {
+double least_step(const std::vector<double>& values, std::size_t steps_min) {
   const std::vector<double> steps = moves_of(values);
-  return steps.size() < changes_min ? 0.0 : *std::min_element(steps.begin(), steps.end());
+  return steps.size() < steps_min ? 0.0 : *std::min_element(steps.begin(), steps.end());
 }
 
 /// Sets values beyond the reading's range, as of an open sensor, to missing.

@@ -16,7 +16,7 @@ constexpr std::array<double, 4> shifts_per_s{0.0, 1.0 / 14400.0, 1.0 / 2400.0, 1
 /// Shifts for changes of a film, joint or capacity.
 constexpr std::array<double, 2> part_shifts_per_s{0.0, 1.0 / 2400.0};
 constexpr double new_direction_least = 1e-7;
-constexpr double um = 1e6;
+constexpr double um_per_m = 1e6;
 
 using Vector = Eigen::VectorXd;
 using Matrix = Eigen::MatrixXd;
@@ -96,7 +96,7 @@ class Reducer {
     const auto sensitivities = statics.sensitivities(structure_.rows);
     std::vector<Vector> outputs;
     for (std::size_t i = 0; i < spec_.outputs.size(); ++i) {
-      outputs.push_back(um * restricted(sensitivities[i]));
+      outputs.push_back(um_per_m * restricted(sensitivities[i]));
     }
     if (with_parts) find_parts();
     find_basis(outputs);
@@ -136,7 +136,7 @@ class Reducer {
         BodyGuideway& rows = body.guideways.emplace_back(
             BodyGuideway{guideway.name, guideway.axis, output, guideway.positions_mm, {}});
         for (std::size_t i = 0; i < guideway.places.size(); ++i)
-          rows.rows.push_back(states_of(um * restricted(sensitivities[next++])));
+          rows.rows.push_back(states_of(um_per_m * restricted(sensitivities[next++])));
       }
     }
   }

@@ -14,10 +14,6 @@
 namespace thermocomp {
 namespace {
 
-const Names<ModbusTable> table_names{{"coil", ModbusTable::coil},
-                                     {"discrete_input", ModbusTable::discrete_input},
-                                     {"holding", ModbusTable::holding},
-                                     {"input", ModbusTable::input}};
 const Names<Encoding> encoding_names{
     {"int16", Encoding::int16},   {"uint16", Encoding::uint16},   {"int32", Encoding::int32},
     {"uint32", Encoding::uint32}, {"float32", Encoding::float32}, {"float64", Encoding::float64}};

@@ -6,15 +6,6 @@
 #include "simulator/files/machine_file_parts.hpp"
 
 namespace thermocomp {
-namespace {
-
-const Names<ModbusTable> table_names{{"coil", ModbusTable::coil},
-                                     {"discrete_input", ModbusTable::discrete_input},
-                                     {"holding", ModbusTable::holding},
-                                     {"input", ModbusTable::input}};
-
-}  // namespace
-
 FaultCodes read_fault_codes(const TomlTable& table, std::int64_t low, std::int64_t high) {
   FaultCodes codes;
   for (const auto& [key, fault] : {std::pair{"open_circuit_codes", ChannelFault::open_circuit},

@@ -15,6 +15,11 @@ namespace thermocomp {
 
 inline constexpr double large = 1e9;  ///< limit of numbers without one of their own
 
+inline const Names<ModbusTable> table_names{{"coil", ModbusTable::coil},
+                                            {"discrete_input", ModbusTable::discrete_input},
+                                            {"holding", ModbusTable::holding},
+                                            {"input", ModbusTable::input}};
+
 /// Reads the optional lists open_, short_circuit_codes, over_, under_range_codes and error_codes.
 [[nodiscard]] FaultCodes read_fault_codes(const TomlTable& table, std::int64_t low,
                                           std::int64_t high);

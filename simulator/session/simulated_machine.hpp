@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "drivers/bus_thread.hpp"
 #include "simulator/devices/event_loop.hpp"
 #include "simulator/plant/machine_config.hpp"
 
@@ -16,9 +17,6 @@ namespace thermocomp {
 
 [[nodiscard]] inline double seconds_of(std::chrono::nanoseconds time) {
   return std::chrono::duration<double>(time).count();
-}
-[[nodiscard]] inline std::chrono::nanoseconds from_seconds(double s) {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::duration<double>(s));
 }
 
 struct BusPlace {

@@ -29,6 +29,11 @@ struct HistoryTime {
     const std::string& text,
     std::chrono::nanoseconds now = std::chrono::system_clock::now().time_since_epoch());
 
+/// nullopt for an empty text. @throws std::invalid_argument
+[[nodiscard]] inline std::optional<HistoryTime> time_or_none(const std::string& text) {
+  return text.empty() ? std::nullopt : std::optional(parse_history_time(text));
+}
+
 /// "2026-03-01T08:30:00.123Z"
 [[nodiscard]] std::string utc_text(std::int64_t wall_ns);
 

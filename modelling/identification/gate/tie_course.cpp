@@ -155,9 +155,9 @@ std::vector<TieCourse> thinned(const std::vector<TieCourse>& courses) {
   return result;
 }
 
-class Search {
+class TieSearch {
  public:
-  Search(const GateFile& file, const std::vector<TieCourse>& courses)
+  TieSearch(const GateFile& file, const std::vector<TieCourse>& courses)
       : variables_(variables_of(file)), start_(bounded(file)), courses_(thinned(courses)) {
     Point drawn;
     for (const Variable& each : variables_) drawn.push_back(each.share(each.of(start_)));
@@ -271,7 +271,7 @@ double swing_um(const std::vector<TieCourse>& courses, const TiedCoefficients& k
 }
 
 TiedColumns best_ties(const GateFile& file, const std::vector<TieCourse>& courses) {
-  return Search(file, courses).best();
+  return TieSearch(file, courses).best();
 }
 
 std::string tie_picture(const GateFile& file, const std::vector<TieCourse>& courses,

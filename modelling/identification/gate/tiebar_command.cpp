@@ -20,7 +20,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-struct Options {
+struct TiebarOptions {
   std::string geometry;
   std::string curves;
   std::optional<double> ratio;
@@ -36,7 +36,7 @@ struct Answer {
   std::string text;
 };
 
-void add_one_tie(const Options& options, const TiedColumns& columns, Answer& answer) {
+void add_one_tie(const TiebarOptions& options, const TiedColumns& columns, Answer& answer) {
   const TiedCoefficients k = tied_coefficients(columns);
   if (!options.curves.empty()) cli::write_file(options.curves, design_curves_svg(columns));
   answer.json = {{"Ki_um_per_K", k.ki_um_per_K}, {"Kc_um_per_K", k.kc_um_per_K.front()}};
@@ -71,7 +71,7 @@ Answer ties_answer(const TiedColumns& columns) {
   return answer;
 }
 
-void add_courses(const Options& options, const GateFile& file, Answer& answer) {
+void add_courses(const TiebarOptions& options, const GateFile& file, Answer& answer) {
   std::vector<std::string> notes;
   const std::vector<TieCourse> courses =
       tie_courses(file, cli::RunLoader(options.columns).load(options.course), notes);
@@ -105,7 +105,7 @@ void add_courses(const Options& options, const GateFile& file, Answer& answer) {
     cli::write_file(options.picture, tie_picture(file, courses, best ? &*best : nullptr));
 }
 
-int run(const Options& options) {
+int run_tiebar(const TiebarOptions& options) {
   const GateFile file = load_gate_file(options.geometry);
   Answer answer;
   if (file.columns.ties.size() == 1) {
@@ -126,7 +126,7 @@ int run(const Options& options) {
 }  // namespace
 
 void add_tiebar_command(CLI::App& app, std::function<int()>& action) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<TiebarOptions>();
   CLI::App* sub =
       app.add_subcommand("tiebar", "coefficients of a gate-shaped machine with tie bars");
   sub->add_option("GEOMETRY.toml", options->geometry, "dimensions and materials")->required();
@@ -145,7 +145,7 @@ void add_tiebar_command(CLI::App& app, std::function<int()>& action) {
   sub->add_option("--picture", options->picture, "the courses without ties, as drawn, best (SVG)")
       ->needs(course);
   sub->add_flag("--json", options->json, "result as JSON");
-  sub->callback([options, &action] { action = [options] { return run(*options); }; });
+  sub->callback([options, &action] { action = [options] { return run_tiebar(*options); }; });
 }
 
 }  // namespace thermocomp::identification

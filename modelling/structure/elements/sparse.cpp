@@ -62,12 +62,13 @@ SparseSymmetric combination(double a, const SparseSymmetric& A, double b,
 
 namespace {
 
-constexpr Module module{"thermocomp-cholmod.so", "factorises matrices",
-                        "thermocomp_cholmod_functions", "CHOLMOD (Debian 12: libcholmod3)"};
+constexpr Module cholmod_module{"thermocomp-cholmod.so", "factorises matrices",
+                                "thermocomp_cholmod_functions", "CHOLMOD (Debian 12: libcholmod3)"};
 
 const CholmodFunctions& cholmod() {
   // Retried if loading failed.
-  static const auto& functions = *static_cast<const CholmodFunctions*>(functions_of(module));
+  static const auto& functions =
+      *static_cast<const CholmodFunctions*>(functions_of(cholmod_module));
   return functions;
 }
 

@@ -11,7 +11,7 @@
 namespace thermocomp::structure {
 namespace {
 
-constexpr double um = 1e-6;
+constexpr double m_per_um = 1e-6;
 constexpr double infinite = std::numeric_limits<double>::infinity();
 constexpr double cells_max = 5e6;
 
@@ -51,7 +51,7 @@ class Reader {
       }
       return {};
     }
-    return {values[0] / um, values[1] / um, values[2] / um};
+    return {values[0] / m_per_um, values[1] / m_per_um, values[2] / m_per_um};
   }
 
   /// "x", "-z", or a vector of three numbers, which is normalised.
@@ -82,7 +82,8 @@ class Reader {
     material.name = read_unique_name(table, material_names_);
     material.youngs_modulus_Pa = 1e9 * table.number("youngs_modulus_GPa", Range::above(0, 2000));
     material.poisson_ratio = table.number("poisson_ratio", Range::between(0, 0.49));
-    material.expansion_per_K = um * table.number("expansion_um_per_m_K", Range::between(-50, 200));
+    material.expansion_per_K =
+        m_per_um * table.number("expansion_um_per_m_K", Range::between(-50, 200));
     read_thermal_constants(table, material);
     spec_.materials.push_back(material);
   }

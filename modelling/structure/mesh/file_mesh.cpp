@@ -16,12 +16,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr Module module{"thermocomp-gmsh.so", "reads .msh and STEP files",
-                        "thermocomp_gmsh_functions", "Gmsh's library (Debian 12: libgmsh4.8)"};
+constexpr Module gmsh_module{"thermocomp-gmsh.so", "reads .msh and STEP files",
+                             "thermocomp_gmsh_functions", "Gmsh's library (Debian 12: libgmsh4.8)"};
 
 const GmshFunctions& gmsh() {
   // Retried if loading failed.
-  static const auto& functions = *static_cast<const GmshFunctions*>(functions_of(module));
+  static const auto& functions = *static_cast<const GmshFunctions*>(functions_of(gmsh_module));
   return functions;
 }
 

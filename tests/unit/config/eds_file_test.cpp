@@ -20,7 +20,7 @@ std::string reported(const std::string& text) {
   return reported;
 }
 
-EdsFile good(const std::string& text) {
+EdsFile eds_file(const std::string& text) {
   EdsFile file = read_eds_text(text, "x.eds");
   INFO(reported(text));
   REQUIRE(file.flaws.empty());
@@ -36,7 +36,7 @@ const std::string array =
 }  // namespace
 
 TEST_CASE("objects of a data sheet are found by address and by name", "[eds]") {
-  const EdsFile file = good(test::example("two_channel_module.eds"));
+  const EdsFile file = eds_file(test::example("two_channel_module.eds"));
   REQUIRE(file.objects.size() == 9);
   const EdsObject* value = file.find(ObjectAddress{0x7130, 2});
   REQUIRE(value != nullptr);
@@ -54,7 +54,7 @@ TEST_CASE("objects of a data sheet are found by address and by name", "[eds]") {
 }
 
 TEST_CASE("a part of a name is not found", "[eds]") {
-  const EdsFile file = good(array);
+  const EdsFile file = eds_file(array);
   CHECK(file.find("PV 1").empty());
   CHECK(file.find("").empty());
   CHECK(file.find("Input PV/").empty());
@@ -62,7 +62,7 @@ TEST_CASE("a part of a name is not found", "[eds]") {
 
 TEST_CASE("numbers of a data sheet have the types of CiA 301", "[eds]") {
   const auto type = [](const std::string& code) {
-    return good("[2000]\nParameterName=x\nDataType=" + code + "\n").objects.at(0).type;
+    return eds_file("[2000]\nParameterName=x\nDataType=" + code + "\n").objects.at(0).type;
   };
   CHECK(type("0x0001") == ObjectType{1, false, false});
   CHECK(type("0x0002") == ObjectType{8, true, false});
@@ -76,7 +76,7 @@ TEST_CASE("numbers of a data sheet have the types of CiA 301", "[eds]") {
 }
 
 TEST_CASE("a data sheet may be written as manufacturers do", "[eds]") {
-  const EdsFile file = good(
+  const EdsFile file = eds_file(
       "\xEF\xBB\xBF; a comment\r\n[FileInfo]\r\nDescription=a = b ; c # \"d\"\r\n\r\n"
       "[1A00SUB0A]\r\n  parametername = Temp\xE9rature \r\nDATATYPE=0x7\r\n"
       "[1a00]\r\nParameterName=Mapping\r\nObjectType=9\r\n");
@@ -86,7 +86,7 @@ TEST_CASE("a data sheet may be written as manufacturers do", "[eds]") {
 }
 
 TEST_CASE("CompactSubObj makes as many objects, named by its list or numbered", "[eds]") {
-  const EdsFile file = good(
+  const EdsFile file = eds_file(
       "[7130]\nParameterName=PV\nObjectType=8\nDataType=3\nCompactSubObj=3\n"
       "[7130Name]\nNrOfEntries=1\n2=Spindle\n");
   CHECK(file.names() == std::vector<std::string>{"PV/PV1", "PV/Spindle", "PV/PV3"});

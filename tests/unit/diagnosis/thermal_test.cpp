@@ -68,8 +68,8 @@ node = "column"
 )";
 const std::string room = "[[thermocouple]]\nname = \"room\"\nnode = \"room\"\n";
 
-/// A run of the network, `rows` minutes by small explicit steps.
-RunFile run_of(unsigned seed, int rows) {
+/// A run of the network, a row a minute, by small explicit steps.
+RunFile run_of(unsigned seed, int minutes) {
   std::mt19937 random(seed);
   std::normal_distribution<double> noise(0.0, 0.02);
   std::uniform_int_distribution<int> speed(0, 3);
@@ -80,7 +80,7 @@ RunFile run_of(unsigned seed, int rows) {
   double head = 21.0;
   double column = 21.0;
   double rpm = 0.0;
-  for (int row = 0; row < rows; ++row) {
+  for (int row = 0; row < minutes; ++row) {
     if (row % 60 == 20) rpm = 2000.0 * speed(random);
     const double air = 21.0 + 0.8 * std::sin(row / 200.0);
     const double values[] = {60.0 * row, rpm, air, head + noise(random), column + noise(random)};
