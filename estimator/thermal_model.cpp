@@ -124,6 +124,13 @@ ThermalModel of_axes(ThermalModel model) {
   return model;
 }
 
+bool moves(const ThermalModel& model) {
+  if (!model.terms.empty() || !model.guideways.empty()) return true;
+  for (const std::vector<double>& row : model.matrix_um_per_K)
+    if (std::any_of(row.begin(), row.end(), [](double gain) { return gain != 0.0; })) return true;
+  return false;
+}
+
 bool is_compared(const ThermalModel& model) {
   return model.made_from &&
          std::all_of(model.outputs.begin(), model.outputs.end(), [&](const std::string& output) {

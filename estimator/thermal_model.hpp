@@ -166,6 +166,9 @@ struct ThermalModel {
 /// example or a computed model, it is not known whether size and sign are those of any machine.
 [[nodiscard]] bool is_compared(const ThermalModel& model);
 
+/// Some coefficient is not zero; `thermocomp init` writes zeros.
+[[nodiscard]] bool moves(const ThermalModel& model);
+
 /// nullptr: the output is no diameter.
 [[nodiscard]] const DiameterSpec* diameter_of(const ThermalModel& model,
                                               std::string_view output) noexcept;

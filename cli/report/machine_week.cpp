@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 
 #include "daemon/history/replay/segment_walk.hpp"
 
@@ -89,13 +90,14 @@ class Setups {
   std::map<std::int64_t, ReplaySetup> setups_;
 };
 
-/// Spans of segments with the given `dry_run`; contiguous segments are merged.
+/// Spans of segments with such a setup; contiguous segments are merged.
 std::vector<WallSpan> spans_of(const std::vector<SegmentInfo>& segments, const Setups& setups,
-                               bool dry_run, const WallSpan& span) {
+                               const std::function<bool(const ReplaySetup&)>& is_such,
+                               const WallSpan& span) {
   std::vector<WallSpan> spans;
   for (const SegmentInfo& segment : segments) {
     const ReplaySetup* setup = setups.of(segment);
-    if (setup == nullptr || setup->dry_run != dry_run) continue;
+    if (setup == nullptr || !is_such(*setup)) continue;
     const WallSpan one =
         WallSpan{s_per_ns * static_cast<double>(segment.wall_ns), end_s(segment)}.within(span);
     if (!(one.length_s() > 0.0)) continue;
@@ -105,6 +107,25 @@ std::vector<WallSpan> spans_of(const std::vector<SegmentInfo>& segments, const S
       spans.push_back(one);
   }
   return spans;
+}
+
+/// Adds the spells while something was recorded, with `zero_model` where it applies.
+void add_modes(MachineWeek& week, const std::vector<ModeSpell>& spells,
+               const std::vector<WallSpan>& recorded, const std::vector<WallSpan>& zeros) {
+  for (const ModeSpell& spell : spells)
+    for (const WallSpan& there : recorded) {
+      WallSpan rest = spell.span.within(there);
+      const bool compensates = spell.mode == to_string(Mode::compensating);
+      for (std::size_t i = 0; compensates && i < zeros.size(); ++i) {
+        const WallSpan still = rest.within(zeros[i]);
+        if (!(still.length_s() > 0.0)) continue;
+        if (still.from_s > rest.from_s)
+          week.modes.push_back({{rest.from_s, still.from_s}, spell.mode});
+        week.modes.push_back({still, zero_model});
+        rest.from_s = still.to_s;
+      }
+      if (rest.length_s() > 0.0) week.modes.push_back({rest, spell.mode});
+    }
 }
 
 /// Blanks the offsets during a proving move, which compensates nothing.
@@ -441,16 +462,16 @@ MachineWeek machine_week(const std::filesystem::path& history, const WallSpan& s
   week.modes = daemon_pauses(events, recorded_spans(reader.segments()), span);
   week.recorded_s = span.length_s();
   for (const ModeSpell& pause : week.modes) week.recorded_s -= pause.span.length_s();
-  const std::vector<WallSpan> recorded = merged(recorded_spans(reader.segments()));
-  for (const ModeSpell& spell : mode_spells(events, span))
-    for (const WallSpan& there : recorded)
-      if (const WallSpan part = spell.span.within(there); part.length_s() > 0.0)
-        week.modes.push_back({part, spell.mode});
+  const Setups setups(reader, parser, week.damage);
+  add_modes(week, mode_spells(events, span), merged(recorded_spans(reader.segments())),
+            spans_of(
+                reader.segments(), setups,
+                [](const ReplaySetup& setup) { return !moves(setup.model); }, span));
   week.outages = outages_of(events, span);
   week.sensors = sensors_of(week.course);
-  const Setups setups(reader, parser, week.damage);
-  week.sent = spans_of(reader.segments(), setups, false, span);
-  week.dry_runs = spans_of(reader.segments(), setups, true, span);
+  const auto is_dry_run = [](const ReplaySetup& setup) { return setup.dry_run; };
+  week.sent = spans_of(reader.segments(), setups, std::not_fn(is_dry_run), span);
+  week.dry_runs = spans_of(reader.segments(), setups, is_dry_run, span);
   for (const RecordedEvent& event : events.events)
     if (event.kind == EventKind::command && event.code == to_string(CommandKind::prove))
       if (const ReplaySetup* setup = setups.at(event.wall_s)) leave_out(event, *setup, week.course);

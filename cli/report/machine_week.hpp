@@ -30,6 +30,8 @@ struct WallSpan {
 /// In place of a mode while no daemon ran: stopped, or ended without a stop.
 inline constexpr const char* daemon_stopped = "daemon_stopped";
 inline constexpr const char* daemon_ended = "daemon_ended";
+/// In place of `compensating` with a model of zeros.
+inline constexpr const char* zero_model = "zero_model";
 
 struct ModeSpell {
   WallSpan span;

@@ -32,6 +32,7 @@ std::string local_text(double wall_s, const char* form = "%Y-%m-%d %H:%M") {
 std::string mode_words(const std::string& name) {
   if (name == daemon_stopped) return "the daemon was stopped";
   if (name == daemon_ended) return "no daemon ran, and none was stopped (power cut, crash)";
+  if (name == zero_model) return "nothing to compensate: every coefficient of the model is 0";
   if (name == not_driven) return "an axis was latched, hence not driven: see its events";
   const auto mode = mode_named(name);
   return mode ? std::string(code_text(*mode, name == "dry_run").meaning) : name;
@@ -66,8 +67,9 @@ std::string time_table(const MachineWeek& week) {
     rest -= share;
     rows.push_back({what, duration_text(seconds), fixed(0.1 * share, 1) + " %"});
   };
-  for (const char* mode : {"compensating", not_driven.data(), "holding", "ramping_to_zero",
-                           "disabled", "starting", "dry_run", daemon_stopped, daemon_ended}) {
+  for (const char* mode :
+       {"compensating", zero_model, not_driven.data(), "holding", "ramping_to_zero", "disabled",
+        "starting", "dry_run", daemon_stopped, daemon_ended}) {
     const double seconds = week.mode_s(mode);
     add(mode_words(mode), std::floor(seconds), std::floor(tenths * seconds / whole_s));
   }

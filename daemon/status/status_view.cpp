@@ -328,13 +328,6 @@ std::map<std::string, double> by_axis(const StatusView& view, double AxisReport:
   return figures;
 }
 
-bool moves(const ThermalModel& model) {
-  if (!model.terms.empty() || !model.guideways.empty()) return true;
-  for (const std::vector<double>& row : model.matrix_um_per_K)
-    if (std::any_of(row.begin(), row.end(), [](double gain) { return gain != 0.0; })) return true;
-  return false;
-}
-
 ModelStatus model_of(const StatusView& view) {
   const DomainReport& domain = view.report.domain;
   ModelStatus status{.file = view.config.model_file.string(),

@@ -315,6 +315,36 @@ TEST_CASE("offsets of a dry run are not reported as compensated", "[week]") {
   CHECK_THAT(dry_html, Contains("Nothing was sent.") && !Contains(">offset sent<"));
 }
 
+TEST_CASE("time with a model of zeros is not compensated", "[week]") {
+  const TempFolder folder;
+  const auto config = history_config(folder / "h.db");
+  const WriterClocks clocks{[] { return nanoseconds(0); },
+                            [] { return std::chrono::hours(500000); }};
+  const double zero_s = 3600.0 * 500007.0;
+  const SetupParser parser = [](const SegmentSetup& text) {
+    ReplaySetup setup = parse_test_setup(text);
+    if (std::stod(text.config_text) > 1.0) return setup;
+    setup.model.guideways.clear();
+    setup.model.terms.clear();
+    for (std::vector<double>& row : setup.model.matrix_um_per_K)
+      std::fill(row.begin(), row.end(), 0.0);
+    return setup;
+  };
+  RecordedMachine machine(config, 11, 65536, clocks);
+  machine.start();
+  machine.run(12000);
+  machine.reload(0.5);
+  machine.run(6000);
+  machine.reload(2.0);
+  machine.run(6000);
+  machine.writer().note(mode_at(zero_s - begin_s, "compensating"));
+  machine.stop();
+  const MachineWeek week = machine_week(config.file, recorded_span(config.file), parser);
+  CHECK(week.mode_s("compensating") == Approx(180.0).margin(1.0));
+  CHECK(week.mode_s(zero_model) == Approx(60.0).margin(1.0));
+  CHECK_THAT(week_html(week), Contains("every coefficient of the model is 0"));
+}
+
 TEST_CASE("offsets and probings of a recorded machine equal those of replay", "[week]") {
   const TempFolder folder;
   const auto config = history_config(folder / "h.db");
