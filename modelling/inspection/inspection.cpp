@@ -31,7 +31,7 @@ constexpr std::array<ScoreCurve, 8> score_curves{{
     {"stuck", 2.0, 3},
     {"displacement_step", 10.0, 6},
 }};
-constexpr double of_plain_facts = 0.99;  // coarse, copy, gap, clock: evident in the file
+constexpr double of_plain_facts = 0.99;  // coarse, unit, copy, gap, clock: evident in the file
 
 /// Probability of a score, by kind; docs/inspection.md gives the origin of the constants.
 double probability_of(const std::string& kind, double score) {

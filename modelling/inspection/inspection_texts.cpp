@@ -42,8 +42,9 @@ Json json_of(const Finding& finding, const Inspection& inspection) {
 
 std::string two_digits(double value) {
   char text[32];
-  std::snprintf(text, sizeof text, "%.2g", value);
-  return std::abs(value) >= 100 ? std::to_string(std::lround(value)) : text;
+  std::snprintf(text, sizeof text,
+                std::abs(value) >= 100 && std::abs(value) < 1e6 ? "%.0f" : "%.2g", value);
+  return text;
 }
 
 /// Time after the run's first row: "3 h 20 min".
@@ -95,6 +96,8 @@ std::string sentence(const Finding& finding, const RunFile& run) {
   if (kind == "coarse")
     return finding.column + " is recorded in steps of " + size +
            ", which hide smaller changes: record it with more digits.";
+  if (kind == "unit")
+    return finding.column + " is in kelvin, though its name says degC: subtract 273.15.";
   if (kind == "copy")
     return finding.column + " equals " + finding.other +
            " throughout: one channel was recorded twice.";

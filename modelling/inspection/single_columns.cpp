@@ -24,6 +24,8 @@ constexpr double coarse_um_min = 1.0;
 constexpr std::size_t stuck_rows_min = 10;
 constexpr double others_moved_K_min = 1.0;
 constexpr double stuck_steps_min = 3.0;  ///< least expected motion, in least steps of the reading
+constexpr double zero_degC_in_K = 273.15;
+constexpr double room_degC = 22.0;
 constexpr std::size_t copy_values_min = 20;  // distinct values; fewer agree by chance
 
 Suspicion suspicion(const std::string& kind, const std::string& column, std::size_t run,
@@ -227,6 +229,25 @@ void check_coarse(const RunFile& run, std::size_t index, std::size_t column, Sus
                             run.time_s().back(), least, 10.0));
 }
 
+/// A reading of more than 200 degC throughout that is near the others once it counts as kelvin.
+void check_unit(const RunFile& run, std::size_t index, std::size_t column, Suspicions& found) {
+  constexpr double hot_degC = 200.0;
+  constexpr double near_K = 15.0;
+  const auto is_cool = [](double value) { return value <= hot_degC; };
+  const std::vector<double>& values = run.values[column];
+  const double level_degC = median(values) - zero_degC_in_K;
+  if (!std::isfinite(level_degC) || std::any_of(values.begin(), values.end(), is_cool)) return;
+  std::vector<double> others;
+  for (std::size_t i = 0; i < run.columns.size(); ++i)
+    if (const double other = median(run.values[i]);
+        is_temperature(run.columns[i]) && is_cool(other))
+      others.push_back(other);
+  const double expected_degC = others.empty() ? room_degC : median(others);
+  if (std::abs(level_degC - expected_degC) > near_K) return;
+  found.push_back(suspicion("unit", run.columns[column], index, run.time_s().front(),
+                            run.time_s().back(), zero_degC_in_K, 10.0));
+}
+
 void check_copies(const RunFile& run, std::size_t index, Suspicions& found) {
   for (std::size_t a = 0; a < run.columns.size(); ++a) {
     if (!is_temperature(run.columns[a])) continue;
@@ -270,6 +291,7 @@ void check_values(const std::vector<RunFile>& runs, Suspicions& found) {
     for (std::size_t column = 0; column < run.columns.size(); ++column) {
       const bool reading = is_temperature(run.columns[column]);
       if (reading) check_stuck(run, index, column, found);
+      if (run.columns[column].ends_with("_degC")) check_unit(run, index, column, found);
       if (reading || is_output(run.columns[column])) check_coarse(run, index, column, found);
     }
     check_copies(run, index, found);

@@ -258,6 +258,21 @@ TEST_CASE("a reading controlled to a setpoint is not stuck", "[inspection]") {
   CHECK(find(inspect({run}), "stuck") == nullptr);
 }
 
+TEST_CASE("a reading in kelvin is named, a nozzle of 250 degC is not", "[inspection]") {
+  RunFile run = recording();
+  const auto name = *std::find_if(run.columns.begin(), run.columns.end(),
+                                  [](const std::string& each) { return each.ends_with("_degC"); });
+  const std::vector<double> degC = column(run, name);
+  for (double& value : column(run, name)) value += 273.15;
+  const Inspection inspection = inspect({run});
+  INFO(inspection_text(inspection));
+  REQUIRE(find(inspection, "unit") != nullptr);
+  CHECK(find(inspection, "unit")->column == name);
+  for (std::size_t row = 0; row < degC.size(); ++row)
+    column(run, name)[row] = 250.0 + 0.1 * degC[row];
+  CHECK(find(inspect({run}), "unit") == nullptr);
+}
+
 TEST_CASE("readings in steps of 1 K that stay at a step are not stuck", "[inspection]") {
   RunFile run = recording();
   for (const std::string& name : run.columns)
