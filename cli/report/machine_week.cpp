@@ -336,7 +336,12 @@ std::vector<ModeSpell> daemon_pauses(const WeekEvents& events, std::vector<WallS
       for (const RecordedEvent& event : events.events)
         if (event.kind == EventKind::daemon && event.wall_s < until_s + apart_s)
           asked = event.code == "stopping" || (asked && event.code != "started");
-      pauses.push_back({pause, asked ? daemon_stopped : daemon_ended});
+      const bool runs_on =
+          &one != &recorded.front() &&
+          std::none_of(events.run_ends_s.begin(), events.run_ends_s.end(), [&](const auto& end) {
+            return end.second > until_s - apart_s && end.second < one.from_s;
+          });
+      pauses.push_back({pause, runs_on ? not_recorded : asked ? daemon_stopped : daemon_ended});
     }
     until_s = std::max(until_s, one.to_s);
   }

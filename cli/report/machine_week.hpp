@@ -27,9 +27,11 @@ struct WallSpan {
   [[nodiscard]] WallSpan within(const WallSpan& other) const noexcept;
 };
 
-/// In place of a mode while no daemon ran: stopped, or ended without a stop.
+/// In place of a mode while nothing was recorded: the daemon was stopped, ended without a stop, or
+/// ran on (disk full, clock set).
 inline constexpr const char* daemon_stopped = "daemon_stopped";
 inline constexpr const char* daemon_ended = "daemon_ended";
+inline constexpr const char* not_recorded = "not_recorded";
 /// In place of `compensating` with a model of zeros.
 inline constexpr const char* zero_model = "zero_model";
 
@@ -120,7 +122,7 @@ struct WeekEvents {
   std::map<std::int64_t, double> run_ends_s;  ///< time of the last record of each run of the daemon
 };
 [[nodiscard]] std::vector<ModeSpell> mode_spells(const WeekEvents& events, const WallSpan& span);
-/// Times without a daemon. @param recorded in any order
+/// Times without a record. @param recorded in any order
 [[nodiscard]] std::vector<ModeSpell> daemon_pauses(const WeekEvents& events,
                                                    std::vector<WallSpan> recorded,
                                                    const WallSpan& span);

@@ -30,6 +30,8 @@ std::string local_text(double wall_s, const char* form = "%Y-%m-%d %H:%M") {
 }
 
 std::string mode_words(const std::string& name) {
+  if (name == not_recorded)
+    return "the daemon ran, and nothing was recorded (disk full, clock set)";
   if (name == daemon_stopped) return "the daemon was stopped";
   if (name == daemon_ended) return "no daemon ran, and none was stopped (power cut, crash)";
   if (name == zero_model) return "nothing to compensate: every coefficient of the model is 0";
@@ -69,7 +71,7 @@ std::string time_table(const MachineWeek& week) {
   };
   for (const char* mode :
        {"compensating", zero_model, not_driven.data(), "holding", "ramping_to_zero", "disabled",
-        "starting", "dry_run", daemon_stopped, daemon_ended}) {
+        "starting", "dry_run", not_recorded, daemon_stopped, daemon_ended}) {
     const double seconds = week.mode_s(mode);
     add(mode_words(mode), std::floor(seconds), std::floor(tenths * seconds / whole_s));
   }

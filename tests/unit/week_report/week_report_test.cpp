@@ -136,6 +136,14 @@ TEST_CASE("times without a daemon are listed, stopped or not", "[week]") {
   REQUIRE(week.modes.size() == 2);
   CHECK(week.mode_s(daemon_stopped) == Approx(100.0).margin(1e-3));
   CHECK(week.mode_s(daemon_ended) == Approx(300.4).margin(1e-3));
+  const auto with_full_disk = daemon_pauses(events,
+                                            {{begin_s, begin_s + 1000},
+                                             {begin_s + 1100, begin_s + 1300},
+                                             {begin_s + 1400, begin_s + 1500}},
+                                            {begin_s, begin_s + 1500});
+  REQUIRE(with_full_disk.size() == 2);
+  CHECK(with_full_disk[0].mode == daemon_stopped);
+  CHECK(with_full_disk[1].mode == not_recorded);
   for (const ModeSpell& spell : mode_spells(events, week.span)) week.modes.push_back(spell);
   CHECK(outages_of(events, week.span).empty());  // switched off with the daemon
   const std::string html = week_html(week);
