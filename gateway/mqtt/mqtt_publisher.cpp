@@ -59,6 +59,7 @@ struct MqttPublisher::Parts {
   void run();
   void send_waiting();
   void publish_offline();
+  void note_short_connection();
   void retire(const std::vector<TopicState>& present, const Snapshot& snapshot);
   void sleep(milliseconds time) const;
 
@@ -78,6 +79,8 @@ struct MqttPublisher::Parts {
   int unacknowledged{0};
   milliseconds again_after{again_after_min};
   std::string last_problem;
+  Clock::time_point connected_at;
+  int short_connections{0};  ///< in succession
 };
 
 MqttPublisher::Parts::Parts(const GatewaySettings& settings_in)
@@ -127,6 +130,7 @@ void MqttPublisher::Parts::set_up() {
     spdlog::info("mqtt: connected to {}", parts.settings.mqtt.host);
     parts.again_after = again_after_min;
     parts.is_connected = true;
+    parts.connected_at = Clock::now();
     const std::lock_guard lock(parts.mutex);
     parts.buffer.repeat_newest();
   });
@@ -154,13 +158,27 @@ void MqttPublisher::Parts::run() {
     }
     const std::string problem =
         last_problem.empty() ? text_of(code) : std::exchange(last_problem, "");
-    if (is_connected.exchange(false) || again_after == again_after_min)
+    const bool was_connected = is_connected.exchange(false);
+    if (was_connected || again_after == again_after_min)
       spdlog::warn("mqtt: {} port {}: {}", settings.mqtt.host, settings.mqtt.port, problem);
+    if (was_connected) note_short_connection();
     sleep(again_after);
     again_after = std::min(2 * again_after, again_after_max);
     if (!stops) code = mosquitto_reconnect_async(client);
   }
   if (is_connected) publish_offline();
+}
+
+/// A broker closes a connection when another one with its client_id begins.
+void MqttPublisher::Parts::note_short_connection() {
+  constexpr std::chrono::seconds short_max(10);
+  constexpr int count_max = 3;
+  short_connections = Clock::now() - connected_at < short_max ? short_connections + 1 : 0;
+  if (short_connections == count_max)
+    spdlog::warn(
+        "mqtt: closed within {} s of connecting, {} times: does another program use "
+        "client_id = \"{}\"?",
+        short_max.count(), count_max, settings.mqtt.client_id);
 }
 
 /// Keeps at most `unacknowledged_max` messages in libmosquitto, which resends them after a lost

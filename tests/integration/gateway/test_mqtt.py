@@ -89,6 +89,19 @@ def test_a_broker_that_was_away_gets_missed_events(lab, machine, broker):
     assert "thermocomp_gateway_mqtt_dropped_total 0\n" in gateway.text("/metrics")
 
 
+def test_another_program_with_its_client_id_is_reported(lab, machine, broker):
+    gateway = publisher(lab, machine, broker)
+    # Each takes the broker from the other.
+    other = subprocess.Popen(["mosquitto_sub", "-p", str(broker.port), "-i", "thermocomp-mill_3", "-t", "none"],
+                             stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        eventually(lambda: 'does another program use client_id = "thermocomp-mill_3"?' in gateway.log.read_text(),
+                   "it is reported", patience_s=60.0)
+    finally:
+        other.kill()
+        other.wait()
+
+
 def test_user_password_and_certificate_are_required(lab, machine):
     certificate, key = make_certificate(lab.folder, "broker")
     passwords = lab.folder / "broker.passwords"
