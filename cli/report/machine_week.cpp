@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <limits>
 
 #include "daemon/history/replay/segment_walk.hpp"
 
@@ -329,6 +330,7 @@ std::vector<ModeSpell> daemon_pauses(const WeekEvents& events, std::vector<WallS
   recorded.push_back({span.to_s + apart_s, span.to_s + apart_s});
   std::vector<ModeSpell> pauses;
   double until_s = span.from_s - apart_s;
+  double last_s = -std::numeric_limits<double>::infinity();  // end of the records so far
   for (const WallSpan& one : recorded) {
     const WallSpan pause = WallSpan{until_s, one.from_s}.within(span);
     if (one.from_s - until_s > apart_s && pause.length_s() > 0.0) {
@@ -337,13 +339,19 @@ std::vector<ModeSpell> daemon_pauses(const WeekEvents& events, std::vector<WallS
         if (event.kind == EventKind::daemon && event.wall_s < until_s + apart_s)
           asked = event.code == "stopping" || (asked && event.code != "started");
       const bool runs_on =
-          &one != &recorded.front() &&
-          std::none_of(events.run_ends_s.begin(), events.run_ends_s.end(), [&](const auto& end) {
-            return end.second > until_s - apart_s && end.second < one.from_s;
+          std::isfinite(last_s) &&
+          std::none_of(events.run_ends_s.begin(), events.run_ends_s.end(),
+                       [&](const auto& end) {
+                         return end.second > last_s - apart_s && end.second < one.from_s;
+                       }) &&
+          std::none_of(events.events.begin(), events.events.end(), [&](const Event& event) {
+            return event.kind == EventKind::daemon && event.code == "started" &&
+                   event.wall_s > last_s - apart_s && event.wall_s < one.from_s + apart_s;
           });
       pauses.push_back({pause, runs_on ? not_recorded : asked ? daemon_stopped : daemon_ended});
     }
     until_s = std::max(until_s, one.to_s);
+    last_s = std::max(last_s, one.to_s);
   }
   return pauses;
 }
@@ -469,9 +477,9 @@ MachineWeek machine_week(const std::filesystem::path& history, const WallSpan& s
   for (const ModeSpell& pause : week.modes) week.recorded_s -= pause.span.length_s();
   const Setups setups(reader, parser, week.damage);
   add_modes(week, mode_spells(events, span), merged(recorded_spans(reader.segments())),
-            spans_of(
+            merged(spans_of(
                 reader.segments(), setups,
-                [](const ReplaySetup& setup) { return !moves(setup.model); }, span));
+                [](const ReplaySetup& setup) { return !moves(setup.model); }, span)));
   week.outages = outages_of(events, span);
   week.sensors = sensors_of(week.course);
   const auto is_dry_run = [](const ReplaySetup& setup) { return setup.dry_run; };

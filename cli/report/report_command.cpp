@@ -59,7 +59,7 @@ int run_report(const ReportOptions& options) {
     std::fprintf(
         stderr,
         "the page ends with the last record, %s ago; --to now counts the time since then, in "
-        "which no daemon ran\n",
+        "which nothing was recorded\n",
         duration_text(silent_s).c_str());
   MachineWeek week = machine_week(options.history, span);
   week.machine = options.machine;

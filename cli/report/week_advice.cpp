@@ -207,6 +207,15 @@ std::vector<std::string> advice(const MachineWeek& week) {
   add_suspicions(week, lines);
   add_axes(week, lines);
   add_sensors(week, lines);
+  constexpr double long_s = 600.0;
+  if (week.mode_s(zero_model) > 0.0)
+    lines.emplace_back(
+        "Every coefficient of the model is 0, so nothing is compensated: make a model, as in "
+        "identification.md.");
+  if (const double lost_s = week.mode_s(not_recorded); lost_s > long_s)
+    lines.push_back("Nothing was recorded for " + duration_text(lost_s) +
+                    " of a daemon's run: see whether the history's disk was full, and whether the "
+                    "clock was set.");
   if (week.dry_run)
     lines.emplace_back(
         "Nothing is written to the controller yet (dry run): compare the offsets "

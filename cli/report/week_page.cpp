@@ -31,9 +31,10 @@ std::string local_text(double wall_s, const char* form = "%Y-%m-%d %H:%M") {
 
 std::string mode_words(const std::string& name) {
   if (name == not_recorded)
-    return "the daemon ran, and nothing was recorded (disk full, clock set)";
+    return "nothing was recorded within a run of the daemon (disk full, clock set)";
   if (name == daemon_stopped) return "the daemon was stopped";
-  if (name == daemon_ended) return "no daemon ran, and none was stopped (power cut, crash)";
+  if (name == daemon_ended)
+    return "nothing was recorded, and no daemon was stopped (power cut, crash, disk full)";
   if (name == zero_model) return "nothing to compensate: every coefficient of the model is 0";
   if (name == not_driven) return "an axis was latched, hence not driven: see its events";
   const auto mode = mode_named(name);

@@ -196,7 +196,8 @@ void CanSocket::look_for_carrier() {
   ifreq request{};
   interface_.copy(std::begin(request.ifr_name), IFNAMSIZ - 1);
   if (::ioctl(socket_, SIOCGIFFLAGS, &request) < 0) return;  // receiving reports the error
-  const bool none = (request.ifr_flags & (IFF_UP | IFF_RUNNING)) == IFF_UP;
+  if ((request.ifr_flags & IFF_UP) == 0) return;             // as above
+  const bool none = (request.ifr_flags & IFF_RUNNING) == 0;
   if (none == without_carrier_) return;
   without_carrier_ = none;
   enter(none ? CanState::bus_off : CanState::active);
@@ -273,7 +274,11 @@ void CanSocket::ask_for_room() noexcept {
 std::span<const CanFrame> CanSocket::receive() {
   received_.clear();
   if (!is_open()) return {};
-  if (without_carrier_ || monotonic_now() < carrier_known_at_) look_for_carrier();
+  if (without_carrier_ || carrier_known_at_ != nanoseconds{0}) {
+    const bool is_known = monotonic_now() >= carrier_known_at_;
+    look_for_carrier();  // once more after that time, however seldom this is called
+    if (is_known) carrier_known_at_ = {};
+  }
   buffers_->prepare();
   const int count =
       ::recvmmsg(socket_, buffers_->messages.data(), batch_max, MSG_DONTWAIT, nullptr);

@@ -79,9 +79,7 @@ constexpr const char* note_position =
     "UPDATE fleet.uplink SET segment = $3, segment_wall_ns = $4, cycle = $5, sent = sent + $6,"
     " refused = refused + $7, repeated = repeated + $8, newest = greatest(newest, "
     "to_timestamp(nullif($9::float8, 0))),"
-    " seen = now(), program_version = $10 WHERE machine = $1 AND history = $2"
-    " AND ($11::bigint IS NULL OR (segment, segment_wall_ns, cycle) = ($11, $12::bigint, "
-    "$13::bigint))";
+    " seen = now(), program_version = $10 WHERE machine = $1 AND history = $2";
 
 }  // namespace
 
@@ -137,6 +135,17 @@ int MachineRows::setup_number(pqxx::work& work, const MeansBatch& batch) {
   return find().at(0)[0].as<int>();
 }
 
+/// Whether the store has another position than this sender left.
+bool MachineRows::is_moved(pqxx::work& work) const {
+  const pqxx::result found = work.exec_params(
+      "SELECT segment, segment_wall_ns, cycle FROM fleet.uplink WHERE machine = $1 AND history = "
+      "$2 FOR UPDATE",
+      machine_, history_);
+  return !found.empty() && (found[0][0].as<std::int64_t>() != position_->segment ||
+                            found[0][1].as<std::int64_t>() != position_->wall_ns ||
+                            found[0][2].as<std::uint64_t>() != position_->cycle);
+}
+
 Taken MachineRows::send(const MeansBatch& batch) {
   pqxx::work work(store_);
   const SoundTimes sound(work);
@@ -177,19 +186,10 @@ Taken MachineRows::send(const MeansBatch& batch) {
   work.exec_params(insert_probings, machine_, time.text(), output.text(), number.text(),
                    displacement.text(), measured.text(), modelled.text(), claimed.text(), sd.text(),
                    source.text());
-  const auto before = [this](auto HistoryPosition::*member) {
-    return position_ ? std::optional((*position_).*member) : std::nullopt;
-  };
-  const pqxx::result noted =
-      work.exec_params(note_position, machine_, history_, batch.after.segment, batch.after.wall_ns,
-                       batch.after.cycle, taken.sent, taken.refused, taken.repeated, end_s,
-                       THERMOCOMP_VERSION, before(&HistoryPosition::segment),
-                       before(&HistoryPosition::wall_ns), before(&HistoryPosition::cycle));
-  if (noted.affected_rows() == 0)
-    throw std::runtime_error(
-        history_ +
-        ": somebody else sends a history of this name as this machine; each machine needs a role "
-        "of its own: thermocomp-fleet add");
+  taken.by_another = position_ && is_moved(work);
+  work.exec_params0(note_position, machine_, history_, batch.after.segment, batch.after.wall_ns,
+                    batch.after.cycle, taken.sent, taken.refused, taken.repeated, end_s,
+                    THERMOCOMP_VERSION);
   work.commit();
   if (position_) position_ = batch.after;
   return taken;

@@ -25,6 +25,7 @@ struct Taken {
   std::uint64_t sent{0};
   std::uint64_t refused{0};   ///< impossible time
   std::uint64_t repeated{0};  ///< time already present
+  bool by_another{false};     ///< somebody else has sent of this history since the last send()
 };
 
 class MachineRows {
@@ -35,8 +36,7 @@ class MachineRows {
   MachineRows(pqxx::connection& store, const std::string& machine, std::string history);
 
   [[nodiscard]] Progress progress();
-  /// @throws pqxx::failure; then nothing was stored, or everything (pqxx::in_doubt_error);
-  ///         std::runtime_error if somebody else has sent this history since progress()
+  /// @throws pqxx::failure; then nothing was stored, or everything (pqxx::in_doubt_error)
   Taken send(const MeansBatch& batch);
   void send(const std::vector<RecordedEvent>& events);
   /// Reports a live uplink without new data.
@@ -44,6 +44,7 @@ class MachineRows {
   void greet(std::uint64_t damaged);
 
  private:
+  [[nodiscard]] bool is_moved(pqxx::work& work) const;
   [[nodiscard]] int setup_number(pqxx::work& work, const MeansBatch& batch);
 
   pqxx::connection& store_;

@@ -51,8 +51,18 @@ void write_secret(const fs::path& file, const std::string& text) {
 int add(const std::string& conninfo, const NewMachine& machine, const fs::path& file) {
   if (fs::exists(file)) throw cli::Failure(file.string() + ": already exists");
   pqxx::connection store = open_store(conninfo);
-  add_machine(store, machine,
-              [&](const std::string& password) { write_secret(file, password + "\n"); });
+  bool is_written = false;
+  try {
+    add_machine(store, machine, [&](const std::string& password) {
+      write_secret(file, password + "\n");
+      is_written = true;
+    });
+  } catch (const pqxx::in_doubt_error&) {
+    throw;  // the machine may have been added
+  } catch (const std::exception&) {
+    if (is_written) fs::remove(file);
+    throw;
+  }
   std::printf("added %s; its uplink logs in as machine_%s with the password in %s\n",
               machine.name.c_str(), machine.name.c_str(), file.c_str());
   return cli::exit_success;

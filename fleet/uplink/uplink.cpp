@@ -1,6 +1,7 @@
 #include "fleet/uplink/uplink.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include <spdlog/spdlog.h>
 
@@ -73,6 +74,7 @@ bool Uplink::send_if_readable(Source& source) {
     if (source.error != error.what()) spdlog::warn("not sent: {}", error.what());
     source.error = error.what();
     source.means.reset();
+    if (source.rows) source.rows->greet(1);
     return false;
   }
 }
@@ -109,6 +111,11 @@ bool Uplink::send_new(Source& source) {
     if (taken.refused > 0)
       spdlog::warn("{} of {} rows refused: their time is impossible (clock set wrong?)",
                    taken.refused, taken.sent);
+    if (taken.by_another && !std::exchange(source.by_another, true))
+      spdlog::warn(
+          "another uplink sends {} as this machine, too: a second one on this computer, or one "
+          "with this machine's role (each machine needs its own: thermocomp-fleet add)",
+          source.file.string());
     if (taken.repeated > 0)
       spdlog::info("{} of {} rows were already present", taken.repeated, taken.sent);
     pace_.rest();

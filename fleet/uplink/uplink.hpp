@@ -57,7 +57,8 @@ class Uplink {
     std::optional<HistoryMeans> means;
     std::int64_t event_run{0};
     std::uint64_t event_number{0};
-    std::string error;  ///< why the history cannot be read; empty: it can
+    bool by_another{false};  ///< reported that another uplink sends it, too
+    std::string error;       ///< why the history cannot be read; empty: it can
   };
   bool send_if_readable(Source& source);
   bool send_new(Source& source);

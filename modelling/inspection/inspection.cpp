@@ -29,9 +29,10 @@ constexpr std::array<ScoreCurve, 8> score_curves{{
     {"sensor_loose", 22.0, 6},
     {"sensor_swap", 2.0, 4},
     {"stuck", 2.0, 3},
+    {"unit", 5.0, 2},
     {"displacement_step", 10.0, 6},
 }};
-constexpr double of_plain_facts = 0.99;  // coarse, unit, copy, gap, clock: evident in the file
+constexpr double of_plain_facts = 0.99;  // coarse, copy, gap, clock: evident in the file
 
 /// Probability of a score, by kind; docs/inspection.md gives the origin of the constants.
 double probability_of(const std::string& kind, double score) {

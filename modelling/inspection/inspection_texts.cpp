@@ -97,7 +97,9 @@ std::string sentence(const Finding& finding, const RunFile& run) {
     return finding.column + " is recorded in steps of " + size +
            ", which hide smaller changes: record it with more digits.";
   if (kind == "unit")
-    return finding.column + " is in kelvin, though its name says degC: subtract 273.15.";
+    return finding.column +
+           " agrees with the others if it is in kelvin, though its name says degC: then subtract "
+           "273.15.";
   if (kind == "copy")
     return finding.column + " equals " + finding.other +
            " throughout: one channel was recorded twice.";

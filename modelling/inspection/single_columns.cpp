@@ -25,7 +25,6 @@ constexpr std::size_t stuck_rows_min = 10;
 constexpr double others_moved_K_min = 1.0;
 constexpr double stuck_steps_min = 3.0;  ///< least expected motion, in least steps of the reading
 constexpr double zero_degC_in_K = 273.15;
-constexpr double room_degC = 22.0;
 constexpr std::size_t copy_values_min = 20;  // distinct values; fewer agree by chance
 
 Suspicion suspicion(const std::string& kind, const std::string& column, std::size_t run,
@@ -229,21 +228,29 @@ void check_coarse(const RunFile& run, std::size_t index, std::size_t column, Sus
                             run.time_s().back(), least, 10.0));
 }
 
-/// A reading of more than 200 degC throughout that is near the others once it counts as kelvin.
+double first_value(const std::vector<double>& values) {
+  const auto found =
+      std::find_if(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
+  return found == values.end() ? std::numeric_limits<double>::quiet_NaN() : *found;
+}
+
+/// A reading of more than 200 degC, its drop-outs left out, that begins where the others begin once
+/// it counts as kelvin.
 void check_unit(const RunFile& run, std::size_t index, std::size_t column, Suspicions& found) {
   constexpr double hot_degC = 200.0;
-  constexpr double near_K = 15.0;
+  constexpr double near_K = 5.0;
+  constexpr std::ptrdiff_t drop_outs = 20;  // at most one in so many
   const auto is_cool = [](double value) { return value <= hot_degC; };
   const std::vector<double>& values = run.values[column];
-  const double level_degC = median(values) - zero_degC_in_K;
-  if (!std::isfinite(level_degC) || std::any_of(values.begin(), values.end(), is_cool)) return;
+  const auto cool = std::count_if(values.begin(), values.end(), is_cool);
+  if (drop_outs * cool > static_cast<std::ptrdiff_t>(values.size())) return;
   std::vector<double> others;
   for (std::size_t i = 0; i < run.columns.size(); ++i)
-    if (const double other = median(run.values[i]);
+    if (const double other = first_value(run.values[i]);
         is_temperature(run.columns[i]) && is_cool(other))
       others.push_back(other);
-  const double expected_degC = others.empty() ? room_degC : median(others);
-  if (std::abs(level_degC - expected_degC) > near_K) return;
+  if (others.empty()) return;
+  if (!(std::abs(first_value(values) - zero_degC_in_K - median(others)) <= near_K)) return;
   found.push_back(suspicion("unit", run.columns[column], index, run.time_s().front(),
                             run.time_s().back(), zero_degC_in_K, 10.0));
 }

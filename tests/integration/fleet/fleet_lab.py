@@ -155,7 +155,9 @@ class Machine:
                                    str(time.time() - 3600 * hours_ago), str(hours), "1", str(probings_per_h),
                                    *map(str, clock)], stdin=subprocess.DEVNULL, capture_output=True, text=True)
             assert done.returncode == 0, done.stderr
-            shutil.copyfile(file, self.history)
+            copy = self.history.with_suffix(".new")
+            shutil.copyfile(file, copy)
+            copy.rename(self.history)  # an uplink may be reading
         return json.loads(done.stdout)
 
     def send(self, status=0):

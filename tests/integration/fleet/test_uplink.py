@@ -276,7 +276,9 @@ def test_two_uplinks_with_one_role_are_reported(machine):
     # What another computer with a copy of uplink.toml does.
     machine.store.ask("UPDATE fleet.uplink SET segment_wall_ns = segment_wall_ns + 1")
     machine.record(hours_ago=5, hours=1)
-    eventually(lambda: "somebody else sends a history of this name" in machine.log.read_text(), "it is reported")
+    eventually(lambda: "another uplink sends" in machine.log.read_text(), "it is reported")
+    machine.means.update(machine.recorded())
+    eventually(lambda: machine.count("sample") == len(machine.means), "its rows arrive all the same")
 
 
 def test_a_configuration_is_refused_with_every_problem(machine):

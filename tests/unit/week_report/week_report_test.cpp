@@ -144,6 +144,12 @@ TEST_CASE("times without a daemon are listed, stopped or not", "[week]") {
   REQUIRE(with_full_disk.size() == 2);
   CHECK(with_full_disk[0].mode == daemon_stopped);
   CHECK(with_full_disk[1].mode == not_recorded);
+  // A week that begins while the daemon is stopped.
+  const auto from_a_stop =
+      daemon_pauses(events, {{begin_s, begin_s + 1000}, {begin_s + 1100, begin_s + 1500}},
+                    {begin_s + 1050, begin_s + 1500});
+  REQUIRE(from_a_stop.size() == 1);
+  CHECK(from_a_stop[0].mode == daemon_stopped);
   for (const ModeSpell& spell : mode_spells(events, week.span)) week.modes.push_back(spell);
   CHECK(outages_of(events, week.span).empty());  // switched off with the daemon
   const std::string html = week_html(week);
@@ -151,7 +157,8 @@ TEST_CASE("times without a daemon are listed, stopped or not", "[week]") {
       html,
       Contains("<td>the daemon was stopped</td><td class=\"line\">1 min 40 s</td><td "
                "class=\"line\">5.5 %</td>") &&
-          Contains("none was stopped (power cut, crash)</td><td class=\"line\">5 min 0 s</td>") &&
+          Contains(
+              "was stopped (power cut, crash, disk full)</td><td class=\"line\">5 min 0 s</td>") &&
           Contains("<td class=\"line\">30 min 0 s</td><td class=\"line\">100 %</td>"));
 }
 
@@ -350,7 +357,9 @@ TEST_CASE("time with a model of zeros is not compensated", "[week]") {
   const MachineWeek week = machine_week(config.file, recorded_span(config.file), parser);
   CHECK(week.mode_s("compensating") == Approx(180.0).margin(1.0));
   CHECK(week.mode_s(zero_model) == Approx(60.0).margin(1.0));
-  CHECK_THAT(week_html(week), Contains("every coefficient of the model is 0"));
+  CHECK_THAT(week_html(week), Contains("every coefficient of the model is 0") &&
+                                  Contains("make a model") &&
+                                  !Contains("nothing needs to be done"));
 }
 
 TEST_CASE("offsets and probings of a recorded machine equal those of replay", "[week]") {
