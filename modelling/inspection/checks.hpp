@@ -27,8 +27,8 @@ void check_empty(const RunFile& run, std::size_t index, Suspicions& found);
 /// Values that jump and return (`spikes` of a reading, `outliers` of a displacement). In `run` they
 /// are replaced by the median of their neighbours.
 void check_spikes(RunFile& run, std::size_t index, Suspicions& found);
-/// Readings that are constant while others move, that have coarse steps, that are in kelvin, or that
-/// duplicate another.
+/// Readings that are constant while others move, that have coarse steps, that are in kelvin, or
+/// that duplicate another.
 void check_values(const std::vector<RunFile>& runs, Suspicions& found);
 
 /// Compares each reading with its expectation from the others: steps, drift, loosening of
