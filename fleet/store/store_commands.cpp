@@ -92,7 +92,9 @@ std::string age_text(const pqxx::field& age_s) {
 std::string uplink_text(const pqxx::row& row) {
   std::string text = age_text(row["seen_s"]);
   constexpr double day_s = 86400.0;
-  if (row["newest_s"].as<double>(0.0) > day_s)
+  if (!row["seen_s"].is_null() && row["newest_s"].is_null())
+    text.append(", no rows yet");
+  else if (row["newest_s"].as<double>(0.0) > day_s)
     text.append(", newest row ").append(age_text(row["newest_s"]));
   const auto count = [&](const char* column, const char* what) {
     const auto number = row[column].as<std::uint64_t>(0);

@@ -94,8 +94,8 @@ def change_over(machine, package, from_um, to_um):
           f"{orders[held + 1][1]:.3f} um; largest step {max(steps):.3f} um, at most "
           f"{max(step - service.SLEW_UM_PER_S * pause for step, pause in zip(steps, pauses)):.3f}"
           " um more than slew x time")
-    # 0.1 s: possible delay of the guest between an offset's computation and its arrival.
-    service.assert_slewed(orders, slack_s=0.1)
+    # Late arrivals on a busy machine are excused; a leap at the start would be of many um.
+    service.assert_slewed(orders)
     assert min(from_um, to_um) < orders[held][1] < max(from_um, to_um)
     # The longest pause may be the guest's own, during which the axis moved.
     assert steps[held] < service.SLEW_UM_PER_S * pauses[held] + 0.05, "it goes on from where the one before stopped"
