@@ -124,6 +124,12 @@ ThermalModel of_axes(ThermalModel model) {
   return model;
 }
 
+bool are_alike(const ThermalModel& a, const ThermalModel& b) {
+  return a.inputs == b.inputs && a.outputs == b.outputs && a.reference_degC == b.reference_degC &&
+         a.matrix_um_per_K == b.matrix_um_per_K && a.guideways == b.guideways &&
+         a.terms == b.terms && a.diameters == b.diameters && a.made_from == b.made_from;
+}
+
 bool moves(const ThermalModel& model) {
   if (!model.terms.empty() || !model.guideways.empty()) return true;
   for (const std::vector<double>& row : model.matrix_um_per_K)

@@ -40,6 +40,8 @@ struct TermSpec {
       per_output;      ///< e.g. gain_um_per_K -> output
   LagBankSpec bank{};  ///< only of a bank, which has no `subject`
 
+  bool operator==(const TermSpec& other) const = default;
+
   /// True for a kind whose subjects, gains and time constants are in `bank`.
   [[nodiscard]] bool is_bank() const;
   /// Names of its columns or outputs: all of a bank's, else one or two.
@@ -55,6 +57,8 @@ struct GuidewaySpec {
   std::vector<double> positions_mm;  ///< strictly increasing, at least two
   /// output -> rows, shape (positions, inputs) [um/K]; added to the output's row of the matrix
   std::map<std::string, std::vector<std::vector<double>>> rows_um_per_K;
+
+  bool operator==(const GuidewaySpec& other) const = default;
 };
 
 /// Largest covariance, for the cost of an estimate per cycle.
@@ -165,6 +169,9 @@ struct ThermalModel {
 /// True if `[made_from]` gives every output's remainder in left-out data. Without it, as with an
 /// example or a computed model, it is not known whether size and sign are those of any machine.
 [[nodiscard]] bool is_compared(const ThermalModel& model);
+
+/// Whether both predict the same displacement and have the same domain.
+[[nodiscard]] bool are_alike(const ThermalModel& a, const ThermalModel& b);
 
 /// Some coefficient is not zero; `thermocomp init` writes zeros.
 [[nodiscard]] bool moves(const ThermalModel& model);

@@ -244,6 +244,16 @@ std::string comparison_text(const ThermalModel& model) {
   return text;
 }
 
+/// What the daemon knows of the controller beside positions and speeds.
+std::string switches_text(const CompensationConfig& config) {
+  const auto text = [](const std::string& what, const std::string& signal, const char* key) {
+    return what + ": " +
+           (signal.empty() ? std::string("none (compensation.") + key + ")" : signal) + "\n";
+  };
+  return text("the controller's switch", config.disable_signal, "disable_signal") +
+         text("signal of cutting", config.cutting_signal, "cutting_signal");
+}
+
 std::string first_start_text(const DaemonConfig& config) {
   const bool is_enabled = config.estimator.compensation.enabled_at_first_start;
   if (is_enabled && config.dry_run)
@@ -268,8 +278,8 @@ void print_what_was_found(const DaemonConfig& config) {
             << unused_sensors_text(estimator) << "axes: " << list_axes(config) << '\n'
             << "controller " << controller_kind(config) << ", "
             << counted(estimator.signals.size(), "signal") << '\n'
-            << "model " << config.model_file.string() << ": "
-            << counted(config.model.inputs.size(), "input") << ", "
+            << switches_text(estimator.compensation) << "model " << config.model_file.string()
+            << ": " << counted(config.model.inputs.size(), "input") << ", "
             << counted(config.model.outputs.size(), "output") << ", "
             << counted(config.model.terms.size(), "extension term") << ", SHA-256 "
             << config.model_checksum << '\n'

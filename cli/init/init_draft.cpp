@@ -183,6 +183,19 @@ std::string axes_text(const InitDraft& draft) {
   return text + "\n";
 }
 
+/// Signals with the names of the documents have that meaning; others are recorded.
+std::string compensation_text(const InitController& controller) {
+  std::string text;
+  const auto add = [&](const char* key, const char* name) {
+    const auto has_name = [name](const InitSignal& signal) { return signal.name == name; };
+    if (std::any_of(controller.signals.begin(), controller.signals.end(), has_name))
+      text += key_text(key, name);
+  };
+  add("cutting_signal", "cutting_on");
+  add("disable_signal", "compensation_off_on");
+  return text.empty() ? text : "[compensation]\n" + text + "\n";
+}
+
 std::string files_text(const InitDraft& draft) {
   if (draft.own_folder.empty()) return "[history]\n# file = \"/var/lib/thermocomp/history.db\"\n";
   return "[history]\nfile = " + toml_string(draft.own_folder + "/history.db") +
@@ -224,7 +237,7 @@ std::string configuration_text(const InitDraft& draft) {
           buses_text(draft);
   for (const InitModule& module : draft.modules) text += module_text(draft, module);
   return text + blocks_text(draft) + controller_text(draft.controller) + axes_text(draft) +
-         files_text(draft);
+         compensation_text(draft.controller) + files_text(draft);
 }
 
 std::string first_model_text(const InitDraft& draft) {

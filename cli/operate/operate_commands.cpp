@@ -79,8 +79,9 @@ int run_measured(const GlobalOptions& global, const MeasuredValue& given) {
             << (remains ? " um left at the tool; by the model "
                         : " um without offset; by the model ")
             << fixed_signed(predicted_um, 2) << (remains ? " um are left" : " um") << '\n';
-  if (remains)
-    std::cout << "(displacement by the model " << fixed_signed(number_of(answer, "predicted_um"), 2)
+  if (const double whole_um = number_of(answer, "predicted_um");
+      remains && whole_um != predicted_um)
+    std::cout << "(displacement by the model " << fixed_signed(whole_um, 2)
               << " um, the rest is taken out by the offset in effect)\n";
   return exit_success;
 }

@@ -121,7 +121,7 @@ void require_possible(const StatusView& view, const Command& command, double exp
         fmt::format(
             "value refused: {:g} um measured, {:.1f} um expected by the model; the axis' bound and "
             "three times the model's claimed error allow a difference of {:.1f} um. Check axis, "
-            "sign and unit",
+            "sign and unit; if it is right, the axis needs a larger offset_um_max",
             command.value_um, from_um, allowed_um));
 }
 
@@ -203,8 +203,10 @@ RpcPending note_measured(const DaemonActions& actions, const json& params) {
   // Expected at the tool if the model is right: displacement not compensated by the offset.
   const double left_um = displacement_um + effect_um;
   const double expected_um = remains ? left_um : displacement_um;
-  require_possible(view, command, expected_um);
-  ask_back(view, command, expected_um, params);
+  if (moves(view.config.model)) {  // zeros expect nothing
+    require_possible(view, command, expected_um);
+    ask_back(view, command, expected_um, params);
+  }
   return then(actions.command(command), [command, displacement_um, remains, left_um] {
     return json{
         {"done", true},

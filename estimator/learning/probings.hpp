@@ -330,6 +330,8 @@ class Probings {
   void restore(const std::map<std::string, double>& corrections);
   /// @param axes  from plan_names()
   void adopt(const Probings& previous, const std::vector<int>& axes) noexcept;
+  /// The error of probings, which is that of a model.
+  void adopt_errors(const Probings& previous, const std::vector<int>& axes) noexcept;
   void visit_learned(StateArchive& archive);
   void visit_measured(StateArchive& archive) { archive(measured_um_); }
   void visit_operators(StateArchive& archive);

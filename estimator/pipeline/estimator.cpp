@@ -49,6 +49,7 @@ struct Stages {
     std::vector<int> axes;
     std::vector<int> terms;
     bool same_domain{false};
+    bool same_model{false};
   };
 
   const EstimatorConfig config;
@@ -434,6 +435,7 @@ void Estimator::plan_adoption(const Estimator& previous) {
   plan.axes = plan_names(entry_names(ours.config.axes), entry_names(theirs.config.axes));
   plan.terms = ours.prediction.plan_terms(theirs.prediction);
   plan.same_domain = ours.prediction.same_domain(theirs.prediction);
+  plan.same_model = are_alike(ours.model, theirs.model);
 }
 
 void Estimator::adopt(const Estimator& previous) noexcept {
@@ -444,7 +446,9 @@ void Estimator::adopt(const Estimator& previous) noexcept {
   ours.sensing.adopt(theirs.sensing);
   ours.reference.adopt(theirs.reference, plan.columns, plan.signals);
   ours.learned.adopt(theirs.learned, plan.axes);
+  if (plan.same_model) ours.learned.adopt_errors(theirs.learned, plan.axes);
   ours.prediction.adopt(theirs.prediction, plan.terms, plan.same_domain);
+  if (plan.same_model) ours.prediction.adopt_outside_share(theirs.prediction);
   ours.mode.adopt(theirs.mode);
   ours.cycle_update.adopt(theirs.cycle_update, plan.columns, plan.signals, plan.axes, plan.terms);
   ours.axes.adopt(theirs.axes, plan.axes);

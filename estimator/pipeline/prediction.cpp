@@ -289,7 +289,6 @@ void Prediction::adopt(const Prediction& previous, const std::vector<int>& terms
                        bool domain) noexcept {
   model_.adopt_terms(previous.model_, terms);
   if (domain) domain_->adopt(*previous.domain_);
-  outside_share_ = previous.outside_share_;
   certainty_.adopt(previous.certainty_);
 }
 

@@ -265,6 +265,10 @@ class Prediction {
   }
   /// After a reload: lags, domain and certainty continue; displacement is computed anew.
   void adopt(const Prediction& previous, const std::vector<int>& terms, bool domain) noexcept;
+  /// After a reload of the same model.
+  void adopt_outside_share(const Prediction& previous) noexcept {
+    outside_share_ = previous.outside_share_;
+  }
   /// Lags and domain of a parallel prediction. @pre made from the same model
   void adopt_model(const Prediction& beside) noexcept;
   void visit_lags(StateArchive& archive) { archive(model_); }

@@ -4,7 +4,9 @@
 #include <cstdio>
 #include <memory>
 #include <optional>
+#include <stdexcept>
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
@@ -192,6 +194,24 @@ void leave_out_room(const std::vector<RunFile>& runs, TestOptions& options) {
   }
 }
 
+/// Leaves out temperatures that the model of --like does not have: its daemon may not have them.
+void leave_out_foreign(const ThermalModel& like, const std::vector<RunFile>& runs,
+                       TestOptions& options) {
+  const std::vector<std::string> known = like.temperature_columns();
+  std::vector<std::string> kept;
+  for (const std::string& column : options.places.empty() ? runs.front().columns : options.places) {
+    if (!is_temperature(column)) continue;
+    if (std::find(known.begin(), known.end(), column) != known.end())
+      kept.push_back(column);
+    else
+      std::fprintf(stderr, "%s: left out, since it is no input of the model of --like (--places)\n",
+                   column.c_str());
+  }
+  if (kept.empty())
+    throw std::runtime_error("--like: the runs have none of that model's temperatures");
+  options.places = kept;
+}
+
 /// Warns of readings that `inspect` doubts. They are used nevertheless: only the user can decide.
 void note_doubtful_readings(const std::vector<RunFile>& runs, MeasuredTests& tests) {
   for (const inspection::Finding& each : inspection::inspect(runs, doubted_from).findings)
@@ -215,6 +235,8 @@ int run(const Options& options) {
   const bool few = options.few_asked_for() && options.family.empty();
   if (few && !options.free_choice && options.tests.places.empty())
     leave_out_room(runs, test_options);
+  if (!options.like.empty() && options.tests.places.empty())
+    leave_out_foreign(load_model(options.like), runs, test_options);
   if (!few) {
     test_options.signals = true;
     test_options.folds_of_one_run = std::max(test_options.folds_of_one_run, blocks_of_one_run);
@@ -251,8 +273,9 @@ void add_fit_command(CLI::App& app, std::function<int()>& action) {
       ->delimiter(',')
       ->type_name("OUTPUT=AXIS");
   sub->add_option("--family", options->family,
-                  "none, static_few, lagged_few, physical or lag_bank; default: the one with the "
-                  "smallest error in left-out tests")
+                  "none, static_few, lagged_few, physical or lag_bank; default: lag_bank, or "
+                  "static_few where that leaves a tenth less of left-out data; none unless one "
+                  "leaves a tenth less than none")
       ->check(CLI::IsMember({"none", "static_few", "lagged_few", "physical", "lag_bank"}));
   const CLI::Option* terms =
       sub->add_option("--terms", options->terms,

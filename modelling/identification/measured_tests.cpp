@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
+#include <utility>
 
 #include "config/runs/model_inputs.hpp"
 #include "config/runs/robust.hpp"
@@ -196,6 +198,94 @@ TestRun make_run(const RunFile& run, const std::vector<std::string>& places,
   return test;
 }
 
+std::string listed(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text.append(text.empty() ? "" : ", ").append(name);
+  return text;
+}
+
+/// Moves displacements that were probed one after another, as each axis is entered by itself, into
+/// the last row of their set: only rows with every output are fitted.
+void gather_probings(RunFile& run, const std::vector<std::string>& outputs,
+                     std::vector<std::string>& notes) {
+  constexpr double set_s_max = 120.0;
+  if (outputs.size() < 2) return;
+  std::vector<std::vector<double>*> columns;
+  for (const std::string& name : outputs) {
+    const auto found = run.find(name);
+    if (!found || share_present(run, run.values[*found]) >= share_present_min) return;
+    columns.push_back(&run.values[*found]);
+  }
+  std::vector<std::optional<std::size_t>> set(columns.size());  // row of each value
+  std::size_t moved = 0;
+  std::size_t alone = 0;
+  const auto leave_alone = [&alone](std::optional<std::size_t>& row) {
+    if (row) ++alone;
+    row.reset();
+  };
+  for (std::size_t row = 0; row < run.rows(); ++row) {
+    for (std::size_t i = 0; i < columns.size(); ++i) {
+      if (!std::isfinite((*columns[i])[row])) continue;
+      leave_alone(set[i]);
+      set[i] = row;
+    }
+    for (std::optional<std::size_t>& each : set)
+      if (each && run.time_s()[row] - run.time_s()[*each] > set_s_max) leave_alone(each);
+    if (!std::all_of(set.begin(), set.end(), [](const auto& each) { return each.has_value(); }))
+      continue;
+    bool is_moved = false;
+    for (std::size_t i = 0; i < columns.size(); ++i) {
+      const std::size_t from = *std::exchange(set[i], std::nullopt);
+      if (from == row) continue;
+      (*columns[i])[row] =
+          std::exchange((*columns[i])[from], std::numeric_limits<double>::quiet_NaN());
+      is_moved = true;
+    }
+    if (is_moved) ++moved;
+  }
+  for (std::optional<std::size_t>& each : set) leave_alone(each);
+  if (moved > 0)
+    notes.push_back(run.name + ": " + listed(outputs) + ": " + std::to_string(moved) +
+                    " sets of probings within 2 min of each other count as one row each");
+  if (alone > 0)
+    notes.push_back(run.name + ": " + std::to_string(alone) +
+                    " values without one of every other output within 2 min are left out; fitted "
+                    "one output at a time, all count");
+}
+
+/// Empty unless the first displacement came after the temperatures had begun to move: it counts as
+/// 0 here, and 0 is the reference of the daemon and of `predict`.
+std::string late_displacement(const RunFile& run, const std::vector<std::string>& places,
+                              const std::vector<std::string>& outputs) {
+  constexpr double moved_K_min = 1.0;
+  const auto first_row = [&](const std::vector<std::vector<std::string>>& groups) {
+    std::size_t row = 0;
+    const auto is_there = [&](const std::string& name) {
+      return std::isfinite(run.column(name)[row]);
+    };
+    for (; row < run.rows(); ++row)
+      if (std::all_of(groups.begin(), groups.end(), [&](const std::vector<std::string>& names) {
+            return std::all_of(names.begin(), names.end(), is_there);
+          }))
+        break;
+    return row;
+  };
+  const std::size_t first = first_row({places});
+  const std::size_t probed = first_row({places, outputs});
+  if (outputs.empty() || probed >= run.rows() || probed == first) return {};
+  double moved_K = 0.0;
+  for (const std::string& name : places)
+    moved_K = std::max(moved_K, std::abs(run.column(name)[probed] - run.column(name)[first]));
+  if (moved_K < moved_K_min) return {};
+  return run.name + ": the first displacement is " +
+         printed("%.0f", (run.time_s()[probed] - run.time_s()[first]) / 60.0) +
+         " min after the first temperatures, which moved by " + printed("%.1f", moved_K) +
+         " K until then. It counts as 0 in the fit, but not in the daemon: the error will be "
+         "larger "
+         "than expected. Begin each run with a displacement in the reference state (thermocomp "
+         "measured AXIS 0)";
+}
+
 /// Removes places that never move: they have no shape to compare.
 void leave_out_still_places(MeasuredTests& tests) {
   std::vector<Eigen::Index> kept;
@@ -352,6 +442,7 @@ MeasuredTests measured_tests(const std::vector<RunFile>& given, const TestOption
     leave_out_spikes(run, tests.notes);
     for (const Blunders& each : leave_out_blunders(run, options.outputs))
       tests.notes.push_back(run.name + ": " + each.text());
+    gather_probings(run, options.outputs, tests.notes);
   }
   for (const std::string& name : options.places)
     if (!is_temperature(name)) refuse("", name, "must be a temperature (*_degC, *_K)");
@@ -370,6 +461,8 @@ MeasuredTests measured_tests(const std::vector<RunFile>& given, const TestOption
     tests.signals.erase(constant, tests.signals.end());
   }
   for (const RunFile& run : runs) {
+    if (const std::string late = late_displacement(run, tests.places, tests.outputs); !late.empty())
+      tests.notes.push_back(late);
     const auto of_run = [&](bool between_probings) {
       return make_run(run, tests.places, tests.outputs, tests.signals, between_probings);
     };

@@ -9,6 +9,8 @@
 namespace thermocomp::inspection {
 namespace {
 
+/// Rows closer in time are of a program that writes on events, too.
+constexpr double set_back_s_min = 10.0;
 constexpr double hour_s = 3600.0;
 
 /// The temperatures continue over a row as if no time had passed: each changes by at most five
@@ -126,8 +128,13 @@ void check_clock(const RunFile& run, std::size_t index, const RunSampling& sampl
     const double hours = std::round(jump_s / hour_s);
     const bool whole_hours = hours >= 1 && std::abs(jump_s - hours * hour_s) <= 2 * sampling.step_s;
     const bool set_forward = gap && regular && whole_hours && continues_over(run, i + 1);
-    // Set back by less than a row.
-    const bool set_back = !gap && regular && steps[i] < 0.3 * sampling.step_s;
+    // Set back by less than a row, not a row in between: the rows after it are off the grid, too.
+    const double over_two_s = i > 0 && i + 1 < steps.size() ? steps[i - 1] + steps[i] + steps[i + 1]
+                                                            : 2.0 * sampling.step_s;
+    const bool is_row_between =
+        std::abs(over_two_s - 2.0 * sampling.step_s) < 0.2 * sampling.step_s;
+    const bool set_back = !gap && regular && steps[i] < 0.3 * sampling.step_s && !is_row_between &&
+                          sampling.step_s >= set_back_s_min;
     if (set_forward || set_back) {
       offer("clock", from_s, to_s, jump_s, 10.0);
     } else if (gap && steps[i] > longest_s) {

@@ -1,6 +1,8 @@
 #include "modelling/identification/equation/similarity.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <set>
 
 #include <catch2/catch.hpp>
@@ -96,6 +98,54 @@ TEST_CASE("22 places in 9 groups are found at three noise levels and three sampl
   const Grouping grouping = group_places(similarity(tests, true), noise_floor(tests));
   CAPTURE(noise_K, minutes, grouping.threshold);
   CHECK(grouping.groups == truth);
+}
+
+/// An hour and a half of a warming place, a row each 30 s; x is probed each fifth minute, z 30 s
+/// after it.
+RunFile probed_one_after_another(std::size_t first_probed) {
+  constexpr std::size_t rows = 180;
+  const double none = std::numeric_limits<double>::quiet_NaN();
+  RunFile run;
+  run.name = "run.csv";
+  run.columns = {"time_s", "head_degC", "x_um", "z_um"};
+  run.values.resize(4);
+  for (std::size_t row = 0; row < rows; ++row) {
+    const double rise_K = 8.0 * (1.0 - std::exp(-static_cast<double>(row) / 60.0));
+    run.values[0].push_back(30.0 * static_cast<double>(row));
+    run.values[1].push_back(20.0 + rise_K);
+    const bool is_due = row >= first_probed && row % 10 < 2;
+    run.values[2].push_back(is_due && row % 10 == 0 ? 2.0 * rise_K : none);
+    run.values[3].push_back(is_due && row % 10 == 1 ? 3.0 * rise_K : none);
+  }
+  run.selected_end = rows;
+  return run;
+}
+
+bool has_note(const MeasuredTests& tests, const std::string& part) {
+  return std::any_of(tests.notes.begin(), tests.notes.end(),
+                     [&](const std::string& note) { return note.find(part) != std::string::npos; });
+}
+
+TEST_CASE("probings of two axes one after another are one row", "[identification]") {
+  TestOptions options;
+  options.outputs = {"x_um", "z_um"};
+  const MeasuredTests tests = measured_tests({probed_one_after_another(0)}, options);
+  CHECK(tests.rows() == 18);
+  CHECK(has_note(tests, "18 sets of probings within 2 min"));
+  CHECK_FALSE(has_note(tests, "min after the first temperatures"));
+  RunFile apart = probed_one_after_another(0);
+  std::swap(apart.values[3][21], apart.values[3][28]);  // 4 min after its x
+  const MeasuredTests without = measured_tests({apart}, options);
+  CHECK(without.rows() == 17);
+  CHECK(has_note(without, "2 values without one of every other output"));
+}
+
+TEST_CASE("a first displacement long after the first temperatures is reported",
+          "[identification]") {
+  TestOptions options;
+  options.outputs = {"x_um", "z_um"};
+  const MeasuredTests tests = measured_tests({probed_one_after_another(50)}, options);
+  CHECK(has_note(tests, "the first displacement is 26 min after the first temperatures"));
 }
 
 }  // namespace

@@ -349,6 +349,19 @@ TEST_CASE("a gap and a clock set forward are distinguished", "[inspection]") {
   CHECK(find(inspection, "clock")->at_s == 249 * 60.0);
 }
 
+TEST_CASE("a clock set back by less than a row is found, a row between two others is none",
+          "[inspection]") {
+  RunFile shifted = recording();
+  for (std::size_t row = 250; row < rows; ++row) column(shifted, "time_s")[row] -= 50.0;
+  REQUIRE(find(inspect({shifted}), "clock") != nullptr);
+  RunFile between = recording();
+  for (std::vector<double>& values : between.values)
+    values.insert(values.begin() + 250, values[249]);
+  column(between, "time_s")[250] += 3.0;
+  between.selected_end = between.rows();
+  CHECK(find(inspect({between}), "clock") == nullptr);
+}
+
 TEST_CASE("a signal that never changed is not identifiable, and an experiment is proposed",
           "[inspection]") {
   RunFile run = recording();
