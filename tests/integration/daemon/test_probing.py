@@ -178,3 +178,21 @@ def test_by_cycles_the_offset_changes_at_their_ends_only(machine, lab):
     assert abs(daemon.axis()["offset"] - 15.0) < 0.05
     daemon.end()
     assert_replays_exactly(daemon.history, lab.folder / "out.csv")
+
+
+def test_a_model_of_zeros_refuses_no_measured_value_and_a_promoted_one_begins_its_own_account(machine):
+    """`init` writes zeros and a bound of 5 um: the values of which the first model is made go beyond it."""
+    zeros = machine.model.read_text().replace("[[3.0, -1.5]]", "[[0.0, 0.0]]")
+    machine.model.write_text(zeros)
+    daemon = machine.start()
+    machine.module.show(24.0, 20.0)
+    eventually(lambda: "all its coefficients are 0" in daemon.cli("status")[1], "it is said")
+    for value in ("300.0", "-300.0", "0.0"):
+        status, _, errors = daemon.cli("measured", "z", value)
+        assert status == 0, errors
+    eventually(lambda: (daemon.status()["model"]["probed_rms_um"].get("z") or 0.0) > 100.0, "it is counted")
+    machine.model.write_text(zeros.replace("[[0.0, 0.0]]", "[[3.0, -1.5]]"))
+    assert daemon.cli("reload")[0] == 0
+    state = eventually(lambda: (now := daemon.status())["model"]["moves"] and now, "the model is in use")
+    assert state["model"]["probed_rms_um"].get("z") is None
+    assert state["compensating_s"] < state["uptime_s"] - 0.1

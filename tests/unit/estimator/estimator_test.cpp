@@ -262,6 +262,23 @@ TEST_CASE("a reload does not move the axis by itself", "[estimator]") {
   CHECK(machine.report().cycle == 12);
 }
 
+TEST_CASE("the error of probings is that of a model: another one begins anew", "[estimator]") {
+  Machine machine;
+  machine.step({20.0, 30.0});
+  machine.steps(10, {21.0, 30.0});
+  machine.estimator.apply({CommandKind::measured, 0, 2.0});
+  machine.step({21.0, 30.0});
+  REQUIRE(std::isfinite(machine.report().axes[0].probed_rms_um));
+  reload(machine, small_config(), small_model());
+  machine.step({21.0, 30.0});
+  CHECK(std::isfinite(machine.report().axes[0].probed_rms_um));
+  ThermalModel other = small_model();
+  other.matrix_um_per_K[0][0] *= 2.0;
+  reload(machine, small_config(), other);
+  machine.step({21.0, 30.0});
+  CHECK(std::isnan(machine.report().axes[0].probed_rms_um));
+}
+
 TEST_CASE("a reload takes new numbers as the reference and keeps an old one", "[estimator]") {
   Machine machine;
   machine.step({20.0, 30.0});
