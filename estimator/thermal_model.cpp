@@ -130,11 +130,40 @@ bool are_alike(const ThermalModel& a, const ThermalModel& b) {
          a.terms == b.terms && a.diameters == b.diameters && a.made_from == b.made_from;
 }
 
-bool moves(const ThermalModel& model) {
-  if (!model.terms.empty() || !model.guideways.empty()) return true;
-  for (const std::vector<double>& row : model.matrix_um_per_K)
-    if (std::any_of(row.begin(), row.end(), [](double gain) { return gain != 0.0; })) return true;
+namespace {
+
+bool has_other_than_zero(const std::vector<double>& gains) {
+  return std::any_of(gains.begin(), gains.end(), [](double gain) { return gain != 0.0; });
+}
+
+bool has_other_than_zero(const std::map<std::string, std::vector<std::vector<double>>>& rows,
+                         const std::string& output) {
+  const auto found = rows.find(output);
+  return found != rows.end() &&
+         std::any_of(found->second.begin(), found->second.end(),
+                     [](const std::vector<double>& row) { return has_other_than_zero(row); });
+}
+
+}  // namespace
+
+bool moves(const ThermalModel& model, const std::string& output) {
+  for (std::size_t i = 0; i < std::min(model.outputs.size(), model.matrix_um_per_K.size()); ++i)
+    if (model.outputs[i] == output && has_other_than_zero(model.matrix_um_per_K[i])) return true;
+  for (const GuidewaySpec& guideway : model.guideways)
+    if (has_other_than_zero(guideway.rows_um_per_K, output)) return true;
+  for (const TermSpec& term : model.terms) {
+    if (has_other_than_zero(term.bank.gain_um_per_unit, output)) return true;
+    for (const auto& [key, by_output] : term.per_output)
+      if (const auto found = by_output.find(output);
+          found != by_output.end() && found->second != 0.0)
+        return true;
+  }
   return false;
+}
+
+bool moves(const ThermalModel& model) {
+  return std::any_of(model.outputs.begin(), model.outputs.end(),
+                     [&](const std::string& output) { return moves(model, output); });
 }
 
 bool is_compared(const ThermalModel& model) {

@@ -175,6 +175,8 @@ struct ThermalModel {
 
 /// Some coefficient is not zero; `thermocomp init` writes zeros.
 [[nodiscard]] bool moves(const ThermalModel& model);
+/// Some coefficient of this output is not zero.
+[[nodiscard]] bool moves(const ThermalModel& model, const std::string& output);
 
 /// nullptr: the output is no diameter.
 [[nodiscard]] const DiameterSpec* diameter_of(const ThermalModel& model,

@@ -83,7 +83,7 @@ struct Event {
   Subject subject{};
   /// Name of the reason, fault, mode, command or CAN state, or a fixed word: "suspected",
   /// "mismatch_latched", "not_connected", "frozen", "not_written", "estimated", "lost",
-  /// "uncertain", "not_taken"; of the daemon "started", "stopping", "history".
+  /// "uncertain", "not_taken"; of the daemon "started", "stopping", "history", "offset".
   std::string code{};
   std::string detail{};  ///< text of a device, driver or signal; may be empty
   /// suspected: error of the sensor [K]; recovery of a sensor: change over the fault where it is

@@ -467,7 +467,9 @@ struct ModelStatus {
   std::string checksum{};
   std::uint64_t inputs{0};
   std::uint64_t outputs{0};
-  bool moves{true};               ///< some coefficient is not zero; `init` writes zeros
+  bool moves{true};  ///< some coefficient is not zero; `init` writes zeros
+  /// Axes whose coefficients are all zero, unless all are.
+  std::vector<std::string> still{};
   bool compared{true};            ///< with measured displacement, according to its file
   std::optional<bool> outside{};  ///< of its domain
   double outside_share_24h{not_a_number};
@@ -481,6 +483,7 @@ struct ModelStatus {
     visit("inputs", self.inputs);
     visit("outputs", self.outputs);
     visit("moves", self.moves);
+    visit("still", self.still);
     visit("compared", self.compared);
     visit("outside", self.outside);
     visit("outside_share_24h", self.outside_share_24h);

@@ -60,7 +60,7 @@ int run_simulate(const SimulateOptions& options) {
   const MachineConfig machine = load_machine(options.machine);
   if (!machine.plant) throw Failure(options.machine + ": has no plant to simulate");
   if (!(machine.duration_s > 0.0)) {
-    throw Failure(options.machine + ": duration_s must be above 0 to make a run file");
+    throw Failure(options.machine + ": duration_h must be above 0 to make a run file");
   }
   const RunFile run = simulate(machine, machine.duration_s, options.seed.value_or(machine.seed));
   cli::write_file(options.output, write_run(run));

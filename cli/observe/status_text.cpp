@@ -219,6 +219,9 @@ std::string reference_line(const ReferenceStatus& reference) {
 
 std::string model_lines(const ModelStatus& model) {
   std::string file = line("Model", model.file + " (SHA-256 " + model.checksum.substr(0, 16) + ")");
+  if (!model.still.empty())
+    file += line("", "gives NO DISPLACEMENT of axis " + joined(model.still) +
+                         ": all its coefficients are 0");
   if (!model.compared)
     file += line("", "NEVER COMPARED with measured displacement, according to its file" +
                          probed_text(model));

@@ -1,4 +1,5 @@
 #include <array>
+#include <cmath>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -191,6 +192,9 @@ int run_promote(const GlobalOptions& global, bool back) {
   std::cout << done.model << (back ? ": the model before runs again" : ": the candidate runs")
             << "; the other is kept as " << done.before
             << ", and thermocomp promote --back exchanges them\n";
+  if (std::isfinite(done.better_probability))
+    std::cout << "by the probings beside the model it is better with "
+              << fixed(100.0 * done.better_probability, 0) << " % (50 %: equally good)\n";
   return exit_success;
 }
 

@@ -74,7 +74,7 @@ Promotion promote(const fs::path& socket, const std::string& checksum) {
   // In this order one of the files always holds the model that was in use.
   cli::write_file(before, now);
   reload_with(socket, model, next, now);
-  return {model, before};
+  return {model, before, number_of(status["candidate"], "better_probability")};
 }
 
 Promotion take_back(const fs::path& socket, const std::string& checksum) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <limits>
 #include <string>
 
 namespace thermocomp::cli {
@@ -13,6 +14,7 @@ void start_candidate(const std::filesystem::path& socket, const std::filesystem:
 struct Promotion {
   std::string model;   ///< file of the model in use
   std::string before;  ///< previous model, used by promote --back
+  double better_probability{std::numeric_limits<double>::quiet_NaN()};  ///< by the probings so far
 };
 /// Makes the candidate the model in use and keeps the previous one. If the reload is refused, the
 /// model's file is restored.

@@ -494,17 +494,25 @@ MachineWeek machine_week(const std::filesystem::path& history, const WallSpan& s
     for (const AxisConfig& axis : setup->estimator.axes)
       week.axes.push_back(axis_week(axis, week.course, places));
   }
+  const ReplaySetup* scored = nullptr;  // with the newest score of a candidate
   for (const RecordedEvent& event : events.events) {
     if (event.wall_s < span.from_s || event.wall_s >= span.to_s) continue;
     if (event.kind == EventKind::daemon && event.code == "started") ++week.starts;
     if (event.kind != EventKind::command) continue;
     week.commands.push_back(event);
-    if (event.candidate) week.candidate = event.candidate;
     const ReplaySetup* setup = setups.at(event.wall_s);
+    if (event.candidate) {
+      week.candidate = event.candidate;
+      scored = setup;
+    }
     if (setup != nullptr && event.code == to_string(CommandKind::measured))
       week.probings.push_back(
           probing_of(history, *setup, event.wall_s, event.subject.name, event.value, parser));
   }
+  // A score beside another model, as before a promotion, is over.
+  const ReplaySetup* last = setups.at(span.to_s);
+  if (scored != nullptr && last != nullptr && !are_alike(scored->model, last->model))
+    week.candidate.reset();
   return week;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <variant>
 #include <vector>
 
@@ -31,6 +32,7 @@ struct RegisterPlace {
   std::vector<std::uint16_t> words;
   WriteStage stage{WriteStage::offset};
   std::size_t axis{axes_max};  ///< axis whose single offset, sent or applied, this is
+  double most{std::numeric_limits<double>::infinity()};  ///< larger is no offset
 };
 
 RegisterPlace place_of(const ModbusValue& value, const std::string& what, const std::string& unit,
@@ -74,6 +76,7 @@ std::vector<RegisterPlace> read_places(const DaemonConfig& config,
     const std::string unit = modbus.axes[i].piezo ? "V" : std::string(unit_of(axis.output).symbol);
     places.push_back(place_of(*modbus.axes[i].applied, "applied of axis " + axis.name, unit));
     places.back().axis = i;
+    places.back().most = offset_um_max_of_any_axis;
   }
   for (const ModbusSignal& signal : modbus.signals) {
     const std::string& name = config.estimator.signals[signal.signal];
@@ -313,6 +316,10 @@ class ControllerScan {
     if (decoded.fault != Fault::none)
       shown.why =
           "is not a finite number: compare encoding and word_order with the controller's side";
+    else if (std::abs(decoded.value) > place.most)
+      shown.why =
+          "is no offset of an axis: compare address, encoding, word_order and scale with the "
+          "controller's side";
   }
 
   [[nodiscard]] std::string why_not(const Exchange& exchange) const {

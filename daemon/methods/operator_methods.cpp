@@ -196,6 +196,9 @@ RpcPending note_measured(const DaemonActions& actions, const json& params) {
   const double displacement_um = figure_at_position(
       view, command.axis, [](const AxisReport& axis) { return axis.displacement_um; });
   const bool remains = view.config.estimator.correction.measured == MeasuredMeaning::remaining;
+  refuse_unless(!remains || !has_reason(view.report.reasons, Reason::controller_offline),
+                "the controller is away, so the offset in effect is unknown: measure once it is "
+                "back");
   const double applied_um = figure_at_position(view, command.axis, [](const AxisReport& axis) {
     return std::isfinite(axis.applied_um) ? axis.applied_um : axis.offset_um;
   });

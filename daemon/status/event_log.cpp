@@ -1,10 +1,12 @@
 #include "daemon/status/event_log.hpp"
 
 #include <cmath>
+#include <fmt/format.h>
 #include <utility>
 
 #include <spdlog/spdlog.h>
 
+#include "config/text/units.hpp"
 #include "status/codes.hpp"
 
 namespace thermocomp {
@@ -80,6 +82,7 @@ void EventLog::note_report(const Report& report, const EstimatorConfig& config, 
   note_ended_outages();
   note_sensors(report, config);
   note_mismatches(report, config);
+  note_returns(report, config);
   note_mode(report, std::string(code_text(report.mode, dry_run).name));  // follows from the above
   first_ = false;
 }
@@ -192,6 +195,29 @@ void EventLog::note_mismatches(const Report& report, const EstimatorConfig& conf
                    axis.offset_um);
     }
   }
+}
+
+void EventLog::note_returns(const Report& report, const EstimatorConfig& config) {
+  if (has_reason(report.reasons, Reason::controller_offline)) {
+    away_ = true;
+    return;
+  }
+  in_effect_um_.resize(report.axes.size(), not_a_number);
+  for (std::size_t i = 0; i < report.axes.size(); ++i) {
+    const double applied_um = report.axes[i].applied_um;
+    const double before_um = std::exchange(in_effect_um_[i], applied_um);
+    // What was still on its way when the link ended.
+    constexpr double unwritten_s = 3.0;
+    const double allowed_um =
+        config.compensation.mismatch_um + unwritten_s * config.axes[i].limiter.rate_um_per_s_max;
+    if (!away_ || !(std::abs(applied_um - before_um) > allowed_um)) continue;
+    const std::string text = fmt::format(
+        "axis {}: the controller returned with {:+.2f} {} in effect, {:+.2f} before",
+        config.axes[i].name, applied_um, unit_of(config.axes[i].output).symbol, before_um);
+    journal_.daemon("offset", text);
+    spdlog::warn("{}", text);
+  }
+  away_ = false;
 }
 
 void EventLog::note_link(const Subject& subject, bool connected, const std::string& error) {

@@ -51,6 +51,8 @@ class EventLog {
   void note_sensors(const Report& report, const EstimatorConfig& config);
   void note_suspicion(std::size_t index, const SensorReport& sensor, const std::string& name);
   void note_mismatches(const Report& report, const EstimatorConfig& config);
+  /// A controller that was away and returns with another offset in effect has moved the tool.
+  void note_returns(const Report& report, const EstimatorConfig& config);
   void note_link(const Subject& subject, bool connected, const std::string& error);
   void note_writes(const ControllerHealth& controller);
   void note_state(const Subject& subject, bool connected, const std::string& state);
@@ -68,6 +70,8 @@ class EventLog {
   std::vector<bool> clipping_;
   std::vector<std::string> input_states_;
   std::vector<bool> latched_;
+  std::vector<double> in_effect_um_;  ///< by axis, at the last look with a controller; NaN: none
+  bool away_{false};                  ///< the controller
   bool uncertain_{false};
   std::set<std::string> frozen_;  ///< modules
   std::map<Subject, bool> connected_;

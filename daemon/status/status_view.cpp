@@ -328,6 +328,16 @@ std::map<std::string, double> by_axis(const StatusView& view, double AxisReport:
   return figures;
 }
 
+std::vector<std::string> still_axes(const DaemonConfig& config) {
+  std::vector<std::string> names;
+  if (!moves(config.model)) return names;
+  for (const AxisSpan& span : axis_spans(config.estimator.axes)) {
+    const AxisConfig& axis = config.estimator.axes[span.first];
+    if (!moves(config.model, axis.output)) names.push_back(axis_name(axis));
+  }
+  return names;
+}
+
 ModelStatus model_of(const StatusView& view) {
   const DomainReport& domain = view.report.domain;
   ModelStatus status{.file = view.config.model_file.string(),
@@ -335,6 +345,7 @@ ModelStatus model_of(const StatusView& view) {
                      .inputs = view.config.model.inputs.size(),
                      .outputs = view.config.model.outputs.size(),
                      .moves = moves(view.config.model),
+                     .still = still_axes(view.config),
                      .compared = is_compared(view.config.model),
                      .claimed_sd_um = by_axis(view, &AxisReport::claimed_sd_um),
                      .probed_rms_um = by_axis(view, &AxisReport::probed_rms_um)};

@@ -171,6 +171,15 @@ def test_a_register_that_is_not_there_is_named_with_the_exception(simulate, rela
     assert "channels give a temperature" not in done.stdout  # only the controller was tested
 
 
+def test_a_read_back_that_can_be_no_offset_is_not_taken_for_one(simulate, tmp_path):
+    simulator = simulate(MACHINE)
+    at_position = '{ table = "input", address = 20, encoding = "int32" }'  # 250000 um
+    path = configuration(tmp_path, bus(simulator, "modbus_tcp", timeout_ms=3000.0), DEVICES, SENSORS,
+                         controller(simulator.port("cnc"), signals="").replace(PLACES[1], at_position))
+    done = thermocomp("scan", path, "--bus", "cnc")
+    assert done.returncode == 1 and "is no offset of an axis" in done.stdout, done.stdout
+
+
 def test_a_silent_or_lost_controller_is_reported(simulate, relay, tmp_path):
     simulator = simulate(MACHINE)
     sensors = bus(simulator, "modbus_tcp", timeout_ms=3000.0)

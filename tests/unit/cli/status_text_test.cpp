@@ -93,6 +93,9 @@ TEST_CASE("the status shows time, origin and temperatures of the reference", "[c
 
 TEST_CASE("a model that was never compared is reported as such", "[cli][status]") {
   Status status = good_status();
+  status.model.still = {"x", "y"};
+  CHECK_THAT(status_text(status, false), Contains("gives NO DISPLACEMENT of axis x, y"));
+  status.model.still.clear();
   CHECK_THAT(status_text(status, false), !Contains("COMPARED"));
   status.model.compared = false;
   CHECK_THAT(status_text(status, false), Contains("NEVER COMPARED") && !Contains("probings"));

@@ -138,6 +138,23 @@ TEST_CASE("a model is compared if each output has errors on rows left out", "[co
   CHECK_FALSE(is_compared(model));
 }
 
+TEST_CASE("a model moves the outputs that have a coefficient", "[config][model]") {
+  ThermalModel model;
+  model.inputs = {"bed_degC"};
+  model.outputs = {"x_um", "z_um"};
+  model.matrix_um_per_K = {{0.0}, {0.0}};
+  CHECK_FALSE(moves(model));
+  TermSpec term;
+  term.kind = "speed_growth";
+  term.per_output["gain_um_per_unit2"]["z_um"] = 1e-7;
+  model.terms.push_back(term);
+  CHECK(moves(model));
+  CHECK(moves(model, "z_um"));
+  CHECK_FALSE(moves(model, "x_um"));
+  model.matrix_um_per_K[0][0] = -2.0;
+  CHECK(moves(model, "x_um"));
+}
+
 TEST_CASE("the commented example of a bank of lags loads", "[config][model]") {
   const ThermalModel model =
       load_model(std::filesystem::path(THERMOCOMP_EXAMPLES) / "lag_bank_model.toml");

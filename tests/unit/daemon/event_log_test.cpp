@@ -91,6 +91,31 @@ TEST_CASE("the end of a sensor's outage has the change over it where that is mor
     CHECK(end.value == Approx(change_K));
 }
 
+TEST_CASE("a controller that returns with another offset in effect is an event",
+          "[daemon][events]") {
+  const auto [after_um, is_named] =
+      GENERATE(std::pair(0.0, true), std::pair(19.5, false), std::pair(21.0, false));
+  Bench bench;
+  bench.config.axes.resize(1);
+  bench.config.axes[0].name = "y";
+  bench.config.axes[0].output = "y_um";
+  bench.report.axes.resize(1);
+  bench.report.axes[0].applied_um = 21.0;
+  bench.pass(1s);
+  bench.report.reasons = static_cast<std::uint32_t>(Reason::controller_offline);
+  bench.pass(4s);
+  bench.report.reasons = 0;
+  bench.report.axes[0].applied_um = after_um;
+  bench.pass(1s);
+  const auto& events = bench.journal.events();
+  const auto named = std::find_if(events.begin(), events.end(), [](const Event& event) {
+    return event.kind == EventKind::daemon && event.code == "offset";
+  });
+  REQUIRE((named != events.end()) == is_named);
+  if (is_named)
+    CHECK_THAT(event_text(*named), Catch::Contains("+0.00 um in effect, +21.00 before"));
+}
+
 TEST_CASE("a frozen module is a fault of its device, and recovers", "[daemon][events]") {
   Bench bench;
   bench.log.note_frozen({{"m1", 60.0}});
