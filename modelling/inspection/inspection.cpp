@@ -21,7 +21,7 @@ struct ScoreCurve {
   double even;
   double steepness;
 };
-constexpr std::array<ScoreCurve, 8> score_curves{{
+constexpr std::array<ScoreCurve, 9> score_curves{{
     {"spikes", 1.15, 8},
     {"outliers", 1.15, 8},
     {"sensor_step", 8.0, 6},
