@@ -132,7 +132,7 @@ void check_clock(const RunFile& run, std::size_t index, const RunSampling& sampl
     const double over_two_s = i > 0 && i + 1 < steps.size() ? steps[i - 1] + steps[i] + steps[i + 1]
                                                             : 2.0 * sampling.step_s;
     const bool is_row_between =
-        std::abs(over_two_s - 2.0 * sampling.step_s) < 0.2 * sampling.step_s;
+        std::abs(over_two_s - 2.0 * sampling.step_s) < 0.03 * sampling.step_s;
     const bool set_back = !gap && regular && steps[i] < 0.3 * sampling.step_s && !is_row_between &&
                           sampling.step_s >= set_back_s_min;
     if (set_forward || set_back) {
