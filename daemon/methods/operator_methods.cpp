@@ -206,7 +206,8 @@ RpcPending note_measured(const DaemonActions& actions, const json& params) {
   // Expected at the tool if the model is right: displacement not compensated by the offset.
   const double left_um = displacement_um + effect_um;
   const double expected_um = remains ? left_um : displacement_um;
-  if (moves(view.config.model)) {  // zeros expect nothing
+  // Zeros expect nothing, and without a correction nothing is learned from the value.
+  if (moves(view.config.model) || view.config.estimator.correction.form != CorrectionForm::off) {
     require_possible(view, command, expected_um);
     ask_back(view, command, expected_um, params);
   }
