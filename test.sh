@@ -110,9 +110,9 @@ run_tests() {
     runner=(run_as_sanitizers_need)
     collect_sanitizer_reports
   fi
-  # Three places per CPU: a test that waits for devices takes one, one that computes two
-  # (cmake/ThermocompTargets.cmake).
-  "${runner[@]}" ctest --preset "$preset" --no-tests=error -j "$((3 * $(nproc)))" \
+  # Two places per CPU: a test that waits for devices takes one, one that computes two
+  # (cmake/ThermocompTargets.cmake). With three, tests wait for each other, and take longer in all.
+  "${runner[@]}" ctest --preset "$preset" --no-tests=error -j "$((2 * $(nproc)))" \
     "$@" --output-junit "$folder/results_$part.xml" || status=$?
   if ((status != 0)); then
     status=0

@@ -178,7 +178,7 @@ function(thermocomp_program name)
   thermocomp_use_precompiled(${name} thermocomp_precompiled_std)
 endfunction()
 
-# What a test takes of the places that ./test.sh gives ctest, three per CPU (property PROCESSORS): one
+# What a test takes of the places that ./test.sh gives ctest, two per CPU (property PROCESSORS): one
 # that computes takes two, one that mostly waits for devices and times takes one - but with sanitizers
 # it computes as well. A guest has one CPU, on which its devices, daemon and test must all keep their times.
 set(THERMOCOMP_COMPUTES 2)
