@@ -182,7 +182,7 @@ endfunction()
 # that computes takes two, one that mostly waits for devices and times takes one - but with sanitizers
 # it computes as well. A guest has one CPU, on which its devices, daemon and test must all keep their times.
 set(THERMOCOMP_COMPUTES 2)
-set(THERMOCOMP_GUEST 3)
+set(THERMOCOMP_GUEST 2)
 set(THERMOCOMP_COMPUTES_ON_TWO 4)
 set(THERMOCOMP_WAITS 1)
 if(THERMOCOMP_SANITIZE)
