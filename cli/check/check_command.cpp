@@ -244,7 +244,7 @@ std::string comparison_text(const ThermalModel& model) {
   return text;
 }
 
-/// What the daemon knows of the controller beside positions and speeds.
+/// The signals of the controller's switch and of cutting, a line each.
 std::string switches_text(const CompensationConfig& config) {
   const auto text = [](const std::string& what, const std::string& signal, const char* key) {
     return what + ": " +

@@ -206,7 +206,7 @@ void EventLog::note_returns(const Report& report, const EstimatorConfig& config)
   for (std::size_t i = 0; i < report.axes.size(); ++i) {
     const double applied_um = report.axes[i].applied_um;
     const double before_um = std::exchange(in_effect_um_[i], applied_um);
-    // What was still on its way when the link ended.
+    // An offset sent just before the link ended may have taken effect after it.
     constexpr double unwritten_s = 3.0;
     const double allowed_um =
         config.compensation.mismatch_um + unwritten_s * config.axes[i].limiter.rate_um_per_s_max;

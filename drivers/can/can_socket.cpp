@@ -196,7 +196,7 @@ void CanSocket::look_for_carrier() {
   ifreq request{};
   interface_.copy(std::begin(request.ifr_name), IFNAMSIZ - 1);
   if (::ioctl(socket_, SIOCGIFFLAGS, &request) < 0) return;  // receiving reports the error
-  if ((request.ifr_flags & IFF_UP) == 0) return;             // as above
+  if ((request.ifr_flags & IFF_UP) == 0) return;             // receiving reports it
   const bool none = (request.ifr_flags & IFF_RUNNING) == 0;
   if (none == without_carrier_) return;
   without_carrier_ = none;

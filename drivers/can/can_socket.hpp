@@ -136,7 +136,8 @@ class CanSocket {
   void enter(CanState state);
   void report_state();
   void look_for_carrier();
-  /// To the bus, by a frame or the kernel's report; the carrier may follow a second later.
+  /// The interface takes part in the bus again, as a frame or the kernel has shown; its carrier may
+  /// follow a second later.
   void returned();
   void fail(const char* what, int code);
   /// Kernel time stamp of a frame; also records the kernel's count of dropped frames.

@@ -21,7 +21,6 @@ class PasswordFile {
   /// rate-limited: guessing is slow and does not lock out logged-in users.
   [[nodiscard]] Answer check(const std::string& user, const std::string& password,
                              Clock::time_point now);
-  [[nodiscard]] bool has_user(const std::string& user) const { return hashes_.count(user) != 0; }
 
   static constexpr double looked_at_per_s = 4.0;
   static constexpr double looked_at_burst = 8.0;

@@ -198,12 +198,6 @@ TestRun make_run(const RunFile& run, const std::vector<std::string>& places,
   return test;
 }
 
-std::string listed(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text.append(text.empty() ? "" : ", ").append(name);
-  return text;
-}
-
 /// Moves displacements that were probed one after another, as each axis is entered by itself, into
 /// the last row of their set: only rows with every output are fitted.
 void gather_probings(RunFile& run, const std::vector<std::string>& outputs,
@@ -245,7 +239,7 @@ void gather_probings(RunFile& run, const std::vector<std::string>& outputs,
   }
   for (std::optional<std::size_t>& each : set) leave_alone(each);
   if (moved > 0)
-    notes.push_back(run.name + ": " + listed(outputs) + ": " + std::to_string(moved) +
+    notes.push_back(run.name + ": " + joined(outputs) + ": " + std::to_string(moved) +
                     " sets of probings within 2 min of each other count as one row each");
   if (alone > 0)
     notes.push_back(run.name + ": " + std::to_string(alone) +
@@ -253,8 +247,8 @@ void gather_probings(RunFile& run, const std::vector<std::string>& outputs,
                     "one output at a time, all count");
 }
 
-/// Empty unless the first displacement came after the temperatures had begun to move: it counts as
-/// 0 here, and 0 is the reference of the daemon and of `predict`.
+/// A note if the temperatures had moved before the first displacement, else empty. The fit takes
+/// that displacement for 0; the daemon and `predict` have 0 at the reference.
 std::string late_displacement(const RunFile& run, const std::vector<std::string>& places,
                               const std::vector<std::string>& outputs) {
   constexpr double moved_K_min = 1.0;
@@ -281,8 +275,8 @@ std::string late_displacement(const RunFile& run, const std::vector<std::string>
          printed("%.0f", (run.time_s()[probed] - run.time_s()[first]) / 60.0) +
          " min after the first temperatures, which moved by " + printed("%.1f", moved_K) +
          " K until then. It counts as 0 in the fit, but not in the daemon: the error will be "
-         "larger "
-         "than expected. Begin each run with a displacement in the reference state (thermocomp "
+         "larger than expected. Begin each run with a displacement in the reference state "
+         "(thermocomp "
          "measured AXIS 0)";
 }
 
