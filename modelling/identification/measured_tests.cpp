@@ -152,13 +152,15 @@ TestRun make_run(const RunFile& run, const std::vector<std::string>& places,
   const std::vector<const std::vector<double>*> probed(columns.end() - std::ssize(outputs),
                                                        columns.end());
   std::vector<std::size_t> rows;
+  std::optional<std::size_t> first_probed;
   std::size_t begin = 0;
   std::size_t complete = 0;
   for (std::size_t row = 0; row < run.selected_end; ++row) {
     const auto is_there = [row](const auto* column) { return std::isfinite((*column)[row]); };
     if (!std::all_of(seen.begin(), seen.end(), is_there)) continue;
     const bool is_complete = std::all_of(probed.begin(), probed.end(), is_there);
-    if (!is_complete && (rows.empty() || !between_probings)) continue;
+    if (!is_complete && !between_probings) continue;
+    if (is_complete && !first_probed) first_probed = row;
     if (row < run.selected_begin)
       ++begin;
     else if (is_complete)
@@ -187,12 +189,13 @@ TestRun make_run(const RunFile& run, const std::vector<std::string>& places,
     const std::size_t row = rows[static_cast<std::size_t>(i)];
     test.time_s[i] = run.time_s()[row];
     for (std::size_t j = 0; j < columns.size(); ++j) {
-      const double change = (*columns[j])[row] - (*columns[j])[rows.front()];
       const auto column = static_cast<Eigen::Index>(j);
+      const std::vector<double>& values = *columns[j];
       if (j < places.size())
-        test.places_K(i, column) = change;
+        test.places_K(i, column) = values[row] - values[rows.front()];
       else
-        test.outputs_um(i, column - static_cast<Eigen::Index>(places.size())) = change;
+        test.outputs_um(i, column - static_cast<Eigen::Index>(places.size())) =
+            values[row] - values[*first_probed];
     }
   }
   return test;
@@ -247,8 +250,7 @@ void gather_probings(RunFile& run, const std::vector<std::string>& outputs,
                     "one output at a time, all count");
 }
 
-/// A note if the temperatures had moved before the first displacement, else empty. The fit takes
-/// that displacement for 0; the daemon and `predict` have 0 at the reference.
+/// A note if the temperatures had moved before the first displacement, else empty.
 std::string late_displacement(const RunFile& run, const std::vector<std::string>& places,
                               const std::vector<std::string>& outputs) {
   constexpr double moved_K_min = 1.0;
@@ -274,9 +276,8 @@ std::string late_displacement(const RunFile& run, const std::vector<std::string>
   return run.name + ": the first displacement is " +
          printed("%.0f", (run.time_s()[probed] - run.time_s()[first]) / 60.0) +
          " min after the first temperatures, which moved by " + printed("%.1f", moved_K) +
-         " K until then. It counts as 0 in the fit, but not in the daemon: the error will be "
-         "larger than expected. Begin each run with a displacement in the reference state "
-         "(thermocomp "
+         " K until then. The model is fitted to the changes since then, and what came before is "
+         "not measured. Begin each run with a displacement in the reference state (thermocomp "
          "measured AXIS 0)";
 }
 
@@ -426,6 +427,18 @@ std::string MeasuredTests::fold_name(std::size_t fold) const {
 
 bool MeasuredTests::moved(const std::string& signal) const {
   return std::find(unmoved.begin(), unmoved.end(), signal) == unmoved.end();
+}
+
+const TestRun& MeasuredTests::course(std::size_t run) const {
+  return between.empty() ? runs[run] : between[run];
+}
+
+std::vector<Eigen::Index> MeasuredTests::rows_in_course(std::size_t run) const {
+  const Eigen::VectorXd& all_s = course(run).time_s;
+  std::vector<Eigen::Index> rows;
+  for (const double time_s : runs[run].time_s)
+    rows.push_back(std::lower_bound(all_s.begin(), all_s.end(), time_s) - all_s.begin());
+  return rows;
 }
 
 MeasuredTests measured_tests(const std::vector<RunFile>& given, const TestOptions& options) {

@@ -47,7 +47,9 @@ struct MeasuredTests {
   /// Those of `unmoved` that change gradually, like a charge: see fit_families().
   std::vector<std::string> gradual;
   std::vector<TestRun> runs;
-  std::vector<TestRun> between;  ///< `runs` with the rows between two probings; outputs NaN there
+  /// `runs` with the rows before the first and between two probings, outputs NaN there; rises over
+  /// its first row, changes of outputs since the first probing.
+  std::vector<TestRun> between;
   std::vector<Fold> folds;
   HotHalf hot;
   std::vector<std::string> notes;  ///< what was left out and why
@@ -55,6 +57,10 @@ struct MeasuredTests {
   [[nodiscard]] Eigen::Index rows() const;  ///< selected rows of all runs
   [[nodiscard]] std::string fold_name(std::size_t fold) const;
   [[nodiscard]] bool moved(const std::string& signal) const;  ///< not among the unmoved
+  /// The run with all rows that low passes need: that of `between`, if there.
+  [[nodiscard]] const TestRun& course(std::size_t run) const;
+  /// Rows of the course that are those of the run.
+  [[nodiscard]] std::vector<Eigen::Index> rows_in_course(std::size_t run) const;
 };
 
 struct TestOptions {
@@ -62,8 +68,7 @@ struct TestOptions {
   std::vector<std::string> outputs;  ///< may be empty
   std::size_t folds_of_one_run{6};
   bool signals{false};  ///< include operating signals
-  /// Keep rows without an output after the first complete row: temperatures between two probings,
-  /// for low passes. Their outputs are NaN.
+  /// `runs` are as `between`.
   bool between_probings{false};
 };
 

@@ -192,7 +192,7 @@ Statistics statistics_of(const std::vector<RunFile>& runs, std::string machine,
       if (run.outputs_um.row(row).allFinite()) probed.push_back(row);
     const auto rows = static_cast<Eigen::Index>(probed.size());
     RunRows& selected = all.emplace_back();
-    selected.x = bank_of(run, tests, bank)(probed, Eigen::all);
+    selected.x = bank_of(run, tests, bank, probed);
     selected.y = run.outputs_um(probed, Eigen::all);
     selected.seconds.resize(rows);
     const Eigen::VectorXd time_s = run.time_s(probed);

@@ -119,6 +119,17 @@ Eigen::VectorXd scales(const Eigen::VectorXd& deviation, const Eigen::VectorXd& 
   return scale;
 }
 
+Eigen::VectorXd low_pass(const Eigen::VectorXd& time_s, const Eigen::VectorXd& values,
+                         double tau_s) {
+  LowPass late(tau_s);
+  Eigen::VectorXd passed(values.size());
+  for (Eigen::Index row = 0; row < values.size(); ++row)
+    passed[row] = late.step(
+        std::chrono::duration_cast<nanoseconds>(std::chrono::duration<double>(time_s[row])),
+        values[row]);
+  return passed;
+}
+
 struct Rows {
   Eigen::MatrixXd x;
   Eigen::MatrixXd y;
@@ -147,11 +158,11 @@ BankColumns bank_columns(const MeasuredTests& tests) {
     }
   double longest_s = 0.0;
   std::vector<double> steps_s;
-  for (const TestRun& run : tests.runs) {
-    const Eigen::Index rows = run.time_s.size();
-    longest_s = std::max(longest_s, run.time_s[rows - 1] - run.time_s[0]);
-    for (Eigen::Index row = 1; row < rows; ++row)
-      steps_s.push_back(run.time_s[row] - run.time_s[row - 1]);
+  for (std::size_t i = 0; i < tests.runs.size(); ++i) {
+    const Eigen::VectorXd& time_s = tests.course(i).time_s;
+    longest_s = std::max(longest_s, time_s[time_s.size() - 1] - time_s[0]);
+    for (Eigen::Index row = 1; row < time_s.size(); ++row)
+      steps_s.push_back(time_s[row] - time_s[row - 1]);
   }
   std::nth_element(steps_s.begin(),
                    steps_s.begin() + static_cast<std::ptrdiff_t>(steps_s.size() / 2),
@@ -185,36 +196,30 @@ void add_hinges(const MeasuredTests& tests, BankColumns& columns) {
   if (columns.late() + hinges.size() <= columns_max) columns.hinges = std::move(hinges);
 }
 
-Eigen::MatrixXd bank_of(const TestRun& run, const MeasuredTests& tests,
-                        const BankColumns& columns) {
-  const Eigen::Index rows = run.time_s.size();
+Eigen::MatrixXd bank_of(const TestRun& course, const MeasuredTests& tests,
+                        const BankColumns& columns, const std::vector<Eigen::Index>& rows) {
   const auto subjects = static_cast<Eigen::Index>(columns.subjects.size());
-  Eigen::MatrixXd values(rows, subjects);
-  values.leftCols(run.places_K.cols()) = run.places_K;
-  for (Eigen::Index i = run.places_K.cols(); i < subjects; ++i) {
+  const auto of_signal = [&](const std::string& name) {
+    return course.signals.col(std::find(tests.signals.begin(), tests.signals.end(), name) -
+                              tests.signals.begin());
+  };
+  Eigen::MatrixXd bank(std::ssize(rows), static_cast<Eigen::Index>(columns.size()));
+  for (Eigen::Index i = 0; i < subjects; ++i) {
     const auto at = static_cast<std::size_t>(i);
-    const auto signal = std::find(tests.signals.begin(), tests.signals.end(), columns.subjects[at]);
-    values.col(i) = run.signals.col(signal - tests.signals.begin());
-    if (columns.powers[at] > 1.5) values.col(i) = values.col(i).cwiseAbs2().eval();
+    Eigen::VectorXd values;
+    if (i < course.places_K.cols())
+      values = course.places_K.col(i);
+    else
+      values = of_signal(columns.subjects[at]);
+    if (columns.powers[at] > 1.5) values = values.cwiseAbs2().eval();
+    for (std::size_t j = 0; j < columns.taus_s.size(); ++j)
+      bank.col(static_cast<Eigen::Index>(j) * subjects + i) =
+          low_pass(course.time_s, values, columns.taus_s[j])(rows);
   }
-  Eigen::MatrixXd bank(rows, static_cast<Eigen::Index>(columns.size()));
-  for (std::size_t j = 0; j < columns.taus_s.size(); ++j)
-    for (Eigen::Index i = 0; i < subjects; ++i) {
-      LowPass late(columns.taus_s[j]);
-      auto column = bank.col(static_cast<Eigen::Index>(j) * subjects + i);
-      for (Eigen::Index row = 0; row < rows; ++row)
-        column[row] = late.step(
-            std::chrono::duration_cast<nanoseconds>(std::chrono::duration<double>(run.time_s[row])),
-            values(row, i));
-      column.array() -= values(0, i);
-    }
   auto at = static_cast<Eigen::Index>(columns.late());
-  for (const Hinge& hinge : columns.hinges) {
-    const auto signal = std::find(tests.signals.begin(), tests.signals.end(), hinge.signal);
-    auto column = bank.col(at++);
-    column = (run.signals.col(signal - tests.signals.begin()).array() - hinge.above).max(0.0);
-    column.array() -= double{column[0]};
-  }
+  for (const Hinge& hinge : columns.hinges)
+    bank.col(at++) = (of_signal(hinge.signal)(rows).array() - hinge.above).max(0.0);
+  bank.rowwise() -= bank.row(0).eval();
   return bank;
 }
 
@@ -276,7 +281,8 @@ ThermalModel bank_model(const std::vector<std::string>& places,
 
 BankEquations::BankEquations(const MeasuredTests& tests, const BankColumns& columns) {
   const auto count = static_cast<Eigen::Index>(columns.size());
-  for (const TestRun& run : tests.runs) rows_.push_back(bank_of(run, tests, columns));
+  for (std::size_t run = 0; run < tests.runs.size(); ++run)
+    rows_.push_back(bank_of(tests.course(run), tests, columns, tests.rows_in_course(run)));
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(count);
   Eigen::VectorXd squares = sum;
   for (const Fold& fold : tests.folds) {

@@ -38,9 +38,11 @@ struct BankColumns {
 /// square describe.
 void add_hinges(const MeasuredTests& tests, BankColumns& columns);
 
-/// Columns over all rows of a run, relative to its first row; shape (rows, columns).
-[[nodiscard]] Eigen::MatrixXd bank_of(const TestRun& run, const MeasuredTests& tests,
-                                      const BankColumns& columns);
+/// Columns at some rows of a course, relative to the first of them; shape (rows, columns). Low
+/// passes see every row of the course, and begin settled at its first.
+[[nodiscard]] Eigen::MatrixXd bank_of(const TestRun& course, const MeasuredTests& tests,
+                                      const BankColumns& columns,
+                                      const std::vector<Eigen::Index>& rows);
 
 /// Term for the daemon without hinges and without subjects of no gain, since the daemon requests
 /// every signal of a term from the controller.

@@ -166,21 +166,26 @@ std::vector<double> remainders_um(const MeasuredTests& tests, const ThermalModel
   double rows = 0.0;
   for (const Fold& fold : tests.folds) {
     const TestRun& run = tests.runs[fold.run];
+    const TestRun& course = tests.course(fold.run);
+    const std::vector<Eigen::Index> probed = tests.rows_in_course(fold.run);
     displacement.restart();
     std::vector<Course> courses;
     courses.reserve(temperatures.size() + signals.size());
-    for (const std::string& name : temperatures) courses.push_back(course_of(tests, run, name));
-    for (const std::string& name : signals) courses.push_back(course_of(tests, run, name));
+    for (const std::string& name : temperatures) courses.push_back(course_of(tests, course, name));
+    for (const std::string& name : signals) courses.push_back(course_of(tests, course, name));
     std::vector<double> first_um;
-    for (Eigen::Index row = 0; row < fold.end; ++row) {
+    Eigen::Index at = 0;  // row of the run
+    for (Eigen::Index row = 0; at < fold.end; ++row) {
       for (std::size_t i = 0; i < temps.size(); ++i) temps[i] = courses[i].values[row];
       for (std::size_t i = 0; i < values.size(); ++i)
         values[i] = courses[temps.size() + i].values[row];
-      displacement.step(time_of(run.time_s[row]), temps, reference, values, now_um);
-      if (row == 0) first_um = now_um;
-      for (std::size_t o = 0; o < now_um.size() && row >= fold.begin; ++o)
+      displacement.step(time_of(course.time_s[row]), temps, reference, values, now_um);
+      if (row < probed[static_cast<std::size_t>(at)]) continue;
+      if (at == 0) first_um = now_um;
+      for (std::size_t o = 0; o < now_um.size() && at >= fold.begin; ++o)
         squares[o] += std::pow(
-            run.outputs_um(row, static_cast<Eigen::Index>(o)) - (now_um[o] - first_um[o]), 2.0);
+            run.outputs_um(at, static_cast<Eigen::Index>(o)) - (now_um[o] - first_um[o]), 2.0);
+      ++at;
     }
     rows += static_cast<double>(fold.end - fold.begin);
   }

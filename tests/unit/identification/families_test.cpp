@@ -272,9 +272,31 @@ TEST_CASE("the bank's columns are the low passes of the recorded columns, from 0
   const BankColumns columns = bank_columns(tests);
   CHECK(columns.subjects == std::vector<std::string>{"t1_degC", "t2_degC", "spindle_rpm"});
   CHECK(columns.taus_s == std::vector<double>{0.0, 300.0, 900.0, 2700.0, 8100.0});
-  const Eigen::MatrixXd bank = bank_of(tests.runs[0], tests, columns);
+  const Eigen::MatrixXd bank = bank_of(tests.course(0), tests, columns, tests.rows_in_course(0));
   CHECK(bank.row(0).norm() == 0.0);
   CHECK(bank.col(0).isApprox(tests.runs[0].places_K.col(0)));
+}
+
+TEST_CASE("a bank's low passes see the rows before the first and between two probings",
+          "[families]") {
+  RunFile run = machine_run("run", 1, [](double, double, double late, double) { return late; });
+  TestOptions options;
+  options.outputs = {"z_um"};
+  const MeasuredTests all = measured_tests({run}, options);
+  std::vector<Eigen::Index> probed;
+  for (std::size_t row = 0; row < run.values[4].size(); ++row)
+    if (row % 30 == 20)
+      probed.push_back(static_cast<Eigen::Index>(row));
+    else
+      run.values[4][row] = not_a_number;
+  const MeasuredTests rare = measured_tests({run}, options);
+  REQUIRE(rare.rows() == std::ssize(probed));
+  CHECK(rare.rows_in_course(0) == probed);
+  const BankColumns columns = bank_columns(rare);
+  CHECK(columns.taus_s == bank_columns(all).taus_s);
+  const Eigen::MatrixXd whole = bank_of(all.course(0), all, columns, all.rows_in_course(0));
+  const Eigen::MatrixXd expected = whole(probed, Eigen::all).rowwise() - whole.row(probed[0]);
+  CHECK((BankEquations(rare, columns).rows()[0] - expected).norm() < 1e-9 * expected.norm());
 }
 
 TEST_CASE("the order of the columns in a file does not change a bank's gains", "[families]") {
