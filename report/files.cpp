@@ -8,6 +8,7 @@
 #include <cstring>
 #include <fcntl.h>
 #include <iostream>
+#include <iterator>
 #include <unistd.h>
 
 #include <sys/stat.h>
@@ -31,7 +32,15 @@ RunFile RunLoader::load(const std::string& argument) {
 std::vector<RunFile> RunLoader::load(const std::vector<std::string>& arguments) {
   std::vector<RunFile> runs;
   runs.reserve(arguments.size());
-  for (const std::string& argument : arguments) runs.push_back(load(argument));
+  for (const std::string& argument : arguments) {
+    const RunFile run = load(argument);
+    std::vector<RunFile> parts = between_references(run);
+    if (!run.references.empty())
+      std::fprintf(stderr,
+                   "%s: displacement counts anew from %zu references: each stretch is a run\n",
+                   run.name.c_str(), run.references.size());
+    std::move(parts.begin(), parts.end(), std::back_inserter(runs));
+  }
   return runs;
 }
 

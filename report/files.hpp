@@ -26,6 +26,7 @@ class RunLoader {
   /// item; for further files of the same form only that they are.
   /// @throws ConfigurationError
   [[nodiscard]] RunFile load(const std::string& argument);
+  /// A run for each stretch between two references of a daemon's export.
   [[nodiscard]] std::vector<RunFile> load(const std::vector<std::string>& arguments);
 
  private:

@@ -115,9 +115,11 @@ int run_correction(const CourseOptions& options) {
   std::vector<RunFile> runs;
   RunLoader loader(options.columns);
   for (const std::string& record : options.records) {
-    runs.push_back(load_record(record, loader));
-    for (const Blunders& each : leave_out_blunders(runs.back(), model.outputs))
-      std::fprintf(stderr, "%s: %s\n", runs.back().name.c_str(), each.text().c_str());
+    for (RunFile& part : between_references(load_record(record, loader))) {
+      for (const Blunders& each : leave_out_blunders(part, model.outputs))
+        std::fprintf(stderr, "%s: %s\n", part.name.c_str(), each.text().c_str());
+      runs.push_back(std::move(part));
+    }
   }
   const CourseFit fit = fit_course(runs, model, correction, options.every_s);
   model.course = fit.course;

@@ -120,9 +120,7 @@ const Column* measured_column(const RunFile& run, const std::string& output) {
   return any ? &column : nullptr;
 }
 
-}  // namespace
-
-Prediction predict(const ThermalModel& model, const RunFile& run) {
+Prediction predict_stretch(const ThermalModel& model, const RunFile& run) {
   const ModelRows all = model_rows(model, run);
   const std::vector<Column>& predicted = all.displacement_um;
   Columns measured;
@@ -158,6 +156,55 @@ Prediction predict(const ThermalModel& model, const RunFile& run) {
     result.outputs.push_back(std::move(output));
   }
   return result;
+}
+
+bool has_value_of_each(const RunFile& run, const std::vector<std::string>& columns) {
+  return std::all_of(columns.begin(), columns.end(), [&run](const std::string& name) {
+    return first_value(run.column(name)).has_value();
+  });
+}
+
+void append(const Column& part, Column& whole) {
+  whole.insert(whole.end(), part.begin(), part.end());
+}
+
+/// @pre of the same model
+void append(const Prediction& part, Prediction& whole) {
+  append(part.time_s, whole.time_s);
+  append(part.outside, whole.outside);
+  if (part.furthest.distance > whole.furthest.distance) whole.furthest = part.furthest;
+  for (std::size_t i = 0; i < part.outputs.size(); ++i) {
+    PredictedOutput& output = whole.outputs[i];
+    append(part.outputs[i].predicted_um, output.predicted_um);
+    append(part.outputs[i].measured_um, output.measured_um);
+    append(part.outputs[i].sd_um, output.sd_um);
+    output.measured_there = output.measured_there || part.outputs[i].measured_there;
+    measure_residual(output);
+  }
+}
+
+}  // namespace
+
+Prediction predict(const ThermalModel& model, const RunFile& run) {
+  if (run.references.empty()) return predict_stretch(model, run);
+  const auto is_measured = [&model](const RunFile& each) {
+    return std::any_of(model.outputs.begin(), model.outputs.end(), [&](const std::string& output) {
+      return measured_column(each, output) != nullptr;
+    });
+  };
+  std::optional<Prediction> whole;
+  for (const RunFile& part : between_references(run)) {
+    if (is_measured(run) && !is_measured(part)) continue;
+    if (!has_value_of_each(part, model.temperature_columns()) ||
+        !has_value_of_each(part, model.signal_columns()))
+      continue;
+    const Prediction stretch = predict_stretch(model, part);
+    if (whole)
+      append(stretch, *whole);
+    else
+      whole = stretch;
+  }
+  return whole ? *whole : predict_stretch(model, run);
 }
 
 double outside_share(const Prediction& prediction) {

@@ -40,7 +40,8 @@ struct Prediction {
 
 /// The reference of an input is the model's, else the first value of its column in the file. t0 of
 /// an output is the file's first row with a prediction and a measured value. The states of lags
-/// start at the file's first row with a prediction. None of these depends on the selection.
+/// start at the file's first row with a prediction. None of these depends on the selection. Each
+/// stretch between two references of a daemon's export is predicted by itself.
 /// @throws ConfigurationError if a column of the model is missing or empty
 [[nodiscard]] Prediction predict(const ThermalModel& model, const RunFile& run);
 

@@ -24,6 +24,9 @@ struct RunFile {
   std::vector<std::vector<double>> values;  ///< shape (columns, rows); NaN: missing
   std::size_t selected_begin{0};
   std::size_t selected_end{0};
+  /// Rows from which displacement counts from another state: a daemon's new reference before them.
+  std::vector<std::size_t> references;
+  bool is_part{false};  ///< of a file, from one reference to the next; `name` has its selection
   /// How a file of another form was read, line by line; empty for our own form.
   std::vector<std::string> understood;
   std::optional<WallZero> wall_zero;  ///< from dates, or from a comment
@@ -37,6 +40,7 @@ struct RunFile {
 
 /// The comment with the wall-clock time of time_s = 0, as written by `export` and `import`:
 /// "# 0.000 s: wall time 2026-03-02T07:00:00.000Z".
+inline constexpr std::string_view reference_mark = " s: command reference";  ///< ends a comment
 inline constexpr std::string_view wall_zero_mark = "# 0.000 s: wall time ";
 /// @return nullopt when there is no such comment
 [[nodiscard]] std::optional<WallZero> stated_wall_zero(std::string_view text);

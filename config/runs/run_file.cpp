@@ -89,13 +89,18 @@ class RunParser {
     problems_.push_back({run_.name, line, std::move(key), std::move(shown), std::move(rule)});
   }
 
-  /// The next line that is not a comment.
+  /// The next line that is not a comment. A reference before the first row changes nothing.
   bool next_line(std::string_view& line) {
     while (!rest_.empty()) {
       ++line_number_;
       static_cast<void>(take(rest_, '\n', line));
       if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
       if (!line.starts_with('#')) return true;
+      const std::size_t row = run_.rows();
+      std::vector<std::size_t>& references = run_.references;
+      if (line.ends_with(reference_mark) && row > 0 &&
+          (references.empty() || references.back() < row))
+        references.push_back(row);
     }
     return false;
   }
@@ -346,13 +351,41 @@ std::string sheet_of(const std::filesystem::path& path) {
 
 }  // namespace
 
+std::vector<RunFile> between_references(const RunFile& run) {
+  std::vector<std::size_t> bounds{0};
+  for (const std::size_t row : run.references)
+    if (row < run.rows()) bounds.push_back(row);
+  if (bounds.size() == 1) return {run};
+  bounds.push_back(run.rows());
+  std::vector<RunFile> parts;
+  for (std::size_t i = 0; i + 1 < bounds.size(); ++i) {
+    const std::size_t begin = std::max(bounds[i], run.selected_begin);
+    const std::size_t end = std::min(bounds[i + 1], run.selected_end);
+    if (begin >= end) continue;
+    RunFile& part = parts.emplace_back(run);
+    part.references.clear();
+    part.selected_begin = bounds[i];
+    part.selected_end = bounds[i + 1];
+    part.name = part.argument = selected_name(part);
+    part.is_part = true;
+    part.selected_begin = begin - bounds[i];
+    part.selected_end = end - bounds[i];
+    for (std::vector<double>& column : part.values) {
+      column.resize(bounds[i + 1]);
+      column.erase(column.begin(), column.begin() + static_cast<std::ptrdiff_t>(bounds[i]));
+    }
+  }
+  return parts;
+}
+
 std::string selected_name(const RunFile& run) {
   if (run.selected_begin == 0 && run.selected_end == run.rows()) return run.name;
+  const RunSelection whole = run.is_part ? parse_selection(run.name) : RunSelection{run.name};
   const std::vector<double>& time_s = run.time_s();
-  const auto bound = [&](std::size_t row) {
-    return row == 0 || row >= run.rows() ? "" : number_text(time_s[row]);
-  };
-  return run.name + "@" + bound(run.selected_begin) + ":" + bound(run.selected_end);
+  const double from_s = run.selected_begin == 0 ? whole.from_s : time_s[run.selected_begin];
+  const double to_s = run.selected_end == run.rows() ? whole.to_s : time_s[run.selected_end];
+  const auto bound = [](double each_s) { return std::isfinite(each_s) ? number_text(each_s) : ""; };
+  return whole.file.string() + "@" + bound(from_s) + ":" + bound(to_s);
 }
 
 RunFile parse_run(std::string_view text, const std::string& name, const RunSelection& selection,

@@ -38,6 +38,10 @@ struct RunSelection {
 [[nodiscard]] RunFile parse_run(std::string_view text, const std::string& name,
                                 const RunSelection& selection = {}, const ColumnMap* map = nullptr);
 
+/// The stretches from one reference to the next, each a run with references and lags of its own,
+/// named FILE@T0:T1; those without a selected row are left out.
+[[nodiscard]] std::vector<RunFile> between_references(const RunFile& run);
+
 /// All rows as a run file, every number bit for bit; missing values are empty fields.
 [[nodiscard]] std::string write_run(const RunFile& run);
 

@@ -250,6 +250,25 @@ void gather_probings(RunFile& run, const std::vector<std::string>& outputs,
                     "one output at a time, all count");
 }
 
+/// Leaves out the parts of a file with too few displacements, such as before its first reference.
+void leave_out_short_parts(std::vector<RunFile>& runs, const std::vector<std::string>& outputs,
+                           std::vector<std::string>& notes) {
+  const auto is_short = [&](const RunFile& run) {
+    std::size_t probed = 0;
+    for (std::size_t row = run.selected_begin; row < run.selected_end; ++row)
+      if (std::all_of(outputs.begin(), outputs.end(), [&](const std::string& name) {
+            return std::isfinite(run.column(name)[row]);
+          }))
+        ++probed;
+    return run.is_part && probed < rows_min;
+  };
+  if (outputs.empty() || std::all_of(runs.begin(), runs.end(), is_short)) return;
+  for (const RunFile& run : runs)
+    if (is_short(run))
+      notes.push_back(run.name + " is left out: it has fewer than 3 displacements");
+  std::erase_if(runs, is_short);
+}
+
 /// A note if the temperatures had moved before the first displacement, else empty.
 std::string late_displacement(const RunFile& run, const std::vector<std::string>& places,
                               const std::vector<std::string>& outputs) {
@@ -451,6 +470,7 @@ MeasuredTests measured_tests(const std::vector<RunFile>& given, const TestOption
       tests.notes.push_back(run.name + ": " + each.text());
     gather_probings(run, options.outputs, tests.notes);
   }
+  leave_out_short_parts(runs, options.outputs, tests.notes);
   for (const std::string& name : options.places)
     if (!is_temperature(name)) refuse("", name, "must be a temperature (*_degC, *_K)");
   for (const std::string& name : options.outputs)

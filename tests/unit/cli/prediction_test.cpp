@@ -39,6 +39,20 @@ TEST_CASE("a prediction is the model's change since the first row, beside the me
   CHECK(z.peak_um == Approx(1.0));
 }
 
+TEST_CASE("displacement counts anew from each reference of an export", "[cli][predict]") {
+  const RunFile run = parse_run(
+      "time_s,t1_degC,t2_degC,z_um\n0,20,20,\n5,20.5,20,7\n10,21,20,9\n"
+      "# 11.0 s: command reference\n20,25,20,1\n30,26,20,2.5\n",
+      "run.csv");
+  REQUIRE(run.references == std::vector<std::size_t>{3});
+  const Prediction result = predict(two_temperatures(), run);
+  REQUIRE(result.time_s == std::vector<double>{5, 10, 20, 30});
+  const auto& z = result.outputs.at(0);
+  CHECK(z.predicted_um == std::vector<double>{0, 1, 0, 2});
+  CHECK(z.measured_um == std::vector<double>{0, 2, 0, 1.5});
+  CHECK(z.peak_um == Approx(1.0));
+}
+
 TEST_CASE("a selection keeps reference and start at the file's first row", "[cli][predict]") {
   const auto selection = parse_selection("run.csv@10:20");
   const RunFile run =

@@ -201,6 +201,34 @@ TEST_CASE("a selection is a half-open interval of time, and the run stays whole"
   CHECK(selected("run.csv@-5:1e9") == std::pair<std::size_t, std::size_t>(0, 3));
 }
 
+TEST_CASE("an export is cut at its references into runs whose names select them", "[config][run]") {
+  const std::string text =
+      "time_s,z_um\n0,1\n10,2\n# 12.000 s: command reference\n20,0\n30,1\n"
+      "# 31.000 s: command reference\n# 32.000 s: command reference\n40,0\n";
+  const auto parts_of = [&](const std::string& argument) {
+    return between_references(parse_run(text, "run.csv", parse_selection(argument)));
+  };
+  const std::vector<RunFile> parts = parts_of("run.csv");
+  REQUIRE(parts.size() == 3);
+  CHECK(parts[0].name == "run.csv@:20");
+  CHECK(parts[1].name == "run.csv@20:40");
+  CHECK(parts[1].column("z_um") == std::vector<double>{0, 1});
+  CHECK(selected_name(parts[1]) == "run.csv@20:40");
+  CHECK(parts[2].name == "run.csv@40:");
+  for (const RunFile& part : parts) {
+    CHECK(part.references.empty());
+    const std::vector<RunFile> again = parts_of(part.name);
+    REQUIRE(again.size() == 1);
+    CHECK(again[0].values == part.values);
+  }
+  const std::vector<RunFile> late = parts_of("run.csv@25:");
+  REQUIRE(late.size() == 2);
+  CHECK(late[0].selected_begin == 1);
+  CHECK(late[0].rows() == 2);
+  CHECK(selected_name(late[0]) == "run.csv@30:40");
+  CHECK(between_references(parse_run(good_run, "run.csv")).size() == 1);
+}
+
 TEST_CASE("the file's name may contain an @", "[config][run]") {
   CHECK(parse_selection("a@b.csv").file == "a@b.csv");
   CHECK(parse_selection("a@b.csv@1:2").file == "a@b.csv");

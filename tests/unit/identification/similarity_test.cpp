@@ -148,5 +148,25 @@ TEST_CASE("a first displacement long after the first temperatures is reported",
   CHECK(has_note(tests, "the first displacement is 26 min after the first temperatures"));
 }
 
+TEST_CASE("a stretch of an export with fewer than three displacements is left out",
+          "[identification]") {
+  std::string text = "time_s,t1_degC,z_um\n";
+  for (int row = 0; row < 40; ++row) {
+    const std::string second = std::to_string(10 * row);
+    if (row == 10 || row == 25) text.append("# ").append(second).append(" s: command reference\n");
+    text.append(second).append(",").append(std::to_string(20 + row)).append(",");
+    if (row >= 10) text.append(std::to_string(row));
+    text.append("\n");
+  }
+  TestOptions options;
+  options.outputs = {"z_um"};
+  const MeasuredTests tests =
+      measured_tests(between_references(parse_run(text, "run.csv")), options);
+  REQUIRE(tests.runs.size() == 2);
+  CHECK(tests.runs[0].name == "run.csv@100:250");
+  CHECK(tests.runs[1].outputs_um(0, 0) == 0.0);
+  CHECK(has_note(tests, "run.csv@:100 is left out: it has fewer than 3 displacements"));
+}
+
 }  // namespace
 }  // namespace thermocomp::identification
