@@ -44,6 +44,20 @@ struct AxisValue {
   double value_um{0.0};
 };
 
+/// What the axes are going to do after a command that changes their targets.
+void print_moves(const GlobalOptions& global) {
+  constexpr double shown_um = 0.1;
+  const json status = StatusClient(global.socket).call("status", json::object());
+  for (const json& axis : status.value("axes", json::array())) {
+    const double from = number_of(axis, "offset");
+    const double to = number_of(axis, "target");
+    if (!flag_of(axis, "driven") || !(std::abs(to - from) >= shown_um)) continue;
+    std::cout << "axis " << text_of(axis, "name") << " moves from " << fixed_signed(from, 2)
+              << " to " << fixed_signed(to, 2) << ' ' << text_of(axis, "unit")
+              << " at its slew rate\n";
+  }
+}
+
 int run_plain(const GlobalOptions& global, const PlainCommand& command) {
   const json answer = StatusClient(global.socket).call(command.method, json::object());
   const std::string checksum = text_of(answer, "checksum");
@@ -56,6 +70,7 @@ int run_plain(const GlobalOptions& global, const PlainCommand& command) {
   if (flag_of(answer, "dry_run"))
     std::cout << "DRY RUN: nothing is written to the controller. The switch outlives the dry run:\n"
                  "thermocomp disable before you end it, so that no axis moves unwatched\n";
+  print_moves(global);
   return exit_success;
 }
 
@@ -81,7 +96,7 @@ int run_measured(const GlobalOptions& global, const MeasuredValue& given) {
                         : " um without offset; by the model ")
             << fixed_signed(predicted_um, 2) << (remains ? " um are left" : " um") << '\n';
   if (const double whole_um = number_of(answer, "predicted_um");
-      remains && whole_um != predicted_um)
+      remains && fixed_signed(whole_um, 2) != fixed_signed(predicted_um, 2))
     std::cout << "(displacement by the model " << fixed_signed(whole_um, 2)
               << " um, the rest is taken out by the offset in effect)\n";
   return exit_success;
@@ -195,6 +210,7 @@ int run_promote(const GlobalOptions& global, bool back) {
   if (std::isfinite(done.better_probability))
     std::cout << "by the probings beside the model it is better with "
               << fixed(100.0 * done.better_probability, 0) << " % (50 %: equally good)\n";
+  print_moves(global);
   return exit_success;
 }
 

@@ -69,7 +69,8 @@ ScanReport scan(const DaemonConfig& config, const ScanOptions& options) {
 int run_scan(ScanOptions options) {
   read_units(options.units, options.search);
   const DaemonConfig config = load_daemon_config(options.file);
-  const ScanReport report = scan(config, options);
+  ScanReport report = scan(config, options);
+  note_fahrenheit(report);
   if (options.as_json) {
     std::cout << scan_json(report).dump(2) << '\n';
   } else {

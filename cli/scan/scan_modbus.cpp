@@ -246,7 +246,8 @@ void ModbusScan::judge_value(const ModbusDeviceConfig& device, const ModbusChann
                                                short_number(range.max_degC) + "] ([screening])";
   result.hints = hints_for_words(channel, words, range);
   result.likely_open_code = likely_open_code(channel, words);
-  if (result.hints.empty()) hint_neighbours(device, channel, result);
+  // Two words at the next address may be right where the same two in another order look right.
+  if (result.hints.empty() || words.size() > 1) hint_neighbours(device, channel, result);
   if (result.hints.empty()) {
     result.hints.emplace_back("compare table, address, encoding and scale with the manual");
   }

@@ -238,6 +238,24 @@ ordered_json scan_json(const ScanReport& report) {
           {"controller", report.controller ? json_of(*report.controller) : ordered_json(nullptr)}};
 }
 
+void note_fahrenheit(ScanReport& report) {
+  constexpr double room_degF_min = 59.0;   // 15 degC
+  constexpr double room_degF_max = 104.0;  // 40 degC
+  const auto in_degC = [](double temp_degF) { return (temp_degF - 32.0) / 1.8; };
+  for (ScanBus& bus : report.buses)
+    for (ScanDevice& device : bus.devices) {
+      std::vector<double> temps;
+      for (const ScanChannel& channel : device.channels)
+        if (channel.good()) temps.push_back(channel.temp_degC);
+      if (temps.empty() || !device.note.empty()) continue;
+      const auto [low, high] = std::minmax_element(temps.begin(), temps.end());
+      if (*low < room_degF_min || *high > room_degF_max) continue;
+      device.note = fixed(*low, 1) + " to " + fixed(*high, 1) + " degC; as degF it would be " +
+                    fixed(in_degC(*low), 1) + " to " + fixed(in_degC(*high), 1) +
+                    " degC. If the machine is cold, set the module to degrees Celsius";
+    }
+}
+
 std::string hex_words(std::span<const std::uint16_t> words) {
   std::vector<std::uint8_t> bytes;
   for (const std::uint16_t word : words) {

@@ -83,6 +83,8 @@ struct ScanReport {
 
 [[nodiscard]] std::size_t count_channels(const ScanReport& report);
 [[nodiscard]] std::size_t count_good(const ScanReport& report);
+/// Notes devices whose temperatures are those of a room in degF.
+void note_fahrenheit(ScanReport& report);
 /// Every channel gives a temperature, and all values of the controller are present.
 [[nodiscard]] bool is_complete(const ScanReport& report);
 

@@ -371,6 +371,21 @@ std::string to_string(TestKind kind) {
   return kind == TestKind::spindle ? "spindle" : "axis";
 }
 
+namespace {
+
+std::optional<bool> is_compensated(const RunFile& run) {
+  std::optional<bool> compensated;
+  for (std::size_t i = 0; i < run.columns.size(); ++i) {
+    if (!run.columns[i].ends_with("_offset_um")) continue;
+    for (std::size_t row = run.selected_begin; row < run.selected_end; ++row)
+      if (std::isfinite(run.values[i][row]))
+        compensated = compensated.value_or(false) || run.values[i][row] != 0.0;
+  }
+  return compensated;
+}
+
+}  // namespace
+
 TestData test_data(const RunFile& given, const TestOptions& options) {
   TestData data;
   RunFile run = given;
@@ -390,6 +405,7 @@ TestData test_data(const RunFile& given, const TestOptions& options) {
     data.description.push_back(axis.name + " is " + axis.from + ", " +
                                std::to_string(axis.measured.value.size()) + " values");
   data.temperatures = temperatures_of(run, options.room);
+  data.compensated = is_compensated(run);
   if (options.kind == TestKind::environment) {
     if (!options.running.empty())
       refuse(run, "--running", options.running, "must be omitted in a test of the environment");

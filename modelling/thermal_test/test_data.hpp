@@ -1,6 +1,7 @@
 /// Record of a thermal test by axes and phases, and the assignment of columns to axes.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -79,6 +80,7 @@ struct TestData {
   std::vector<double> speed_time_s;
   std::vector<double> speed;
   std::vector<double> breaks_s;          ///< times of speed changes
+  std::optional<bool> compensated;       ///< an offset was in effect; nullopt: not recorded
   std::vector<std::string> description;  ///< interpretation of the columns, one line each
 };
 

@@ -18,6 +18,7 @@ namespace {
 /// Durations of running or record that differ by less count as equal.
 constexpr double same_length_share = 0.05;
 constexpr double room_difference_K = 1.0;
+constexpr double start_difference_K_max = 1.0;
 
 double length_s(const TestPhases& phases) {
   return phases.runs ? phases.running_to_s - phases.running_from_s : phases.to_s - phases.from_s;
@@ -42,6 +43,34 @@ double mean_speed(const TestData& data) {
   return count > 0.0 ? sum / count : std::nan("");
 }
 
+/// How much warmer the machine was at the start than the room, the room's difference left out where
+/// it is not known; mean over the places that both tests have. NaN: none.
+double start_difference_K(const TestFigures& before, const TestFigures& after) {
+  double places_K = 0.0;
+  double room_K = 0.0;
+  double places = 0.0;
+  double rooms = 0.0;
+  for (const TemperatureFigures& first : before.temperatures)
+    for (const TemperatureFigures& second : after.temperatures) {
+      if (first.name != second.name) continue;
+      (first.is_room ? room_K : places_K) += second.at_start_degC - first.at_start_degC;
+      (first.is_room ? rooms : places) += 1.0;
+    }
+  return places_K / places - (rooms > 0.0 ? room_K / rooms : 0.0);
+}
+
+void add_compensation_note(TestAnswer& answer) {
+  const std::optional<bool>& before = answer.before.compensated;
+  const std::optional<bool>& after = answer.after->compensated;
+  if (after == false)
+    answer.notes.emplace_back(
+        before == true ? "The first test was compensated and the second not."
+                       : "No offset was in effect in the second test, so the ratio does not show "
+                         "a compensation.");
+  else if (before == true)
+    answer.notes.emplace_back("An offset was in effect in both tests.");
+}
+
 void add_notes(TestAnswer& answer) {
   const double before_s = length_s(answer.before.phases);
   const double after_s = length_s(answer.after->phases);
@@ -63,6 +92,16 @@ void add_notes(TestAnswer& answer) {
   if (std::abs(room_before - room_after) > room_difference_K)
     answer.notes.emplace_back(
         "The room temperature changed by over 1 K more in one test than in the other.");
+  const double start_K = start_difference_K(answer.before_figures, *answer.after_figures);
+  if (std::abs(start_K) > start_difference_K_max) {
+    char text[160];
+    std::snprintf(text, sizeof text,
+                  "The machine was %.1f K %s at the start of the second test, relative to the room "
+                  "if recorded: the two do not begin in the same state.",
+                  std::abs(start_K), start_K > 0 ? "warmer" : "colder");
+    answer.notes.emplace_back(text);
+  }
+  add_compensation_note(answer);
 }
 
 }  // namespace

@@ -77,6 +77,7 @@ int run_report(ReportOptions options) {
   if (options.output != "-" && options.json != "-") {
     std::string text = sentences(answer.before_figures);
     if (answer.after_figures) text += sentences(*answer.after_figures);
+    for (const std::string& note : answer.notes) text += note + "\n";
     std::fputs(text.c_str(), stdout);
   }
   return cli::exit_success;

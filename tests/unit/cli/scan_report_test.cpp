@@ -46,6 +46,25 @@ TEST_CASE("a scan with every value of the controller is complete", "[cli][scan]"
   CHECK(is_complete(ScanReport{}));
 }
 
+TEST_CASE("a module whose temperatures are those of a room in degF is noted", "[cli][scan]") {
+  const auto note_of = [](std::vector<double> temps_degC) {
+    ScanReport report;
+    ScanDevice& device = report.buses.emplace_back().devices.emplace_back();
+    for (const double each : temps_degC) {
+      ScanChannel& channel = device.channels.emplace_back();
+      channel.temp_degC = each;
+      channel.fault = Fault::none;
+    }
+    device.channels.emplace_back();  // never read
+    note_fahrenheit(report);
+    return report.buses[0].devices[0].note;
+  };
+  CHECK_THAT(note_of({66.8, 68.1}),
+             Contains("66.8 to 68.1 degC; as degF it would be 19.3 to 20.1"));
+  CHECK(note_of({66.8, 24.0}).empty());
+  CHECK(note_of({}).empty());
+}
+
 TEST_CASE("missing values of a controller are listed with its answers", "[cli][scan]") {
   const ScanReport report =
       report_of({there("spindle_rpm", 10.0), missing("x_mm"), missing("heartbeat")});

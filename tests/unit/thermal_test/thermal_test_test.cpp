@@ -311,6 +311,28 @@ TEST_CASE("the environment: the whole record and the hour with the largest range
   CHECK_THAT(report_html(answer), Contains("largest hour"));
 }
 
+TEST_CASE("a comparison says whether an offset was in effect and the machine as cold",
+          "[thermal_test]") {
+  const auto answer = [](double before_um, double after_um, double warmer_K) {
+    const auto test_of = [](double offset_um, double temp_degC) {
+      RunFile run = simulated(0.2, 9);
+      run.columns.insert(run.columns.end(), {"z_offset_um", "head_degC"});
+      run.values.emplace_back(run.rows(), offset_um);
+      run.values.emplace_back(run.rows(), temp_degC);
+      return test_data(run, options_of(TestKind::environment));
+    };
+    std::string notes;
+    for (const std::string& note :
+         answer_of(test_of(before_um, 20.0), test_of(after_um, 20.0 + warmer_K)).notes)
+      notes += note;
+    return notes;
+  };
+  CHECK(answer(0.0, 12.0, 0.0).empty());
+  CHECK_THAT(answer(0.0, 0.0, 0.0), Contains("No offset was in effect in the second test"));
+  CHECK_THAT(answer(5.0, 12.0, 0.0), Contains("in both tests"));
+  CHECK_THAT(answer(0.0, 12.0, 9.0), Contains("K warmer at the start of the second test"));
+}
+
 TEST_CASE("a completed sheet is read unchanged", "[thermal_test]") {
   SheetOptions sheet;
   sheet.rpm_max = 8000.0;
