@@ -164,8 +164,8 @@ void Supervisor::note_report() {
   const Report& report = parts_.cycle.report();
   const bool all_driven = std::all_of(report.axes.begin(), report.axes.end(),
                                       [](const AxisReport& axis) { return axis.driven; });
-  if (report.mode != Mode::compensating || !all_driven || !moves(parts_.config.model))
-    idle_until_ = Clock::now();
+  const bool moved = moves(parts_.config.model) || parts_.config.estimator.correction.learns_bias();
+  if (report.mode != Mode::compensating || !all_driven || !moved) idle_until_ = Clock::now();
   if (trend_.is_due(report.now))
     trend_.note(report.now, parts_.config.model.temperature_columns(), report.inputs);
   judge_reference(report);

@@ -70,6 +70,11 @@ struct CorrectionConfig {
     };
   }
   void validate() const { require_numbers(*this); }  ///< @throws InvalidValue
+  /// It gives an offset even where the model gives no displacement.
+  [[nodiscard]] bool learns_bias() const noexcept {
+    return form == CorrectionForm::constant ||
+           (form == CorrectionForm::recursive && bias_drift_um_per_sqrt_h > 0.0);
+  }
   bool operator==(const CorrectionConfig&) const = default;
 };
 

@@ -37,8 +37,8 @@ std::vector<RunFile> RunLoader::load(const std::vector<std::string>& arguments) 
     std::vector<RunFile> parts = between_references(run);
     if (!run.references.empty())
       std::fprintf(stderr,
-                   "%s: displacement counts anew from %zu references: each stretch is a run\n",
-                   run.name.c_str(), run.references.size());
+                   "%s: displacement counts anew from each reference: read as %zu runs\n",
+                   run.name.c_str(), parts.size());
     std::move(parts.begin(), parts.end(), std::back_inserter(runs));
   }
   return runs;

@@ -467,7 +467,7 @@ struct ModelStatus {
   std::string checksum{};
   std::uint64_t inputs{0};
   std::uint64_t outputs{0};
-  bool moves{true};  ///< some coefficient is not zero; `init` writes zeros
+  bool moves{true};  ///< some coefficient is not zero, or a bias is learned; `init` writes zeros
   /// Axes whose coefficients are all zero, unless all are.
   std::vector<std::string> still{};
   bool compared{true};            ///< with measured displacement, according to its file

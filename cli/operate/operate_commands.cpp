@@ -44,10 +44,16 @@ struct AxisValue {
   double value_um{0.0};
 };
 
-/// What the axes are going to do after a command that changes their targets.
+/// The moves of the axes after a command that changes their targets; nothing if the daemon, which
+/// has done the command, does not answer.
 void print_moves(const GlobalOptions& global) {
   constexpr double shown_um = 0.1;
-  const json status = StatusClient(global.socket).call("status", json::object());
+  json status;
+  try {
+    status = StatusClient(global.socket).call("status", json::object());
+  } catch (const Failure&) {
+    return;
+  }
   for (const json& axis : status.value("axes", json::array())) {
     const double from = number_of(axis, "offset");
     const double to = number_of(axis, "target");

@@ -479,7 +479,10 @@ MachineWeek machine_week(const std::filesystem::path& history, const WallSpan& s
   add_modes(week, mode_spells(events, span), merged(recorded_spans(reader.segments())),
             merged(spans_of(
                 reader.segments(), setups,
-                [](const ReplaySetup& setup) { return !moves(setup.model); }, span)));
+                [](const ReplaySetup& setup) {
+                  return !moves(setup.model) && !setup.estimator.correction.learns_bias();
+                },
+                span)));
   week.outages = outages_of(events, span);
   week.sensors = sensors_of(week.course);
   const auto is_dry_run = [](const ReplaySetup& setup) { return setup.dry_run; };

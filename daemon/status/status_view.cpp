@@ -328,9 +328,13 @@ std::map<std::string, double> by_axis(const StatusView& view, double AxisReport:
   return figures;
 }
 
+bool moves(const DaemonConfig& config) {
+  return moves(config.model) || config.estimator.correction.learns_bias();
+}
+
 std::vector<std::string> still_axes(const DaemonConfig& config) {
   std::vector<std::string> names;
-  if (!moves(config.model)) return names;
+  if (!moves(config.model) || config.estimator.correction.learns_bias()) return names;
   for (const AxisSpan& span : axis_spans(config.estimator.axes)) {
     const AxisConfig& axis = config.estimator.axes[span.first];
     if (!moves(config.model, axis.output)) names.push_back(axis_name(axis));
@@ -344,7 +348,7 @@ ModelStatus model_of(const StatusView& view) {
                      .checksum = view.config.model_checksum,
                      .inputs = view.config.model.inputs.size(),
                      .outputs = view.config.model.outputs.size(),
-                     .moves = moves(view.config.model),
+                     .moves = moves(view.config),
                      .still = still_axes(view.config),
                      .compared = is_compared(view.config.model),
                      .claimed_sd_um = by_axis(view, &AxisReport::claimed_sd_um),

@@ -77,7 +77,8 @@ def test_nothing_moves_before_an_operator_enables_it_and_the_switch_survives(day
     daemon.end()
     daemon.start().wait_for_mode("disabled")  # a restart does not change this
 
-    assert daemon.cli("enable")[0] == 0
+    status, out, _ = daemon.cli("enable")
+    assert status == 0 and "axis z moves from +" in out and " to +12.00 um" in out, out
     eventually(lambda: daemon.axis()["applied"] == pytest.approx(WANTED_um, abs=0.05), "applied")
     daemon.kill()
     daemon.start().wait_for_mode("compensating")

@@ -97,7 +97,8 @@ def test_a_candidate_is_scored_promoted_and_taken_back(machine, lab):
     daemon.start().wait_for_mode("compensating")
     assert daemon.status()["candidate"] == before
 
-    assert daemon.cli("promote")[0] == 0
+    status, out, _ = daemon.cli("promote")
+    assert status == 0 and " to +8.00 um at its slew rate" in out, out
     daemon.wait_for_offset(8.0, 0.05)
     assert machine.model.read_text() == candidate.read_text() and kept.read_text() == old
     assert "candidate" not in daemon.status()
@@ -196,3 +197,22 @@ def test_a_model_of_zeros_refuses_no_measured_value_and_a_promoted_one_begins_it
     state = eventually(lambda: (now := daemon.status())["model"]["moves"] and now, "the model is in use")
     assert state["model"]["probed_rms_um"].get("z") is None
     assert state["compensating_s"] < state["uptime_s"] - 0.1
+
+
+def test_a_new_reference_begins_a_run_in_an_export(machine, lab):
+    daemon = machine.start()
+    for offset_um in (6.0, 12.0):
+        machine.warm_by(offset_um)
+        daemon.wait_for_offset(6.0, 0.05)  # the second from the new reference on
+        assert daemon.cli("measured", "z", "0.5")[0] == 0
+        daemon.committed()
+        if offset_um == 6.0:
+            assert daemon.cli("reference", "--force")[0] == 0
+            daemon.wait_for_offset(0.0, 0.05)
+    daemon.end()
+    exported = lab.folder / "run.csv"
+    assert run_tool("export", daemon.history, "-o", exported)[0] == 0
+    status, out, errors = run_tool("predict", "--model", machine.model, exported, "-o", lab.folder / "p.csv")
+    assert status == 0, errors
+    _, _, errors = run_tool("inspect", exported)
+    assert "run.csv: displacement counts anew from each reference: read as 2 runs" in errors, errors
