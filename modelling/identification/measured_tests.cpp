@@ -329,7 +329,7 @@ void leave_out_still_places(MeasuredTests& tests) {
 bool is_constant(const MeasuredTests& tests, std::size_t signal) {
   double within = 0.0;
   double size = 0.0;
-  for (const TestRun& run : tests.runs) {
+  for (const TestRun& run : tests.between) {
     const auto column = run.signals.col(static_cast<Eigen::Index>(signal))
                             .tail(run.time_s.size() - run.begin)
                             .array();
@@ -352,13 +352,13 @@ Ways ways_of(const MeasuredTests& tests, std::size_t signal) {
   };
   double least = std::numeric_limits<double>::infinity();
   double most = -least;
-  for (const TestRun& run : tests.runs) {
+  for (const TestRun& run : tests.between) {
     least = std::min(least, selected(run).minCoeff());
     most = std::max(most, selected(run).maxCoeff());
   }
   const double turn = way_share * (most - least);
   Ways ways;
-  for (const TestRun& run : tests.runs) {
+  for (const TestRun& run : tests.between) {
     int way = 0;  // up: 1, down: -1
     double last = selected(run)[0];
     double low = last;
@@ -382,8 +382,8 @@ Ways ways_of(const MeasuredTests& tests, std::size_t signal) {
   return ways;
 }
 
-/// Fills `unmoved` and `gradual`. The effect of a signal that goes one way once cannot be separated
-/// from that of time.
+/// Fills `unmoved` and `gradual` from all rows of the courses, which the low passes see. The effect
+/// of a signal that goes one way once cannot be separated from that of time.
 void find_unmoved(MeasuredTests& tests) {
   for (std::size_t i = 0; i < tests.signals.size(); ++i) {
     if (is_constant(tests, i)) {

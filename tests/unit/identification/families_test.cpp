@@ -299,6 +299,17 @@ TEST_CASE("a bank's low passes see the rows before the first and between two pro
   CHECK((BankEquations(rare, columns).rows()[0] - expected).norm() < 1e-9 * expected.norm());
 }
 
+TEST_CASE("a signal that moves between probings has moved", "[families]") {
+  RunFile run = machine_run("run", 1, [](double quick, double, double, double) { return quick; });
+  const double usual_rpm = run.values[3][0];
+  for (std::size_t row = 0; row < run.values[4].size(); ++row)
+    if (run.values[3][row] != usual_rpm) run.values[4][row] = not_a_number;
+  TestOptions options;
+  options.outputs = {"z_um"};
+  options.signals = true;
+  CHECK(measured_tests({run}, options).moved("spindle_rpm"));
+}
+
 TEST_CASE("the order of the columns in a file does not change a bank's gains", "[families]") {
   std::vector<MeasuredTests> both;
   for (const bool turned : {false, true}) {
