@@ -83,7 +83,7 @@ struct ScanReport {
 
 [[nodiscard]] std::size_t count_channels(const ScanReport& report);
 [[nodiscard]] std::size_t count_good(const ScanReport& report);
-/// Every channel gives a temperature, and all values of the controller are present.
+/// True if every channel gives a temperature and all values of the controller are present.
 [[nodiscard]] bool is_complete(const ScanReport& report);
 
 /// @param colours  for a terminal
