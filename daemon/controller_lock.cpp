@@ -29,8 +29,7 @@ std::string line_name(const ModbusTcp& tcp, int unit) {
                      unit);
 }
 
-/// Addresses of a host, so that "plc" and "10.0.0.5" are one controller; none if they are not
-/// known.
+/// Addresses of a host, so that "plc" and "10.0.0.5" are one controller; empty if unknown.
 std::vector<std::string> addresses_of(const std::string& host) {
   addrinfo hints{};
   hints.ai_socktype = SOCK_STREAM;
@@ -52,7 +51,7 @@ std::string line_name(const ModbusRtu& rtu, int) {
   if (stat(rtu.device.c_str(), &device) == 0 && S_ISCHR(device.st_mode))
     return fmt::format("controller at serial device {}:{}", major(device.st_rdev),
                        minor(device.st_rdev));
-  // The device is not plugged in yet.
+  // The device may not be plugged in yet.
   std::error_code error;
   const auto path = std::filesystem::weakly_canonical(rtu.device, error);
   return "controller at serial device " + (error ? rtu.device : path.string());

@@ -1,4 +1,4 @@
-/// Locks that let only one daemon on this machine write to a controller.
+/// Locks that allow only one daemon of this machine to write to a controller.
 #pragma once
 
 #include <string>

@@ -56,7 +56,7 @@ std::unique_ptr<HistoryWriter> make_history(const HistoryConfig& config, const G
   return std::make_unique<HistoryWriter>(config, grid, THERMOCOMP_VERSION);
 }
 
-/// Checked before the state file is read: reading may move it aside, also if the start then fails.
+/// Precedes reading the state file, which may move it aside even if the start then fails.
 void require_own_history(const DaemonConfig& config) {
   if (!config.history.enabled) return;
   try {
@@ -173,7 +173,7 @@ Daemon::Parts::Parts(const std::filesystem::path& config_file)
       supervisor({config, cycle, sources, *link, history.get(), keeper, server, signals, service,
                   operations, journal, locks.controller}) {
   if (history) journal.on_event([this](const Event& event) { history->note(event); });
-  // Saved now: a kill before the first periodic save must not look like a first start.
+  // Saved now, so that a kill before the first periodic save does not look like a first start.
   keeper.save(start_state.state, std::chrono::steady_clock::now());
   static_cast<void>(keeper.wait(StateKeeper::disk_answers_within));
   for (const std::string& warning : locks.warnings) supervisor.add_warning(warning);
@@ -236,7 +236,7 @@ void Daemon::Parts::stop() noexcept {
   try {
     operations.settle();
     operations.save_state(true);
-    // A write that is still under way leaves either the old or the new file.
+    // A write still under way leaves either the old or the new file.
     if (!keeper.wait(StateKeeper::disk_answers_within) || !keeper.error().empty())
       spdlog::error("state not saved: {}", keeper.error());
   } catch (const std::exception& error) {

@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::chrono::seconds log_patience{1};
 
-/// Prints after the log is flushed; if the log's reader hangs, standard error may block as well.
+/// Prints after the log is flushed; if the log's reader hangs, standard error may also block.
 void complain(const std::string& what) {
   if (thermocomp::flush_log(log_patience)) std::fprintf(stderr, "%s\n", what.c_str());
 }

@@ -31,7 +31,7 @@ bool is_kept(CommandKind kind) {
 }
 
 /// @param asked  name of the request, for the error text
-/// @return whether it is done
+/// @return true if it is done
 bool is_done(Outcome outcome, const char* asked) {
   switch (outcome) {
     case Outcome::waiting:
@@ -91,7 +91,7 @@ std::unique_ptr<CycleParts> make_cycle_parts(const DaemonConfig& config, History
   return parts;
 }
 
-/// Configuration and parts, loaded on a side thread: this takes time, and the disk may hang.
+/// Configuration and parts, loaded on a side thread, since this takes time and the disk may hang.
 struct Operations::Loaded {
   DaemonConfig config;
   std::unique_ptr<CycleParts> parts;
@@ -136,7 +136,7 @@ RpcPending Operations::command(const Command& asked) {
   };
 }
 
-/// Whether the command's change is on disk, or need not be. @throws RpcError if saving failed
+/// True if the command's change is on disk or need not be. @throws RpcError if saving failed
 bool Operations::is_settled(const Save& save, CommandKind kind) const {
   const StateKeeper::Saving saving = parts_.keeper.saving(save.serial);
   if (saving == StateKeeper::Saving::under_way && Clock::now() < save.deadline) return false;
@@ -287,7 +287,7 @@ void Operations::carried_out(const Command& done) {
   if (parts_.journal != nullptr) parts_.journal->command(std::move(event));
   if (done.kind == CommandKind::reference && is_reference_whole(parts_.cycle.report())) {
     parts_.keeper.reference_taken();
-    // Also recorded when the temperatures equal those of the previous reference.
+    // Also recorded if the temperatures equal those of the previous reference.
     parts_.reference_before_degC.clear();
     note_reference(parts_.cycle.parts().estimator.persistent_state(parts_.cycle.report()),
                    ReferenceOrigin::command);
@@ -359,7 +359,7 @@ void Operations::save_state(bool at_once) {
 }
 
 /// Reports a newer state on disk to the estimator.
-/// @param again  reports an unchanged one too, if an axis waits and no write is under way
+/// @param again  also reports an unchanged one if an axis waits and no write is under way
 void Operations::report_saved(bool again) {
   const std::vector<AxisReport>& axes = parts_.cycle.report().axes;
   const bool is_waited_for = again && !parts_.keeper.is_busy() && parts_.keeper.error().empty() &&

@@ -44,7 +44,8 @@ class Operations {
   Operations(const Operations&) = delete;
   Operations& operator=(const Operations&) = delete;
 
-  /// The reference was taken by itself, and then this changed: "bed_degC +12.0 K/h".
+  /// Marks a reference taken automatically as doubtful because of this later change: "bed_degC
+  /// +12.0 K/h".
   void doubt_reference(const std::string& changed);
   /// The person for whom the client gives the next command or reload.
   void note_asked_for(const std::string& name) { asked_for_ = name; }
@@ -54,7 +55,7 @@ class Operations {
   /// @throws RpcError if a reload is under way
   [[nodiscard]] RpcPending reload(
       const std::optional<std::filesystem::path>& candidate = std::nullopt);
-  /// The same for SIGHUP. Any number that arrive during a reload cause one further reload.
+  /// Reload by SIGHUP. Any number of signals during a reload cause one further reload.
   void hang_up();
 
   void poll();
@@ -62,7 +63,7 @@ class Operations {
   /// Call after the cycle has ended.
   void settle();
 
-  /// @param at_once  also writes what is otherwise written periodically
+  /// @param at_once  also writes data that is otherwise written periodically
   void save_state(bool at_once);
 
   [[nodiscard]] CycleHandle& cycle() noexcept { return cycle_; }

@@ -30,7 +30,7 @@ void search(const HistoryReader& reader, const SetupParser& parser, RecordedStat
   const std::vector<SegmentInfo>& segments = reader.segments();
   found.has_run = !segments.empty() || !reader.damage().empty();
   for (const HistoryDamage& damage : reader.damage()) {
-    // Damage in a segment that the reader skipped and that may be newer; 0: the whole file.
+    // The reader skipped a damaged segment that may be newer; 0: the whole file.
     if (!segments.empty() && damage.segment != 0 && damage.segment <= segments.back().id) continue;
     found.is_newest = false;
     found.problem = to_string(damage);
@@ -88,7 +88,7 @@ void take_recorded(const RecordedState& recorded, const std::string& why, StartS
                            "); compensation stays off until `thermocomp enable`");
 }
 
-/// Discards references that the machine's sensors cannot have measured.
+/// Discards references that this machine's sensors cannot have measured.
 void refuse_impossible(const DaemonConfig& config, StartState& start) {
   const std::vector<std::string> refused = impossible_references(
       config.estimator, config.model.temperature_columns(), start.state.reference_degC);

@@ -16,11 +16,11 @@ namespace thermocomp {
 
 /// The machine's state when the daemon last ran, from the history.
 struct RecordedState {
-  /// The history has, or had, content: this is not the first start of this machine.
+  /// True if the history has, or had, content: this is not the machine's first start.
   bool has_run{false};
   /// After the last recorded cycle of the newest sound segment; none: no segment is sound.
   std::optional<PersistentState> state;
-  /// No newer data is damaged, so no command came after the last commit.
+  /// True if no newer data is damaged, so that no command came after the last commit.
   bool is_newest{true};
   std::string problem;  ///< error of the newest segment, or of the file
 };

@@ -140,8 +140,8 @@ bool Supervisor::take_signals() {
   return asked.stop != 0;
 }
 
-/// A reference from the first values of a start is only as good as the machine was even then:
-/// judged once, when a change can be told from the resolution of a module.
+/// A reference from the first values after a start requires an even machine. Judged once, when a
+/// change can be distinguished from the resolution of a module.
 void Supervisor::judge_reference(const Report& report) {
   constexpr std::chrono::seconds judged_after{120};
   const ReferenceRecord& record = parts_.keeper.reference();

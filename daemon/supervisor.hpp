@@ -80,7 +80,7 @@ class Supervisor {
  private:
   using Clock = std::chrono::steady_clock;
 
-  /// @return whether the daemon was asked to stop
+  /// @return true if the daemon was asked to stop
   [[nodiscard]] bool turn();
   [[nodiscard]] bool take_signals();
   void note_report();

@@ -1,5 +1,5 @@
 /// Types common to all kinds of buses: start error, outline, sentinels, health, the source of
-/// readings that the cycle reads without waiting, and the slot between two threads.
+/// readings, and the slot between two threads.
 #pragma once
 
 #include <array>
@@ -51,7 +51,7 @@ struct UnitHealth {
 
 struct BusHealth {
   std::string name;
-  std::string kind;  ///< of the configuration: "modbus_tcp", "can", ...
+  std::string kind;  ///< value of the key `kind`: "modbus_tcp", "can", ...
   bool connected{false};
   std::uint64_t connects{0};
   std::string last_error;
@@ -73,28 +73,28 @@ class SensorSource {
   SensorSource& operator=(const SensorSource&) = delete;
   virtual ~SensorSource() = default;
 
-  /// Starts the bus' thread. A bus that is not there yet is no error: it is retried for ever.
+  /// Starts the bus' thread. A missing bus is no error: opening is retried for ever.
   /// @throws DriverError when the configuration cannot work on this system
   virtual void start() = 0;
-  /// Ends the thread within a second. The readings stay as they were.
+  /// Ends the thread within a second. The readings do not change.
   virtual void stop() noexcept = 0;
   /// Copies this bus' newest readings into `all` (one entry per configured sensor; entries of other
-  /// buses are unchanged). Wait-free, no allocation; for one thread.
+  /// buses are unchanged). Wait-free, no allocation; for one reading thread.
   virtual void newest(std::span<Reading> all) noexcept = 0;
   /// For any ordinary thread; may lock.
   [[nodiscard]] virtual BusHealth health() const = 0;
 };
 
-/// Passes the newest value from one writer to one reader; neither waits for the other. The
-/// writer fills back(), then publish(); the reader calls fresh() and reads front(). Exactly one
-/// writer thread and one reader thread. A triple buffer: no allocation after construction.
+/// Passes the newest value from one writer to one reader; neither waits for the other. The writer
+/// fills back(), then calls publish(); the reader calls fresh() and reads front(). A triple buffer
+/// for exactly one thread each: no allocation after construction.
 template <class T>
 class WaitFreeSlot {
  public:
   WaitFreeSlot() = default;
   explicit WaitFreeSlot(const T& initial) : buffers_{initial, initial, initial} {}
 
-  /// The writer's buffer; it holds an earlier value, so write all of it.
+  /// The writer's buffer, which holds an earlier value: write all of it.
   [[nodiscard]] T& back() noexcept { return buffers_[back_]; }
   void publish() noexcept {
     back_ =
@@ -102,7 +102,7 @@ class WaitFreeSlot {
         index_mask;
   }
 
-  /// The reader's side: takes the newest published value. @return true if front() changed
+  /// Takes the newest published value, for the reader. @return true if front() changed
   bool fresh() noexcept {
     if ((shared_.load(std::memory_order_relaxed) & fresh_bit) == 0) return false;
     front_ = shared_.exchange(front_, std::memory_order_acq_rel) & index_mask;

@@ -1,4 +1,3 @@
-/// Thread, clock and sleep of a driver.
 #pragma once
 
 #include <array>
@@ -31,7 +30,8 @@ namespace thermocomp {
       static_cast<std::chrono::nanoseconds::rep>((time_s < year_s ? time_s : year_s) * 1e9)};
 }
 
-/// Stays signalled: every later sleep ends at once. signal() may be called from any thread.
+/// Event that stays signalled: every later sleep ends at once. signal() may be called from any
+/// thread.
 class WakeEvent {
  public:
   /// @throws DriverError when the system has no more descriptors
@@ -44,7 +44,7 @@ class WakeEvent {
 
   void signal() noexcept {
     const std::uint64_t one = 1;
-    // Fails only when the counter is full, and then it is signalled already.
+    // Fails only if the counter is full, hence already signalled.
     [[maybe_unused]] const ssize_t written = ::write(descriptor_, &one, sizeof one);
   }
 
@@ -64,9 +64,9 @@ class WakeEvent {
   int descriptor_;
 };
 
-/// A thread with a small stack: the daemon locks its memory, so the whole stack is resident (256
-/// KiB instead of glibc's 8 MiB). It blocks all signals, which belong to the main thread, and never
-/// inherits the creator's real-time priority.
+/// A thread with a small stack, since the daemon locks its memory and the whole stack is resident
+/// (256 KiB instead of glibc's 8 MiB). It blocks all signals, which belong to the main thread, and
+/// never inherits the creator's real-time priority.
 class BusThread {
  public:
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
@@ -106,7 +106,7 @@ class BusThread {
     pthread_setname_np(thread_, name.substr(0, 15).c_str());
   }
 
-  /// Waits for the end of the body; returns at once when not running.
+  /// Waits until the body ends; returns at once when not running.
   void join() noexcept {
     if (!running_) return;
     pthread_join(thread_, nullptr);

@@ -50,7 +50,7 @@ struct CorrectionConfig {
   double gain_drift_per_sqrt_h{0.1};
   double bias_drift_um_per_sqrt_h{0.0};  ///< 0: no bias is learned
   double outlier_sigma{4.0};
-  double probe_sd_um{3.0};  ///< beyond this a new probing is requested
+  double probe_sd_um{3.0};  ///< limit above which a new probing is requested
 
   static constexpr auto numbers() {
     using Key = NumberKey<CorrectionConfig>;
@@ -223,17 +223,17 @@ struct CompensationConfig {
   LossPolicy on_loss{LossPolicy::hold};
   double hold_s{600.0};                  ///< ramp_to_zero: hold this long first
   StopPolicy on_stop{StopPolicy::hold};  ///< offsets when the daemon is stopped
-  double stop_ramp_s_max{120.0};         ///< ramp_to_zero: given up after this long
-  /// Without a saved state; false: nothing moves before an operator enables it.
+  double stop_ramp_s_max{120.0};         ///< ramp_to_zero: longest duration
+  /// Initial state without a saved one; false: nothing moves before an operator enables it.
   bool enabled_at_first_start{false};
   bool hold_while_cutting{false};  ///< the offset changes only while cutting_signal is 0
   std::string cutting_signal;      ///< "cutting_on"; empty: none
   std::string disable_signal;      ///< "compensation_off_on": 1 disables; empty: none
   double controller_stale_after_s{2.0};
   double mismatch_um{2.0};       ///< tolerated difference between applied and sent
-  double mismatch_after_s{3.0};  ///< ... and how long a larger one is tolerated
+  double mismatch_after_s{3.0};  ///< longest duration of a larger one
   /// Without read-back and readable registers: largest distance of the first offset after a power
-  /// cut from the one sent last [um], and so of the offset from the saved one.
+  /// cut from the one sent last [um], hence of the offset from the saved one.
   double restart_leap_um_max{1.0};
   /// Estimates a block without a good sensor where the model has a covariance.
   bool estimate_lost_blocks{true};
@@ -241,7 +241,7 @@ struct CompensationConfig {
   OutsidePolicy outside_domain{OutsidePolicy::warn};  ///< for a model with [made_from]
   /// For a model with a covariance.
   SuspectedPolicy suspected_sensors{SuspectedPolicy::warn};
-  double warm_um{5.0};  ///< the machine counts as warm while no axis is to move farther than this
+  double warm_um{5.0};  ///< largest motion still to come of an axis of a warm machine
   double prove_um_max{10.0};
   double prove_hold_s{3.0};
 

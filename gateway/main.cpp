@@ -45,8 +45,8 @@ sigset_t ending_signals() {
   return signals;
 }
 
-/// Ends the process after `time`, even if a name server, disk or broker does not answer. An orderly
-/// shutdown is finished by then.
+/// Ends the process after `time`, even if a name server, disk or broker does not answer. By then an
+/// orderly shutdown is finished.
 void end_within(std::chrono::seconds time) {
   std::thread([time] {
     std::this_thread::sleep_for(time);
@@ -163,8 +163,8 @@ void run_gateway(const GatewaySettings& settings) {
   end_within(end_max);
 }
 
-/// Logs to the journal under systemd, else to standard error, from a thread of its own: a pipe that
-/// nobody reads must not stop the feed.
+/// Logs to the journal under systemd, else to standard error, from a separate thread, so that a
+/// pipe without a reader cannot stop the feed.
 void set_up_log(const std::string& level) {
   constexpr std::size_t lines_max = 1024;
   const char* name = "thermocomp-gateway";

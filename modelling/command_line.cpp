@@ -48,7 +48,7 @@ void declare_modelling_command_line(CLI::App& app, std::function<int()>& action)
   app.description("Models: test plans, structures, sensor placement, fit, inspection, diagnosis");
   app.require_subcommand(1);
   app.failure_message(cli::command_error_text);
-  // Each command shows this one too, unless it has its own.
+  // Shown by each command without a text of its own.
   app.footer("Exit status: 0 success, 2 usage error or bad input.");
   diagnosis::add_diagnose_command(app, action);
   inspection::add_inspect_command(app, action);

@@ -1,5 +1,4 @@
-/// The command line of `thermocomp-modelling`; `--help`, manual page and completion are made from
-/// it.
+/// The command line of `thermocomp-modelling`, the source of `--help`, manual page and completion.
 #pragma once
 
 #include <functional>
@@ -10,15 +9,15 @@ class App;
 
 namespace thermocomp {
 
-/// @param action  outlives the parsing, which sets it to what was asked for; it returns the exit
-///                status
+/// @param action  outlives the parsing, which sets it to the requested command; it returns the exit
+/// status
 void declare_modelling_command_line(CLI::App& app, std::function<int()>& action);
 
 /// fit: sensors and equation from measured runs.
 void add_fit_command(CLI::App& app, std::function<int()>& action);
 
 namespace diagnosis {
-/// diagnose: what a model gets wrong in measured runs, and why.
+/// diagnose: errors of a model in measured runs, and their causes.
 void add_diagnose_command(CLI::App& app, std::function<int()>& action);
 }  // namespace diagnosis
 namespace experiments {
@@ -26,14 +25,14 @@ namespace experiments {
 void add_plan_command(CLI::App& app, std::function<int()>& action);
 }  // namespace experiments
 namespace identification {
-/// group: places that warm alike.
+/// group: places with similar temperature courses.
 void add_group_command(CLI::App& app, std::function<int()>& action);
 /// tiebar: coefficients of a gate-shaped machine with one or more ties, and the ties with the
-/// smallest swing on measured temperatures.
+/// smallest displacement range for measured temperatures.
 void add_tiebar_command(CLI::App& app, std::function<int()>& action);
 }  // namespace identification
 namespace inspection {
-/// inspect: faults of recordings and what they can identify.
+/// inspect: faults of recordings, and identifiable effects.
 void add_inspect_command(CLI::App& app, std::function<int()>& action);
 }  // namespace inspection
 namespace placement {

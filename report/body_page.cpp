@@ -57,7 +57,7 @@ json state_json(const BodyState& state) {
           {"outputs_um", numbers(state.outputs_um)}};
 }
 
-/// JSON that cannot end an element <script>.
+/// JSON text that cannot close an element <script>.
 std::string script_text(const json& value) {
   std::string text = value.dump(-1, ' ', false, json::error_handler_t::replace);
   for (std::size_t at = text.find('<'); at != std::string::npos; at = text.find('<', at + 1))

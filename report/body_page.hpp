@@ -14,7 +14,7 @@ struct BodyState {
   std::string group;               ///< states of one group (a load case) are shown in sequence
   std::string name;                ///< within the group, if states differ by more than time
   double time_s{0.0};              ///< NaN: no time
-  std::string input;               ///< model input of a state in which it alone is 1 K warm
+  std::string input;               ///< the only input that is 1 K warm
   std::vector<double> rise_K;      ///< shape (nodes)
   std::vector<double> moved_um;    ///< shape (3 nodes)
   std::vector<double> outputs_um;  ///< tool against work, one per output of the picture

@@ -25,7 +25,8 @@ bool is_output(const CLI::Option& option) {
          });
 }
 
-/// `covariance` completes a model, `fit` one like another: they may write into it.
+/// True for commands that complete a file: `covariance` and `fit` may write into the model they
+/// read.
 bool may_be_replaced(const CLI::App& command, const CLI::Option& option) {
   return (command.get_name() == "covariance" && option.check_lname("model")) ||
          (command.get_name() == "fit" && option.check_lname("like"));

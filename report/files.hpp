@@ -23,10 +23,10 @@ class RunLoader {
   explicit RunLoader(const std::string& columns);
 
   /// Reads RUN.csv[@T0:T1]. Reports on stderr how a file in a foreign form was read, one line per
-  /// item; for further files of the same form only that they are.
+  /// item; for further files of the same form, one line only.
   /// @throws ConfigurationError
   [[nodiscard]] RunFile load(const std::string& argument);
-  /// A run for each stretch between two references of a daemon's export.
+  /// One run per stretch between two references of a daemon's export.
   [[nodiscard]] std::vector<RunFile> load(const std::vector<std::string>& arguments);
 
  private:
@@ -37,7 +37,7 @@ class RunLoader {
   std::vector<std::string> reported_;
 };
 
-/// Writes beside the destination and renames in commit(); without commit() nothing is left, also
+/// Writes beside the destination and renames in commit(); without commit() nothing is left, even
 /// after an interrupt. `-` is standard output. A pipe with a reader, the terminal and /dev/null are
 /// written directly; other devices are refused. One at a time per program.
 class OutputFile {

@@ -12,7 +12,7 @@ constexpr const char* style =
     "body{font:16px/1.5 sans-serif;max-width:900px;margin:1.5em auto;padding:0 1em;color:#1a202c;"
     "background:#fff}h1,h2,p,li{overflow-wrap:anywhere}h1{font-size:1.6em;line-height:1.2}h2{font-"
     "size:1.2em;margin:1.6em 0 .3em}"
-    // A shade at the side on which more can be scrolled to.
+    // Shading at a side that hides more content.
     ".wide,figure{overflow-x:auto;background:linear-gradient(90deg,#fff 60%,#fff0) local,"
     "linear-gradient(270deg,#fff 60%,#fff0) 100% 0 "
     "local,linear-gradient(90deg,#4a556866,#4a556800),"
@@ -31,7 +31,7 @@ constexpr const char* style =
 
 std::string row(const std::vector<std::string>& cells, const char* tag) {
   std::string html = "<tr>";
-  // On a phone neither a figure with its unit is broken, nor a sentence after each word.
+  // On a phone neither a number and its unit nor every word is broken onto a new line.
   constexpr std::size_t line_max = 24;
   for (const std::string& cell : cells) {
     const bool is_figure = cell.find_first_of("0123456789") != std::string::npos;
@@ -93,7 +93,7 @@ std::string figure_text(double value) {
   const int digits = size >= 99.95 ? 0 : size >= 9.995 ? 1 : 2;
   char text[48];
   std::snprintf(text, sizeof text, "%.*f", digits, value);
-  // No sign for a value rounded to zero.
+  // A value rounded to zero has no sign.
   const std::string result(text);
   return result.find_first_not_of("-0.") == std::string::npos ? std::string("0.00") : result;
 }

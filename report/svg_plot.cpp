@@ -246,14 +246,14 @@ std::string title_of(const PlotPanel& panel) {
   return panel.title + (panel.unit.empty() ? "" : ", " + panel.unit);
 }
 
-/// Strokes with their names: beside the title where there is room, else in rows below it.
+/// Strokes with their names: beside the title if there is room, else in rows below it.
 class Legend {
  public:
   explicit Legend(const PlotPanel& panel) {
     constexpr double bold = 1.15;
     double all = 0.0;
     for (const PlotLine& line : panel.lines) all += width_of(line);
-    // On a narrow screen the left part of a picture is seen.
+    // A narrow screen shows the left part of a picture.
     double x = left + legend_gap + bold * text_width(title_of(panel));
     double row = 0.0;
     if (x + all > width - right) {

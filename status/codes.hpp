@@ -23,7 +23,7 @@ struct CodeText {
   std::string_view meaning;
   std::string_view remedy;  ///< empty: no action needed
   Severity severity{Severity::fault};
-  std::string_view command{};  ///< terminal command that does or shows it; empty: none
+  std::string_view command{};  ///< terminal command for the remedy; empty: none
 };
 
 [[nodiscard]] CodeText code_text(Reason reason) noexcept;

@@ -95,7 +95,7 @@ std::string user_text(const Event& event) {
          (event.asked_for.empty() ? "" : " for " + event.asked_for);
 }
 
-/// To 0.1 s below a minute, for short outages.
+/// Duration, to 0.1 s below a minute for short outages.
 std::string lasted(double seconds) {
   return seconds < 60.0 ? fixed(seconds, 1) + " s" : duration_text(seconds);
 }

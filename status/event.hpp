@@ -86,8 +86,8 @@ struct Event {
   /// "uncertain", "not_taken"; of the daemon "started", "stopping", "history", "offset".
   std::string code{};
   std::string detail{};  ///< text of a device, driver or signal; may be empty
-  /// suspected: error of the sensor [K]; recovery of a sensor: change over the fault where it is
-  /// more than rate_allowance_K [K]; commands `measured` and `prove`: [um]; NaN: none
+  /// suspected: error of the sensor [K]; recovery of a sensor: change over the fault if larger than
+  /// rate_allowance_K [K]; commands `measured` and `prove`: [um]; NaN: none
   double value{std::numeric_limits<double>::quiet_NaN()};
   /// recovery: duration of the fault [s]; mode: duration of the previous one [s]; "started", from a
   /// history: time without a daemon before it [s]; else NaN
@@ -107,7 +107,7 @@ struct RecordedEvent : Event {
 /// Mode of a run while it compensates and an axis is latched, hence not driven.
 inline constexpr std::string_view not_driven = "not_driven";
 
-/// What the offsets do, from the events of a run in their order.
+/// Mode of the offsets, from the events of a run in their order.
 class RecordedMode {
  public:
   void take(const Event& event);

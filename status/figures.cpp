@@ -32,7 +32,7 @@ std::string fixed(double value, int digits, int width) {
 }
 
 std::string fixed_signed(double value, int digits, int width) {
-  // A value shown as zero has no sign.
+  // A value rounded to zero has no sign.
   if (std::abs(value) < 0.5 * std::pow(10.0, -digits)) value = 0.0;
   return formatted(value, digits, width, "%+*.*f");
 }

@@ -18,7 +18,7 @@
 
 namespace thermocomp {
 
-/// A read-back that is explained by no sent offset.
+/// A read-back that no sent offset explains.
 struct LatchedMismatch {
   double sent_um{not_a_number};
   double read_um{not_a_number};
@@ -200,11 +200,11 @@ struct JumpedSensor {
   }
 };
 
-/// Sensors whose new values do not count yet.
+/// Sensors whose new values are not yet confirmed.
 struct Confirmation {
   std::vector<std::string> sensors{};
   double settle_s{not_a_number};
-  std::string one_value_of{};  ///< all channels of this module show one value; empty: they do not
+  std::string one_value_of{};  ///< module whose channels all show one value; empty: none
 
   template <class Self, class Visitor>
   static void fields(Self& self, Visitor& visit) {
@@ -468,7 +468,7 @@ struct ModelStatus {
   std::uint64_t inputs{0};
   std::uint64_t outputs{0};
   bool moves{true};  ///< some coefficient is not zero, or a bias is learned; `init` writes zeros
-  /// Axes whose coefficients are all zero, unless all are.
+  /// Axes with all coefficients zero, unless all axes are.
   std::vector<std::string> still{};
   bool compared{true};            ///< with measured displacement, according to its file
   std::optional<bool> outside{};  ///< of its domain
@@ -504,7 +504,7 @@ struct WarmStatus {
   }
 };
 
-/// Axes whose model error makes a probing due.
+/// Axes whose model error requests a probing.
 struct ProbeDueStatus {
   std::map<std::string, bool> axes{};
   double because_um{not_a_number};  ///< largest error of the model
@@ -522,7 +522,7 @@ struct ReferenceStatus {
   bool lost{false};
   std::string changed{};  ///< "bed_degC +12.0 K/h": the machine was not even when it was taken
   std::map<std::string, double> temps_degC{};
-  std::vector<std::string> objections{};  ///< why none should be taken now, one sentence each
+  std::vector<std::string> objections{};  ///< reasons against taking one now, one sentence each
 
   template <class Self, class Visitor>
   static void fields(Self& self, Visitor& visit) {
@@ -641,7 +641,7 @@ struct EventsAnswer {
 template <class Part>
 [[nodiscard]] nlohmann::json json_of(const Part& part);
 
-/// Tolerates any shape: missing members and those of another type keep the structure's defaults. A
+/// Accepts any JSON: missing members and those of another type keep the structure's defaults. A
 /// text is reduced to one line. An unknown reason becomes a warning.
 template <class Part>
 [[nodiscard]] Part part_from(const nlohmann::json& value);

@@ -12,7 +12,7 @@ namespace thermocomp {
 
 namespace {
 
-/// The switch is kept after a dry run: left on, the first offsets would be sent unattended.
+/// After a dry run the switch must not stay on, or the first offsets would be sent unattended.
 constexpr std::string_view dry_run_remedy =
     "switched on, the offsets are shown; switch it off before the dry run ends";
 constexpr std::string_view moves_nothing =
@@ -79,7 +79,7 @@ class Causes {
     list_.push_back({what, std::string(remedy), std::string(command), subject, detail});
   }
 
-  /// Whether entries of sensors, modules or axes are more specific than the reason.
+  /// True if entries of sensors, modules or axes are more specific than the reason.
   [[nodiscard]] bool is_named_by_its_cause(Reason reason) const {
     const auto any_axis = [this](const auto& is_so) {
       return std::any_of(status_.axes.begin(), status_.axes.end(), is_so);
@@ -105,7 +105,7 @@ class Causes {
     }
   }
 
-  /// At start, no value has lasted long enough to count.
+  /// True if values are missing only because none has settled since the start.
   [[nodiscard]] bool only_settles() const {
     return status_.mode == Mode::starting && status_.sensors_bad.empty();
   }
@@ -123,7 +123,7 @@ class Causes {
     }
   }
 
-  /// Empty in the first second, before any error.
+  /// The error in brackets; empty in the first second, before any error.
   static std::string in_brackets(const std::string& error) {
     return error.empty() ? "" : " (" + error + ")";
   }
@@ -137,7 +137,7 @@ class Causes {
            input_text(lost_inputs(blocks));
   }
 
-  /// Each input is listed by one cause only.
+  /// Lost inputs of the blocks; each input is listed by one cause only.
   std::vector<std::string> lost_inputs(const std::vector<std::string>& blocks) {
     std::vector<std::string> lost;
     for (const InputStatus& input : status_.inputs)
@@ -173,7 +173,8 @@ class Causes {
         add_silent(unit, is_network(bus.kind), subject);
   }
 
-  /// All its readings are still valid: newly silent, or the first answer does not count yet.
+  /// True if all its readings are still valid: newly silent, or its first answer is not yet
+  /// confirmed.
   [[nodiscard]] bool is_good_still(const UnitStatus& unit) const {
     const auto is_good = [this](const std::string& sensor) {
       const std::vector<std::string>& bad = status_.sensors_bad;
@@ -207,7 +208,7 @@ class Causes {
       add(name + ": error " + *state + lasts, can_remedy, "", subject);
   }
 
-  /// Adds bad sensors that no silent module explains.
+  /// Adds bad sensors that are not explained by a silent module.
   void add_bad_sensors() {
     if (sensors_ == nullptr) {
       std::vector<std::string> blocks;
@@ -277,8 +278,8 @@ class Causes {
   std::vector<Trouble> list_;
 };
 
-/// The axis with the longest way to its target: "z has 35.1 um still to go to -48.6 um". Empty:
-/// every axis is nearer than a lost input may leave it. An axis at its bound is a trouble.
+/// The axis farthest from its target: "z has 35.1 um still to go to -48.6 um". Empty if every axis
+/// is nearer than a lost input may leave it. An axis at its bound is a trouble.
 std::string way_text(const std::vector<AxisStatus>& axes) {
   const AxisStatus* farthest = nullptr;
   const auto way = [](const AxisStatus& axis) { return std::abs(axis.target - axis.offset); };

@@ -10,7 +10,7 @@
 
 namespace thermocomp {
 
-/// Whether offsets reach the machine: mode `compensating`, no dry run, controller online, every
+/// True if offsets reach the machine: mode `compensating`, no dry run, controller online, every
 /// axis driven, a model with non-zero coefficients.
 [[nodiscard]] bool is_compensating(const Status& status);
 
@@ -40,9 +40,9 @@ struct Trouble {
   Subject subject{};     ///< for a link to more data
   std::string detail{};  ///< the driver's text; may be empty
 };
-/// All faults, one entry per cause, worst first: a silent module covers its sensors, and these the
-/// model inputs made from them.
-/// @param sensors  gives the sensors' faults; nullptr: names only
+/// All faults, one entry per cause, worst first: a silent module covers its sensors, and these
+/// cover the model inputs made from them.
+/// @param sensors  source of the sensors' faults; nullptr: names only
 [[nodiscard]] std::vector<Trouble> troubles(const Status& status,
                                             const SensorsAnswer* sensors = nullptr);
 
@@ -51,7 +51,7 @@ struct Trouble {
                                                       const std::vector<AxisStatus>& axes);
 /// Text of the sensor's fault; empty remedy if it only settles.
 [[nodiscard]] CodeText fault_text(const SensorStatus& sensor);
-/// The newest value is valid but has not lasted long enough to count.
+/// True if the newest value is valid but not yet confirmed.
 [[nodiscard]] bool settles(const SensorStatus& sensor);
 /// "the same values for 1 min 15 s, up and down before: frozen?"
 [[nodiscard]] std::string frozen_text(const FrozenModule& module);

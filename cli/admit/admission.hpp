@@ -10,7 +10,7 @@
 namespace thermocomp::cli {
 
 struct AdmissionRules {
-  std::size_t probings_min{3};  ///< probings of an output needed to judge it by them
+  std::size_t probings_min{3};  ///< minimum number of probings for judging an output by them
 };
 
 /// Compares both models over the machine's last days. An output with enough probings is judged by

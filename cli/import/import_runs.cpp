@@ -24,7 +24,7 @@ constexpr double correlation_min = 0.8;
 constexpr double lead_min = 0.15;
 
 /// Changes of a column over `lag` steps of a grid that begins with the run's first row; a longer
-/// lag reduces the share of the readings' noise.
+/// lag reduces the noise's share.
 std::vector<double> changes(const RunFile& run, std::size_t column, double step_s,
                             std::size_t lag) {
   std::vector<double> time_s;
@@ -94,7 +94,7 @@ void try_pair(const std::vector<double>& a, const std::vector<double>& b, double
   best.correlation = by_shift[static_cast<std::size_t>(strongest)];
   best.shift_s = offset_s + best.step_s * static_cast<double>(strongest + common - size_b);
   best.columns = columns;
-  // r falls on both sides of its peak; a rise of more than 0.05 marks another peak.
+  // r falls on both sides of its peak; where it rises by more than 0.05, another peak follows.
   best.next = 0.0;
   for (const std::ptrdiff_t way : {-1, 1}) {
     double lowest = best.correlation;
@@ -157,7 +157,7 @@ std::string two_digits(double value) {
   return text;
 }
 
-/// Estimates the shift from events that both recordings contain.
+/// Estimates the shift from events in both recordings.
 std::optional<ClockShift> seen_shift(const RunFile& first, const RunFile& second,
                                      const std::string& why) {
   const auto shift = clock_shift(first, second);

@@ -11,7 +11,7 @@ namespace thermocomp::cli {
 
 /// Shift between two clocks, estimated from columns of both recordings.
 struct ClockShift {
-  double shift_s{0.0};      ///< added to the second's time_s it gives the first's
+  double shift_s{0.0};      ///< added to the second's time_s to get the first's
   double step_s{0.0};       ///< grid step, the resolution of the shift
   double correlation{0.0};  ///< of the two columns' changes at this shift
   double next{0.0};         ///< highest correlation at another peak
@@ -28,17 +28,17 @@ struct ClockShift {
 /// @return nullopt if no column of either recording changes
 [[nodiscard]] std::optional<ClockShift> clock_shift(const RunFile& first, const RunFile& second);
 
-/// Merges the rows of both files on the first one's clock. In rows that only the second file has,
+/// Merges the rows of both files on the first one's clock. In rows only of the second file,
 /// temperatures and positions of the first are interpolated, its outputs are empty and its other
 /// columns hold their last value, except across gaps longer than a minute and three usual steps.
-/// @param shift_s  added to the second's time_s it gives the first's; nullopt: from the files'
-///                 dates, else from columns that change alike
+/// @param shift_s  added to the second's time_s to get the first's; nullopt: from the files' dates,
+/// else from columns that change alike
 /// @throws ConfigurationError if the shift is unknown, a column exists in both files, or the two do
-///         not overlap
+/// not overlap
 [[nodiscard]] RunFile joined_runs(const RunFile& first, const RunFile& second,
                                   std::optional<double> shift_s);
 
-/// An entry is either an increment or the total at the controller from then on.
+/// Meaning of an entry: an increment, or the total at the controller from then on.
 enum class CorrectionEntry { step, total };
 
 /// displacement = -(sum of the steps until then), or -(total), in um, under the axis' name: an

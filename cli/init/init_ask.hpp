@@ -43,8 +43,8 @@ class Questions {
   std::size_t next_{0};  ///< index of the next answer to reuse
 };
 
-/// Queries to the machine during the interview. find_units and try_module are empty where no bus is
-/// to be scanned.
+/// Queries to the machine during the interview. find_units and try_module are empty if no bus is to
+/// be scanned.
 struct InitEyes {
   std::function<std::vector<int>(const InitBus&)> find_units;
   /// One line for each preset that contains the word.
@@ -57,7 +57,7 @@ struct InitEyes {
 /// @throws Failure if a module that is not tried has no channels
 void refuse_unnamed_channels(const InitModule& module);
 
-/// Asks for everything that the draft lacks; the body of an interview.
+/// Asks for everything that the draft lacks; body of an interview.
 void ask_for_rest(InitDraft& draft, bool has_controller, Questions& questions,
                   const InitEyes& eyes);
 

@@ -183,7 +183,7 @@ std::string axes_text(const InitDraft& draft) {
   return text + "\n";
 }
 
-/// Signals with the names of the documents have that meaning; others are recorded.
+/// Signals named as in the documents have that meaning; others are recorded.
 std::string compensation_text(const InitController& controller) {
   std::string text;
   const auto add = [&](const char* key, const char* name) {

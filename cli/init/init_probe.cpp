@@ -109,7 +109,7 @@ std::string line_of(int number, const ScanChannel& channel, bool has_preset) {
 }
 
 /// Takes over the open-circuit codes that channels show now. Such a value is out of range anyway;
-/// with the code the fault is named correctly.
+/// with the code, the fault has the right name.
 void take_codes(const ScanDevice& device, InitModule& module, std::vector<std::string>& lines) {
   std::set<std::int64_t> codes;
   for (const ScanChannel& channel : device.channels)
@@ -225,7 +225,7 @@ std::vector<std::string> try_module(const InitDraft& draft, InitModule& module,
 
 InitEyes eyes_of(const fs::path& folder) {
   InitEyes eyes;
-  // Cached: an interview that goes back does not search again.
+  // Cached, so that an interview that goes back does not search again.
   eyes.find_units = [known =
                          std::map<std::string, std::vector<int>>{}](const InitBus& bus) mutable {
     const std::string name = bus_text(bus);

@@ -59,7 +59,7 @@ std::string AxisTrends::bars(const std::deque<Sample>& samples) const {
   for (std::size_t cell = 0; cell < count; ++cell) {
     // The last value of each equal part, so that the newest is always shown.
     const Sample& sample = samples[(cell + 1) * samples.size() / count - 1];
-    // Offset from the boundary of two levels, where a constant value would flicker.
+    // Off the boundary of two levels, where a constant value would flicker.
     const double height = 3.01 + 7.0 * (sample.offset - middle) / range;
     const auto level = static_cast<std::size_t>(std::clamp(std::lround(height), 0L, 7L));
     text += wide_ ? wide_bars.at(level) : plain_bars.at(level);

@@ -71,7 +71,7 @@ Promotion promote(const fs::path& socket, const std::string& checksum) {
   const std::string next = text_of_model(candidate);
   require_checksum(candidate, next, checksum);
   const std::string now = text_of_model(model);
-  // In this order one of the files always holds the model that was in use.
+  // In this order one of the files always holds the model previously in use.
   cli::write_file(before, now);
   reload_with(socket, model, next, now);
   return {model, before, number_of(status["candidate"], "better_probability")};

@@ -21,8 +21,9 @@ struct Promotion {
 /// @param checksum  required of the candidate; empty: any
 /// @throws Failure
 Promotion promote(const std::filesystem::path& socket, const std::string& checksum = "");
-/// Exchanges the two again. @throws Failure if nothing was promoted
+/// Exchanges the two again.
 /// @param checksum  required of the model in use; empty: any
+/// @throws Failure if nothing was promoted
 Promotion take_back(const std::filesystem::path& socket, const std::string& checksum = "");
 
 }  // namespace thermocomp::cli

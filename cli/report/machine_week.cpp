@@ -37,7 +37,7 @@ std::vector<WallSpan> recorded_spans(const std::vector<SegmentInfo>& segments) {
   return spans;
 }
 
-/// Between them lies time without a daemon, or time that the clock passed over when it was set.
+/// Merges spans separated by time without a daemon, or by time skipped when the clock was set.
 std::vector<WallSpan> merged(std::vector<WallSpan> spans) {
   std::sort(spans.begin(), spans.end(),
             [](const WallSpan& a, const WallSpan& b) { return a.from_s < b.from_s; });
@@ -359,7 +359,7 @@ std::vector<ModeSpell> daemon_pauses(const WeekEvents& events, std::vector<WallS
 std::vector<Outages> outages_of(const WeekEvents& events, const WallSpan& span) {
   std::map<Subject, Outages> found;
   const auto& list = events.events;
-  std::int64_t stopping = -1;  // run that is stopping
+  std::int64_t stopping = -1;  // run that is being stopped
   for (std::size_t i = 0; i < list.size(); ++i) {
     if (list[i].kind == EventKind::daemon && list[i].code == "stopping") stopping = list[i].run;
     if (list[i].kind != EventKind::fault || list[i].run == stopping) continue;
@@ -417,7 +417,7 @@ std::vector<SensorWeek> sensors_of(const ThinnedHistory& course) {
       if (!(alike > best)) continue;
       best = alike;
       sensor.neighbour = other.name.substr(0, other.name.size() - 5);
-      constexpr double day_s = 86400.0;  // to separate the daily cycle from a drift
+      constexpr double day_s = 86400.0;  // distinguishes the daily cycle from a drift
       if (course.time_s.back() - course.time_s.front() < day_s) continue;
       const Line drift = drift_of(course.time_s, column.values, other.values);
       sensor.drift_K = drift.slope;
@@ -467,7 +467,7 @@ MachineWeek machine_week(const std::filesystem::path& history, const WallSpan& s
   week.damage = reader.damage();
   WeekEvents events{read_events(history), {}};
   for (const SegmentInfo& segment : reader.segments()) {
-    events.run_ends_s[segment.run] = end_s(segment);  // the last one's, however the clock was set
+    events.run_ends_s[segment.run] = end_s(segment);  // end of its last segment
   }
   const auto points = static_cast<std::size_t>(
       std::clamp(span.length_s() / point_s_min, 60.0, static_cast<double>(points_max)));
@@ -512,7 +512,7 @@ MachineWeek machine_week(const std::filesystem::path& history, const WallSpan& s
       week.probings.push_back(
           probing_of(history, *setup, event.wall_s, event.subject.name, event.value, parser));
   }
-  // A score beside another model, as before a promotion, is over.
+  // The score of a model other than the present one, as before a promotion, is outdated.
   const ReplaySetup* last = setups.at(span.to_s);
   if (scored != nullptr && last != nullptr && !are_alike(scored->model, last->model))
     week.candidate.reset();

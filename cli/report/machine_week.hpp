@@ -27,12 +27,12 @@ struct WallSpan {
   [[nodiscard]] WallSpan within(const WallSpan& other) const noexcept;
 };
 
-/// In place of a mode while nothing was recorded: the daemon was stopped, ended without a stop, or
-/// ran on (disk full, clock set).
+/// Replaces a mode while nothing was recorded: the daemon was stopped, ended without a stop, or ran
+/// on (disk full, clock set).
 inline constexpr const char* daemon_stopped = "daemon_stopped";
 inline constexpr const char* daemon_ended = "daemon_ended";
 inline constexpr const char* not_recorded = "not_recorded";
-/// In place of `compensating` with a model of zeros.
+/// Replaces `compensating` for a model of zeros.
 inline constexpr const char* zero_model = "zero_model";
 
 struct ModeSpell {
@@ -130,7 +130,7 @@ struct WeekEvents {
 [[nodiscard]] std::vector<Outages> outages_of(const WeekEvents& events, const WallSpan& span);
 [[nodiscard]] std::vector<SensorWeek> sensors_of(const ThinnedHistory& course);
 
-/// Whether the samples of a thinned point are from a dry run, not, or `both`.
+/// Whether the samples of a thinned point are from a dry run, or not, or from both.
 enum class PointPlace { sent, dry_run, both };
 [[nodiscard]] std::vector<PointPlace> places_of(const ThinnedHistory& course,
                                                 const std::vector<WallSpan>& sent,

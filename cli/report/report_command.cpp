@@ -18,7 +18,7 @@ namespace {
 
 constexpr double day_s = 86400.0;
 constexpr double week_s = 7.0 * day_s;
-/// The newest rows may not be committed yet: an end at most this much after them is their end.
+/// The newest rows may not be committed yet: an end up to this time after them is accepted.
 constexpr double uncommitted_s = 60.0;
 
 struct ReportOptions {

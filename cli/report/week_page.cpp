@@ -109,7 +109,7 @@ std::string spells_part(const MachineWeek& week) {
 std::string why_part(const MachineWeek& week) {
   std::vector<std::vector<std::string>> rows{{"why it did less than it could", "times", "in all"}};
   for (const Outages& outages : week.outages)
-    // A suspicion is reported with its sensor and alone reduces nothing.
+    // A suspicion is reported with its sensor and has no effect by itself.
     if (const auto reason = reason_named(outages.last.code);
         outages.subject.kind == SubjectKind::reason && reason && reason != Reason::sensor_suspected)
       rows.push_back({std::string(code_text(*reason).meaning), std::to_string(outages.count),

@@ -23,7 +23,7 @@ struct ScanSensors {
   std::vector<double> stale_after_s;
 };
 
-/// Another value may come: the last second brought none, and the last is not stale yet.
+/// True if another value may arrive: none came in the last second, and the last is not stale yet.
 [[nodiscard]] bool may_come_again(nanoseconds taken_at, double stale_after_s, nanoseconds end,
                                   nanoseconds now);
 /// Marks a value as stale by the daemon's rule.
@@ -45,8 +45,8 @@ struct ScanTask {
 };
 
 /// One overload per kind of bus, in scan_PROTOCOL.cpp. Gives every channel of the configuration the
-/// daemon's value or the reason for its absence. Sends only what the daemon would send, and changes
-/// no settings that the configuration does not.
+/// daemon's value, or the reason why it is missing. Sends only what the daemon would send, and
+/// changes only settings of the configuration.
 [[nodiscard]] ScanBus scan_bus(const ModbusBusConfig& config, const ScanSensors& sensors,
                                const ScanTask& task);
 [[nodiscard]] ScanBus scan_bus(const CanBusConfig& config, const ScanSensors& sensors,

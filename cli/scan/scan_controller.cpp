@@ -97,7 +97,7 @@ std::vector<RegisterPlace> written_places(const DaemonConfig& config,
       for (RegisterPlace& place : places_of_set(*travel, axis, travel->values, "", true))
         places.push_back(std::move(place));
       places.push_back(place_of(travel->end, "end" + of_axis, "", true));
-      places.back().shown.is_needed = true;  // the next set's number follows from it
+      places.back().shown.is_needed = true;  // the next set's number depends on it
       continue;
     }
     const std::string unit = modbus.axes[i].piezo ? "V" : std::string(unit_of(axis.output).symbol);
@@ -202,7 +202,7 @@ class ControllerScan {
     for (std::vector<RegisterPlace>* places : {&read, &written})
       for (RegisterPlace& place : *places) {
         place.shown.why = why;
-        place.shown.is_needed = true;  // only an answer excuses what is written and not read
+        place.shown.is_needed = true;  // only an answer makes a written value optional
       }
   }
 
@@ -210,7 +210,7 @@ class ControllerScan {
     Exchange exchange;
     constexpr int tries_max = 2;
     for (int tried = 0; tried < tries_max; ++tried) {
-      // A single-client gateway may still hold the connection of the sensors' bus.
+      // A single-client gateway may still be connected to the sensors' bus.
       if (!connection_.connected() && tried > 0)
         connection_.pause_until(connection_.now() + from_seconds(config_.line.reconnect_s));
       if (!connection_.connected() && !connection_.connect()) return exchange;

@@ -299,7 +299,7 @@ void ModbusScan::hint_refused(const ModbusDeviceConfig& device, const ModbusChan
     result.hints.emplace_back("look this exception up in the device's manual");
 }
 
-/// The first device answers its first request on this line.
+/// True if the first device answers its first request on this line.
 bool ModbusScan::would_answer(const ModbusLine& line) const {
   const ModbusDeviceConfig& device = config_.devices.front();
   const ModbusChannel& channel = device.channels.front();
@@ -310,7 +310,7 @@ bool ModbusScan::would_answer(const ModbusLine& line) const {
              .unit_answered();
 }
 
-/// The same on the serial line, which is already open.
+/// The same test on the serial line that is already open.
 bool ModbusScan::answers_within(double timeout_ms) {
   ModbusLine patient = config_.line;
   patient.timeout_ms = timeout_ms;

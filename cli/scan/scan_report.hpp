@@ -85,7 +85,7 @@ struct ScanReport {
 [[nodiscard]] std::size_t count_good(const ScanReport& report);
 /// Notes devices whose temperatures are those of a room in degF.
 void note_fahrenheit(ScanReport& report);
-/// Every channel gives a temperature, and all values of the controller are present.
+/// True if every channel gives a temperature and all values of the controller are present.
 [[nodiscard]] bool is_complete(const ScanReport& report);
 
 /// @param colours  for a terminal

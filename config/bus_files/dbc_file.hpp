@@ -1,9 +1,9 @@
 /// Parser of DBC files: the messages of a CAN bus and the places of their signals.
 ///
 /// A statement that breaks the grammar, has an invalid reference or does not fit into a frame is a
-/// flaw of its message or signal, with file, line and rule; the others are read. Comments, nodes,
-/// value tables, environment variables and attributes other than VFrameFormat and long names are
-/// checked for syntax only.
+/// flaw of its message or signal, with file, line and rule; the others are read. Only the syntax of
+/// comments, nodes, value tables, environment variables and attributes is checked, except for
+/// VFrameFormat and long names.
 #pragma once
 
 #include <cstdint>

@@ -1,9 +1,9 @@
 /// Electronic data sheets (CiA 306): names and types of the objects of a CANopen device.
 ///
-/// An EDS file is an INI file with comment lines that begin with ';'. INI libraries treat ';'
-/// inside a line, '#', quotes and indented lines differently, cut long lines or do not report the
-/// line of an entry; hence this strict parser: a line that is not a section, entry, comment or
-/// empty is a flaw of its section, as is a repeated section or entry; the first one counts.
+/// An EDS file is an INI file with comment lines that begin with ';'. INI libraries differ in ';'
+/// inside a line, '#', quotes and indented lines, cut long lines or do not report the line of an
+/// entry. Hence this strict parser: a line that is not a section, entry, comment or empty is a flaw
+/// of its section, as is a repeated section or entry; the first one counts.
 #pragma once
 
 #include <cstdint>

@@ -10,7 +10,7 @@
 namespace thermocomp::sections {
 namespace {
 
-/// nullptr, with a problem, for a missing or unknown kind.
+/// Kind of the bus; nullptr, with a problem, if missing or unknown.
 const BusKind* read_kind(const TomlTable& table) {
   Names<const BusKind*> names;
   for (const BusKind& kind : bus_kinds()) names.emplace_back(kind.name, &kind);
@@ -69,7 +69,7 @@ class BusReader {
   }
 
  private:
-  /// Without files, devices with a preset are left out, and so are buses of such devices only.
+  /// Without files, devices with a preset are omitted, and so are buses that have no other devices.
   std::vector<BusConfig> take() {
     std::vector<BusConfig> buses;
     for (const std::shared_ptr<BusSection>& section : sections_)

@@ -25,7 +25,8 @@ struct ChannelTables {
   std::size_t index{0};  ///< of the sensor in the configuration
   double stale_after_s{0.0};
 
-  /// Checks that a reading as old as its period is not stale. @param period  its key, for the rule
+  /// Requires that a reading as old as its period is not stale. @param period  its key, for the
+  /// rule
   void check_period(double period_s, const std::string& period) const;
 };
 
@@ -37,7 +38,7 @@ struct BusFiles {
   std::vector<Problem> remarks;                   ///< warnings, without the file's name
   std::map<std::string, std::string> places;      ///< by place: the first sensor, see note_place()
 
-  /// Warns if two sensors read one place. @param place  bus, device and number on it
+  /// Warns if two sensors read the same place. @param place  bus, device and number on it
   void note_place(const ChannelTables& tables, const std::string& place);
 };
 

@@ -47,7 +47,7 @@ std::vector<std::string> short_and_long_names(const EdsFile& eds) {
   return names;
 }
 
-/// Marks the flaws of an object whose type is not configured as used; without an object those
+/// Marks the flaws of an object whose type is not configured as used; without an object, the flaws
 /// outside of objects.
 void mark_flaws(EdsFile& eds, const TomlTable& table, std::optional<ObjectAddress> object) {
   for (EdsFlaw& flaw : eds.flaws) {

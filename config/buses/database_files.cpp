@@ -48,7 +48,7 @@ std::string did_you_mean(std::string_view name, const std::vector<std::string>& 
 
 /// Marks the flaws of a named message or signal as used; without a signal all of the message's,
 /// without a message those outside of messages.
-/// @return whether some are not overridden by configured keys
+/// @return true if some are not overridden by configured keys
 bool mark_flaws(DbcFile& file, std::string_view message, std::optional<std::string_view> signal,
                 const TomlTable& own, const TomlTable& base) {
   bool found = false;

@@ -23,7 +23,7 @@
 namespace thermocomp {
 namespace {
 
-/// The files named by a configuration: none that the daemon writes may be the same as another one,
+/// The files named by a configuration: a file that the daemon writes must differ from all others,
 /// whatever the path or link.
 enum class FileUse {
   read,
@@ -33,7 +33,7 @@ enum class FileUse {
 
 struct NamedFile {
   TomlTable table;
-  std::string key;  ///< key in `table` that names the file; empty: the configuration itself
+  std::string key;  ///< key in `table` of the file's name; empty: the configuration itself
   std::filesystem::path path;
   FileUse use{FileUse::read};
   /// Suffixes of further files created next to it.
@@ -197,7 +197,7 @@ void check_controller_period(const TomlTable& compensation, const DaemonConfig& 
                        "must be more than the controller's period_s");
 }
 
-/// Everything but the content of the model file.
+/// Reads everything except the model file's content.
 /// @return the tables to be checked against the model
 sections::BindingTables read_daemon(const TomlTable& root, const fs::path& folder,
                                     sections::Presets& presets, sections::BusFiles& bus_files,

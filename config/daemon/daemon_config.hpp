@@ -46,7 +46,7 @@ struct SocketConfig {
 };
 
 /// `[model] candidate`: runs beside the model, is scored, never sent. A candidate that cannot run
-/// does not affect the rest.
+/// has no effect on the rest.
 struct CandidateModel {
   std::filesystem::path file;
   std::string problem;  ///< why it does not run; empty: it does, and the other members are valid
@@ -81,15 +81,15 @@ struct DaemonConfig {
 /// @throws ConfigurationError with every problem of both files
 [[nodiscard]] DaemonConfig load_daemon_config(const std::filesystem::path& path);
 
-/// The same from texts, as stored in the history; the names are those in problems. Opens no file:
-/// devices with a preset and CANopen objects given by name are left out of the buses.
+/// The same from texts, as stored in the history, with their names for problems. Opens no file:
+/// devices with a preset and CANopen objects given by name are omitted from the buses.
 /// @throws ConfigurationError
 [[nodiscard]] DaemonConfig parse_daemon_config(const std::string& config_text,
                                                const std::string& config_name,
                                                const std::string& model_text,
                                                const std::string& model_name);
 
-/// Differences that need a restart; empty: a reload suffices. A reload covers model, blocks,
+/// Differences that require a restart; empty: a reload suffices. A reload covers model, blocks,
 /// screening, smoothing, limiter, compensation and log_level.
 [[nodiscard]] std::vector<std::string> restart_needed(const DaemonConfig& running,
                                                       const DaemonConfig& next);

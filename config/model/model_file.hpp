@@ -17,8 +17,8 @@ namespace thermocomp {
 /// @param name  file name in problems
 [[nodiscard]] ThermalModel parse_model(const std::string& text, const std::string& name);
 
-/// The readable part and the problems. Never throws. With problems the model is only good for
-/// further checks: `inputs` and `outputs` hold the given names.
+/// The readable part and the problems. Never throws. With problems the model only serves further
+/// checks: `inputs` and `outputs` hold the given names.
 struct ModelReading {
   ThermalModel model;
   std::vector<Problem> problems;

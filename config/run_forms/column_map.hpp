@@ -39,9 +39,9 @@ struct ColumnMap {
   std::map<std::string, MappedColumn> columns;  ///< by the name in the header
 
   [[nodiscard]] bool ignores(std::string_view header) const;
-  /// nullptr: it does not say what the column is.
+  /// Description of the column; nullptr: none.
   [[nodiscard]] const MappedColumn* find(const std::string& header) const;
-  /// Whether it says what the column is, or leaves it out.
+  /// True if the map describes the column or leaves it out.
   [[nodiscard]] bool uses(const std::string& header) const;
 };
 

@@ -22,7 +22,7 @@ constexpr std::string_view series_names =
     "|sensor|sensors|sensor_id|sensor_name|sensor name|channel|kanal|tag|tagname"
     "|tag name|probe|place|point|messstelle|series|signal|variable|parameter"
     "|metric|item|topic|entity_id|sphere|";
-/// Those whose sensors may have numbers.
+/// Names of quantities whose sensors may be numbered.
 constexpr std::string_view numbered_names =
     "|sensor|sensor_id|channel|kanal|ch|chan|probe|messstelle|sphere|";
 constexpr std::string_view time_part_names =
@@ -42,8 +42,8 @@ std::optional<std::uint64_t> code_of(std::string_view field) {
   return error == std::errc() && at == end ? std::optional(code) : std::nullopt;
 }
 
-/// Reads words or, with `codes`, a number: OPC calls 192 to 255 good and numbers below 64 bad, OPC
-/// UA calls numbers from 0x80000000 on bad.
+/// Reads words or, with `codes`, a number: OPC defines 192 to 255 as good and numbers below 64 as
+/// bad, OPC UA numbers from 0x80000000 on as bad.
 Quality quality_of(std::string_view field, Codes codes) {
   const std::string word = small_letters(field);
   if (word.starts_with("good") || word == "valid") return Quality::good;
@@ -60,7 +60,7 @@ Codes codes_of(const TextColumn& column) {
   const auto has = [&](std::string_view part) { return name.find(part) != std::string::npos; };
   if (has("valid")) return Codes::validity;
   if (has("qualit") || has("status")) return Codes::opc;
-  // Under another name if most are OPC's "good".
+  // A column of another name holds qualities if most are OPC's "good".
   std::size_t good = 0;
   for (const std::string_view field : column.fields) {
     const auto code = code_of(field);
@@ -93,8 +93,8 @@ bool is_factor(std::string_view word) {
   return finite_number(word) && (is_marked || word.find('.') != std::string_view::npos);
 }
 
-/// The first unit of a column's cells, if each number has one: in "80.6 A" below 20.5 the A may be
-/// a flag.
+/// The first unit of a column's cells, if each number has one: otherwise the A in "80.6 A" may be a
+/// flag.
 std::string_view unit_of_cells(const TextColumn& column) {
   std::string_view first;
   for (const std::string_view field : column.fields) {
@@ -188,7 +188,7 @@ class MeaningFinder {
       if (!header.empty()) check("ignore", header);
   }
 
-  /// Why an unmapped column is not a value; empty: it is one.
+  /// Reason why an unmapped column is not a value; empty: it is one.
   [[nodiscard]] std::string no_value(const TextColumn& column) const {
     const std::string& header = column.header;
     const bool has_no_unit = column.unit.empty() && !has_own_unit(header);
@@ -304,7 +304,7 @@ class MeaningFinder {
            with_name_and_unit("its name", has_factor ? spelled.unit : "a known unit") + end;
   }
 
-  /// Why the unit of a column may be another than it seems; empty: it is clear.
+  /// Reason why the unit of a column is doubtful; empty: it is clear.
   [[nodiscard]] std::string unclear_unit(const TextColumn& column,
                                          const SpelledName& spelled) const {
     if (spelled.known == nullptr) return {};

@@ -29,7 +29,7 @@ constexpr std::string_view missing_words =
     "|invalid|#div/0!|#value!|undef|n.a.|disconnected|over|under|no value|nodata"
     "|logged|nan|";
 
-/// Outside, a temperature is a sign of a fault, such as -9999.
+/// A temperature below is a fault code, such as -9999.
 constexpr double degC_min = -273.15;
 constexpr double degC_max = 2500.0;
 
@@ -133,7 +133,7 @@ class ValueReader {
     words_.emplace(column.fields[row]);
   }
 
-  /// Words, what the map lists, and the infinity of SCPI instruments, 9.9E37.
+  /// Missing: words, entries of the map, and the infinity of SCPI instruments, 9.9E37.
   bool takes_as_missing(std::string_view field, const std::optional<double>& number) {
     constexpr double overload_min = 1e37;
     if (is_missing(field)) return true;

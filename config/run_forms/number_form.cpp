@@ -83,7 +83,7 @@ NumberForm number_form(const TextTable& table) {
                    shortened(other.field) + ": there must be one decimal sign in a file");
   };
   const Seen comma = of(Shows::comma);
-  // A separating comma cannot be a decimal sign, so a single point is one.
+  // A comma that separates fields cannot be a decimal sign, so a single point is one.
   const bool by_commas = table.separator == ',';
   const Seen point = of(Shows::point) || !by_commas ? of(Shows::point) : of(Shows::point_or_group);
   const Seen unclear_comma = of(Shows::comma_or_group);

@@ -31,10 +31,10 @@ struct LongForm {
 
 /// The columns of a table that may be parts of a long one.
 struct LongColumns {
-  std::vector<std::size_t> words;  ///< that recur
+  std::vector<std::size_t> words;  ///< columns of recurring words
   std::vector<std::size_t> one_word;
   std::vector<std::size_t> numbers;
-  std::vector<std::size_t> values;  ///< called so
+  std::vector<std::size_t> values;  ///< columns called value
   std::optional<std::size_t> unit;
 };
 
@@ -93,7 +93,7 @@ std::optional<LongForm> mapped_form(const TextTable& table, const LongColumns& f
   return LongForm{{columns[0]}, columns.size() == 2 ? columns[1] : numbers[0], found.unit};
 }
 
-/// Keeps one column of words by which each series has a time only once, if there is one.
+/// Keeps only the column of words by which each series has a time only once, if there is one.
 void keep_needed_names(const TextTable& table, const std::vector<double>& time_s, LongForm& form) {
   for (const std::size_t column : form.names) {
     std::set<std::pair<std::string_view, double>> seen;
@@ -273,8 +273,8 @@ bool may_be_clock_change(double wall_s) {
          (month == 3 || month == 4 || (month >= 9 && month <= 11));
 }
 
-/// A local clock is set forward by an hour in a night of spring, and back in one of autumn, while
-/// the rows continue.
+/// Follows a local clock that is set forward by an hour in a night of spring, and back in autumn,
+/// while the rows continue.
 void follow_summer_time(TextTable& table, RunTime& time) {
   constexpr double hour_s = 3600.0;
   constexpr double steps_max = 3.0;
@@ -326,7 +326,7 @@ bool has_text(const TextTable& table, std::size_t row) {
   });
 }
 
-/// How to mend a time that is not later than that of the row before.
+/// Remedy for a time that is not later than that of the previous row.
 std::string remedy(const TextTable& table, const std::vector<double>& time_s, std::size_t row) {
   if (has_text(table, row))
     return "for one row per value write pivot = \"the column that names the series\" in the file "

@@ -15,10 +15,9 @@ namespace thermocomp {
 }
 
 /// Makes one column per series of a long table; missing values and those of bad quality are empty.
-/// A table is long according to `pivot` of the map; else with a column of numbers called value, or
-/// one whose times repeat or decrease, with columns of recurring words; else with a single column
-/// of numbers and one of axis letters only. Times within `scan_s` of a row's first time belong to
-/// that row.
+/// A table is long if the map has `pivot`. Otherwise it must have a column of numbers called value,
+/// or one whose times repeat or decrease, and columns of recurring words; or only a column of
+/// numbers and one of axis letters. Times within `scan_s` of a row's first time belong to that row.
 ///
 /// Then turns rows of falling times, follows a local clock through the change of summer time, and
 /// refuses a time that does not increase.

@@ -53,7 +53,8 @@ struct HeadLine {
   }
 };
 
-/// The column that tells rows from other lines: the first of times, else the first of numbers.
+/// The column that distinguishes rows from other lines: the first of times, else the first of
+/// numbers.
 std::optional<std::size_t> key_column(const std::vector<FieldKind>& kinds) {
   for (const FieldKind kind : {FieldKind::time, FieldKind::number})
     if (const auto found = std::ranges::find(kinds, kind); found != kinds.end())
@@ -112,7 +113,7 @@ bool may_be_row(const HeadLine& line, const std::vector<FieldKind>& kinds, std::
          !is_known_row_of_numbers(line) && !line.has(FieldKind::text);
 }
 
-/// Whether also half of the numbers are there.
+/// True if, in addition, half of the numbers are present.
 bool is_row(const HeadLine& line, const std::vector<FieldKind>& kinds, std::size_t key) {
   if (!may_be_row(line, kinds, key)) return false;
   std::ptrdiff_t alike = 0;
@@ -293,7 +294,7 @@ class TableReader {
       const std::size_t i = row_begin_ - up;
       const HeadLine& line = head_[i];
       if (line.fields.size() != cut_.fields) {
-        // Names of another count: one too few is explained, others are refused.
+        // One name too few is explained; another count is refused.
         if (!names_line_ && line.is_all_words()) names_line_ = i;
         return;
       }

@@ -1,5 +1,5 @@
-/// A text table of another program, on its way to a run: its columns, the user's statements on
-/// them, and what was found out.
+/// A text table of another program, while it is read as a run: its columns, the user's map of them,
+/// and the detected properties.
 #pragma once
 
 #include <algorithm>

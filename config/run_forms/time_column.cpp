@@ -24,8 +24,8 @@ std::span<const std::string_view> first_fields(const TextColumn& column) {
   return std::span(column.fields).first(std::min(column.fields.size(), rows_read));
 }
 
-/// The kind of content of a column's first rows, if the same in all of them. A date may be written
-/// only where it changes, and with midnight.
+/// The kind of content of a column's first rows, if it is the same in all of them. A date may be
+/// written only when it changes, and with midnight.
 Holds content(const TextColumn& column) {
   std::optional<Holds> holds;
   bool all_midnight = true;
@@ -80,14 +80,14 @@ struct Candidates {
   std::vector<std::size_t> counting;  ///< numbers with a unit of time, or called time
 };
 
-/// Removes the other columns if exactly one is called time.
+/// Keeps only the column called time, if there is exactly one.
 void keep_named(const TextTable& table, std::vector<std::size_t>& columns) {
   const auto is_named = [&](std::size_t i) { return names_time(table.columns[i].header); };
   if (std::ranges::count_if(columns, is_named) == 1) std::erase_if(columns, std::not_fn(is_named));
 }
 
-/// Drops constant dates, such as the start of a query, unless all are; of the rest keeps the one
-/// called time, if there is exactly one.
+/// Drops constant dates, such as the start of a query, unless all are constant; of the rest keeps
+/// the one called time, if there is exactly one.
 void keep_moving_dates(const TextTable& table, std::vector<std::size_t>& dates) {
   if (dates.size() < 2) return;
   const auto is_constant = [&](std::size_t i) { return table.columns[i].has_one_value(); };
@@ -95,7 +95,7 @@ void keep_moving_dates(const TextTable& table, std::vector<std::size_t>& dates) 
   keep_named(table, dates);
 }
 
-/// Whether counting numbers increase, and dates do not or do not show seconds.
+/// True if counting numbers increase, and dates do not, or lack seconds.
 bool is_finer(const TextTable& table, const TextColumn& counting, const TextColumn& dates) {
   const auto number = [&](std::string_view field) { return table.number(field); };
   const auto seconds = [](std::string_view field) {
@@ -191,8 +191,8 @@ std::optional<TimeColumns> find_clock(const TextTable& table) {
   return std::nullopt;
 }
 
-/// The column behind a clock of whole seconds that is called after a unit of time, if all its
-/// numbers are below a second.
+/// Finds the fraction after a clock of whole seconds: the column named after a unit of time, if all
+/// its numbers are below a second.
 void find_fraction(const TextTable& table, TimeColumns& time) {
   const std::size_t next = time.columns.back() + 1;
   if (next >= table.columns.size() || table.columns[next].is_time) return;
@@ -215,7 +215,7 @@ void find_fraction(const TextTable& table, TimeColumns& time) {
   time.fraction_factor = unit->factor;
 }
 
-/// A column of nothing but AM and PM, of a clock without.
+/// Finds a column of only AM and PM that belongs to a clock.
 void find_half(const TextTable& table, TimeColumns& time) {
   constexpr std::string_view halves = "|am|pm|";
   if (table.rows() == 0) return;
@@ -229,7 +229,7 @@ void find_half(const TextTable& table, TimeColumns& time) {
 
 constexpr double day_s = 86400.0;
 
-/// The least and the greatest difference of two that follow each other.
+/// The least and the greatest difference of consecutive numbers.
 std::pair<double, double> steps_of(const std::vector<double>& numbers, double (*seconds)(double)) {
   double low = INFINITY;
   double high = -INFINITY;
@@ -512,7 +512,7 @@ class TimeReader {
 
   bool clock_is_clear(const TimeStamp& first) {
     if (first.clock_parts != 2 || !table_.map.time_unit.empty()) return true;
-    // Beside a date they are hours and minutes, unless a spreadsheet shows 00:10.0.
+    // After a date they are hours and minutes, unless a spreadsheet shows 00:10.0.
     if (first.has_date && first.fraction_digits == 0) return true;
     refuse(0,
            "may be hours and minutes or minutes and seconds: write time_unit = \"hh:mm\" or "

@@ -19,9 +19,9 @@ struct TimeColumns {
   std::optional<std::size_t> half{};      ///< column with AM or PM of a clock
 };
 
-/// As mapped; else `time_s`; else the one column that has dates or clock times; else the one of
-/// numbers that is called time or has a unit of it, counted from an epoch if their size shows one.
-/// Marks the columns; `dates` remains a column of its own.
+/// The mapped time; else `time_s`; else the only column of dates or clock times; else the only
+/// column of numbers that is called time or has a unit of time, counted from an epoch if their size
+/// shows one. Marks the columns; `dates` remains a column of its own.
 /// @return nullopt after a problem
 [[nodiscard]] std::optional<TimeColumns> find_time(TextTable& table);
 

@@ -368,7 +368,7 @@ const Epoch* epoch_of(const std::vector<double>& numbers, bool is_named, bool ha
     // Whole numbers of that size may be ms of a counter of 32 bits.
     if (epoch.only_named && epoch.per_second == 1 && !has_unit && are_multiples_of(1, numbers))
       continue;
-    // No clock goes in steps of 86.4 s: these are seconds.
+    // Steps of 86.4 s are unlikely: these are seconds.
     if (epoch.per_second < 1 && !has_unit && are_multiples_of(0.001, numbers)) continue;
     if (!has_unit && !has_steps_below(step_s_max * epoch.per_second * 1.001, numbers)) continue;
     if (!numbers.empty() && std::ranges::all_of(numbers, [&](double number) {

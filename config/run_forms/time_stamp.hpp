@@ -1,6 +1,6 @@
-/// How a column shows that it holds the time: by its name, by numbers since an epoch, by time
-/// stamps. Their parser reads 2026-03-01T08:30:00+01:00, 01.03.2026 08:30, 3/1/26 8:30:00 PM,
-/// 01-Mar-2026, Mar 1, 2026, 2026/03/01-08:30:15, 20260301T083015Z, 08:30:15,250.
+/// Detection of a time column: by its name, by numbers since an epoch, by time stamps. Their parser
+/// reads 2026-03-01T08:30:00+01:00, 01.03.2026 08:30, 3/1/26 8:30:00 PM, 01-Mar-2026, Mar 1, 2026,
+/// 2026/03/01-08:30:15, 20260301T083015Z, 08:30:15,250.
 #pragma once
 
 #include <array>
@@ -81,11 +81,10 @@ struct Epoch {
   bool is_utc;
 };
 
-/// The epoch that the size of a column's numbers shows.
+/// The epoch indicated by the size of a column's numbers; nullptr: none.
 /// @param is_named  the column is called date or time, or has a unit of time
-/// @param has_unit  else numbers of which no two are within an hour may be a counter of another
-/// unit
-/// @return nullptr: none
+/// @param has_unit  without a unit, numbers of which no two are within an hour may count something
+/// else
 [[nodiscard]] const Epoch* epoch_of(const std::vector<double>& numbers, bool is_named,
                                     bool has_unit);
 

@@ -31,13 +31,13 @@ bool same_file(const std::string& a, const std::string& b) {
       {Problem{run.name, 0, "", other.name == run.name ? "" : other.name, rule}});
 }
 
-/// Rows in succession with the same values in both runs are the same rows: two measurements agree
-/// in some of their rows, but not while the values change.
+/// Consecutive rows with the same values in both runs are the same rows: two measurements agree in
+/// some rows, but not while the values change.
 constexpr std::size_t same_rows_min = 10;
 constexpr double same_share_min = 0.25;  ///< of the shorter run
 
-/// One number for each stretch of same_rows_min selected rows that differ from the row before, with
-/// the time between them: coarse values of two warm-ups are alike, not their times.
+/// One number for each stretch of same_rows_min selected rows that differ from the previous row,
+/// including the time between them: coarse values of two warm-ups are alike, their times are not.
 std::vector<std::size_t> stretches_of(const RunFile& run, const std::vector<std::string>& names) {
   const auto combine = [](std::size_t hash, double next) {
     return hash * 0x9E3779B97F4A7C15U + std::hash<double>{}(next);
@@ -67,7 +67,7 @@ std::vector<std::size_t> stretches_of(const RunFile& run, const std::vector<std:
   return stretches;
 }
 
-/// A copy, or exports of one history that overlap.
+/// True for a copy, or for overlapping exports of one history.
 bool are_of_one_measurement(const RunFile& a, const RunFile& b) {
   std::vector<std::string> columns;
   for (const std::string& column : a.columns)
@@ -120,7 +120,7 @@ constexpr std::size_t side = 4;
 constexpr std::size_t rows_min = 2 * side + 1;
 constexpr double usual_deviations = 12.0;
 constexpr double share_of_way = 0.25;
-/// At an end, only its size distinguishes an outlier from a first step of the machine.
+/// At an end, only its size distinguishes an outlier from the machine's first step.
 constexpr double share_of_way_at_end = 0.5;
 constexpr double share_max = 0.1;  ///< of the values; more are the column's own course
 constexpr std::size_t stuck_rows_min = 10;
@@ -160,7 +160,7 @@ Blunders blunders_of(const RunFile& run, const std::string& column) {
     values.push_back(all[row]);
     times_s.push_back(run.time_s()[row]);
   }
-  // Repeated without the outliers found: one next to an end bends the line there.
+  // Repeated without the outliers found, since one next to an end bends the line there.
   while (values.size() >= rows_min) {
     const Values leaps = leaps_of(values);
     const double usual_um = usual_deviations * robust_deviation(leaps);

@@ -13,15 +13,15 @@
 
 namespace thermocomp {
 
-/// Whether both have a selected row of one file in common (by its resolved path), or a quarter of
-/// the shorter one is in the other: a copy, or exports of one history that overlap.
+/// True if both have a selected row of one file in common (by its resolved path), or a quarter of
+/// the shorter one is in the other: a copy, or overlapping exports of one history.
 [[nodiscard]] bool share_rows(const RunFile& a, const RunFile& b);
 
 /// Whether a model was made from rows of the run, by name; folders are ignored.
 /// @param runs  MadeFrom::runs
 [[nodiscard]] bool is_made_from(std::span<const std::string> runs, const std::string& run);
 
-/// Refuses common rows of runs that are left out in turn or judge one another.
+/// Refuses common rows of runs that are left out in turn or test one another.
 /// @throws ConfigurationError naming the file
 void refuse_overlap(std::span<const RunFile> runs);
 /// Refuses common rows of training and test runs.
@@ -60,7 +60,7 @@ struct ModelInputs {
 /// @throws ConfigurationError when a column is missing, or one needed as reference has no value
 [[nodiscard]] ModelInputs model_inputs(const ThermalModel& model, const RunFile& run);
 
-/// At most a fifth of the values are missing.
+/// True if at most a fifth of the values are missing.
 [[nodiscard]] bool is_mostly_known(const std::vector<double>& column);
 
 /// The first value that is not missing; nullopt: none.
@@ -69,7 +69,7 @@ struct ModelInputs {
 /// A row's time, for models that are stepped from row to row.
 [[nodiscard]] nanoseconds time_of_row(double time_s);
 
-/// Whether a temperature's name is that of the air around the machine: one of its words begins with
+/// True if a temperature's name is that of the air around the machine: one of its words begins with
 /// room, ambient, air, Raum, Luft, Umgebung or hall.
 [[nodiscard]] bool is_called_like_a_room(std::string name);
 

@@ -8,7 +8,7 @@
 
 namespace thermocomp {
 
-/// Median of the finite values, of an even number the upper one; NaN if there are none.
+/// Median of the finite values; for an even number the upper one; NaN if there are none.
 [[nodiscard]] double median(std::vector<double> values);
 
 /// 1.4826 times the median absolute deviation: standard deviation without outliers. 0 if there is
@@ -25,8 +25,8 @@ namespace thermocomp {
                                  std::size_t side, bool after);
 
 /// Least and greatest value that a reading of temperature can have: at most 100 K, or ten times the
-/// range, beyond those of its rows that change and are not further apart. A channel whose sensor is
-/// open stays at one value. Of a setpoint, which changes in less than a tenth of the rows, beyond
+/// range, beyond those of its rows that change and are not farther apart. (A channel with an open
+/// sensor keeps one value.) For a setpoint, which changes in less than a tenth of the rows, beyond
 /// all but two rows at each end.
 [[nodiscard]] std::pair<double, double> range_of_reading(const std::vector<double>& values_degC);
 
@@ -36,7 +36,7 @@ struct StillRows {
   std::size_t end{0};
   [[nodiscard]] std::size_t rows() const noexcept { return end - begin; }
 };
-/// The longest such stretch, and the number of rows of the second longest (at least 1).
+/// The longest stretch of one value, and the number of rows of the second longest (at least 1).
 [[nodiscard]] std::pair<StillRows, std::size_t> longest_still(const std::vector<double>& values);
 
 }  // namespace thermocomp

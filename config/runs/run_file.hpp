@@ -1,6 +1,6 @@
 /// Run files: measured or simulated data, CSV with one header row; the unit is in the column's name
 /// (config/text/units.hpp). An empty field or `nan` is a missing value. One file is one run. Our
-/// programs write this form; other forms (run_forms/foreign_run.hpp) can be read too.
+/// programs write this form; others (run_forms/foreign_run.hpp) can be read.
 #pragma once
 
 #include <filesystem>
@@ -38,8 +38,8 @@ struct RunSelection {
 [[nodiscard]] RunFile parse_run(std::string_view text, const std::string& name,
                                 const RunSelection& selection = {}, const ColumnMap* map = nullptr);
 
-/// The stretches from one reference to the next, each a run with references and lags of its own,
-/// named FILE@T0:T1; those without a selected row are left out.
+/// The stretches between references, each a run with references and lags of its own, named
+/// FILE@T0:T1; those without a selected row are omitted.
 [[nodiscard]] std::vector<RunFile> between_references(const RunFile& run);
 
 /// All rows as a run file, every number bit for bit; missing values are empty fields.

@@ -29,7 +29,7 @@ enum class Kind {
   unknown
 };
 
-/// For a controller that cannot interpolate along the travel.
+/// Refuses a travel if the controller cannot interpolate along it.
 void refuse_travel(const TomlTable& axis) {
   refuse_all(axis, {"line", "table"},
              "needs a controller that takes a set of values as a whole (kind = \"modbus_tcp\", "
@@ -146,7 +146,7 @@ class ControllerReader {
     }
     read_signals([](const TomlTable&, std::size_t) {});
     config.signals = result_.signals;
-    result_.config = std::move(config);  // the bridge sets the pace
+    result_.config = std::move(config);  // the bridge determines the period
   }
 
   /// Calls read_value(table, index) for every signal with a valid name.
@@ -282,7 +282,7 @@ class ControllerReader {
     return place;
   }
 
-  /// For an axis with a travel.
+  /// Refuses the plain places for an axis with a travel.
   static void refuse_plain_places(const TomlTable& axis) {
     refuse_all(axis, {"offset", "applied", "piezo"},
                "cannot be combined with `line` or `table`, which has its own registers");

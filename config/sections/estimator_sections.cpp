@@ -173,7 +173,7 @@ std::vector<AxisConfig> nodes_of(const TomlTable& table, const AxisConfig& axis,
       table.problem("name", "the nodes of its travel are called " + axis.name + "_1, " + axis.name +
                                 "_2, ...: another axis must not be called " + each.name);
   }
-  // One axis is kept after a problem, so that the rest can be checked.
+  // One axis is kept after a problem, so that the remaining keys can be checked.
   if (nodes.empty()) nodes.push_back(axis);
   return nodes;
 }

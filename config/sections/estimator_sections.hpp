@@ -17,7 +17,7 @@ namespace thermocomp::sections {
 [[nodiscard]] std::vector<BlockConfig> read_blocks(const std::vector<TomlTable>& tables,
                                                    const std::vector<SensorConfig>& sensors);
 
-/// Without `offset` and `applied`, the keys for its place.
+/// Reads the axes without `offset` and `applied`, the keys for their places.
 [[nodiscard]] std::vector<AxisConfig> read_axes(const std::vector<TomlTable>& tables);
 
 /// @param signals  signals of the controller

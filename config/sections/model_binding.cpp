@@ -49,8 +49,8 @@ void check_weighing_down(const BindingTables& tables, const EstimatorConfig& con
                           .append(" inputs (`thermocomp covariance` makes it from records)"));
 }
 
-/// A controller must interpolate by a position on which the displacement depends uniquely: with
-/// backlash it differs between the two directions.
+/// The displacement must be a unique function of the position by which the controller interpolates:
+/// with backlash it differs between the two directions.
 void check_travel(const TomlTable& table, const AxisConfig& axis, const ThermalModel& model) {
   const TomlTable travel = table.table(axis.node->form == TravelForm::line ? "line" : "table");
   std::vector<std::string> positions;

@@ -20,7 +20,7 @@ struct Carried {
 };
 
 /// Checks that the place of an offset can represent the bound, and that one count is small against
-/// bound and slew limit: otherwise the axis would jump or stand still.
+/// bound and slew limit; otherwise the axis would jump or stand still.
 void check_offset_place(const TomlTable& table, std::string_view key, const Carried& place,
                         const LimiterConfig& limiter);
 
@@ -58,7 +58,7 @@ class CanTravelSection {
   CanTravelSection(const TomlTable& axis, const LimiterConfig& limiter, TakenBits& sent);
 
   void read_applied(const TakenBits& sent);
-  /// Set numbers must not repeat while a frame of the controller is still valid.
+  /// Requires that set numbers do not repeat while a frame of the controller is still valid.
   void check_round(double period_s, double silent_after_s) const;
   [[nodiscard]] const CanTravel& travel() const noexcept { return travel_; }
 

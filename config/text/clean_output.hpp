@@ -6,9 +6,9 @@
 
 namespace thermocomp {
 
-/// From now on, all output to stdout and stderr (by printf, std::cout, std::cerr, a library or
-/// CLI11) goes through printable_text(): names from files and texts of other processes cannot send
-/// control codes to the terminal. Line ends and tabulators stay. Call once, first in main().
+/// Sends all further output to stdout and stderr (by printf, std::cout, std::cerr, a library or
+/// CLI11) through printable_text(), so that names from files and texts of other processes cannot
+/// send control codes to the terminal. Line ends and tabulators stay. Call once, first in main().
 void clean_standard_output();
 
 /// A terminal code of our own: "[32m" for ESC [32m. Until it reaches the terminal it is marked by a

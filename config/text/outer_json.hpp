@@ -9,7 +9,7 @@
 
 namespace thermocomp {
 
-/// Why a text is refused; the message is a predicate: "must be ...".
+/// Reason for refusing a text, as a predicate: "must be ...".
 class JsonError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -17,7 +17,7 @@ class JsonError : public std::runtime_error {
 
 struct JsonLimits {
   /// Nesting of arrays and objects; our deepest message has 6. Copying, printing and comparing
-  /// recurse, so that a depth of 100,000 would overflow the stack.
+  /// recurse: a depth of 100,000 would overflow the stack.
   int depth_max{16};
   /// Values and commas: each takes some tens of bytes of memory.
   std::size_t values_max{1'000'000};

@@ -13,9 +13,9 @@ namespace thermocomp {
 /// UTF-8's mark, which programs of Windows write at the start of a text.
 inline constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
 
-/// Without control characters (C0, DEL, C1), Unicode's directional marks, embeddings, overrides and
-/// isolates, line and paragraph separators, zero-width characters except joiners, and invalid
-/// UTF-8.
+/// False if the text has control characters (C0, DEL, C1), Unicode's directional marks, embeddings,
+/// overrides and isolates, line and paragraph separators, zero-width characters except joiners, or
+/// invalid UTF-8.
 [[nodiscard]] bool is_printable(std::string_view text);
 inline constexpr std::string_view printable_rule =
     "must be printable, without control characters or changes of writing direction";

@@ -73,7 +73,7 @@ std::string to_string(const Problem& problem) {
     text += cut(problem.value) + ": ";
   }
   text += cut(problem.rule);
-  // A quoted name may contain anything; a problem stays on its line and without control codes.
+  // A quoted name may contain anything; a problem is one line without control codes.
   return printable_text(text);
 }
 

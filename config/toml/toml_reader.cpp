@@ -78,7 +78,7 @@ std::string nearest_name(std::string_view name, const std::vector<std::string>& 
     best = distance;
     nearest = candidate;
   }
-  // With similar names such as T_01 and T_02 the nearest one is ambiguous.
+  // With similar names such as T_01 and T_02, the nearest one is ambiguous.
   const auto is_twin = [&](const std::string& other) {
     return other != nearest && edit_distance(nearest, other) < best;
   };

@@ -111,7 +111,7 @@ class TomlTable {
   [[nodiscard]] std::vector<std::vector<double>> matrix(std::string_view key, std::size_t rows,
                                                         std::size_t columns) const;
 
-  /// A required table. After a problem the result reports no further ones.
+  /// A required table. After a problem, the result reports no further ones.
   [[nodiscard]] TomlTable table(std::string_view key) const;
   /// An optional table; if absent, an empty one.
   [[nodiscard]] TomlTable table_or_empty(std::string_view key) const;
@@ -140,7 +140,7 @@ class TomlTable {
   void problem(std::string_view key, std::string_view value, std::string_view rule) const;
   /// Reports `key`, if present, as not allowed, with the reason `rule`.
   void refuse(std::string_view key, std::string_view rule) const;
-  /// Suppresses problems for unknown keys of this table, as their meaning depends on a wrong key.
+  /// Suppresses problems for unknown keys of this table, whose meaning depends on a wrong key.
   void ignore_rest() const;
 
   /// Line of the key, or of the table if the key is absent.

@@ -114,7 +114,7 @@ class Candidate {
     now_ = now;
     estimator_.step(now, readings, controller, unsent_);
   }
-  /// From the previous estimator and, unless null, the previous candidate.
+  /// Takes over from the previous estimator and, unless null, the previous candidate.
   void adopt(const Estimator& running, const Candidate* before) noexcept;
 
   [[nodiscard]] const Estimator& estimator() const noexcept { return estimator_; }
@@ -128,7 +128,7 @@ class Candidate {
     score_.fresh();
     return score_.front();
   }
-  /// Adds the score for restore(), as named numbers among those of the correction.
+  /// Adds the score, as named numbers for restore(), to those of the correction.
   void add_to(std::map<std::string, double>& correction);
 
  private:

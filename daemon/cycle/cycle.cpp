@@ -150,7 +150,7 @@ void Cycle::run() noexcept {
 }
 
 void Cycle::step(std::uint64_t cycle) noexcept {
-  // Recorded late: at the end, the last step's offsets are recorded before skipped cycles.
+  // Recorded late: at the end, the last step's offsets must precede skipped cycles.
   if (cycle > expected_ && parts_->recorder) parts_->recorder->skipped(expected_, cycle - 1);
   cycle_ = cycle;
   expected_ = cycle + 1;
@@ -167,17 +167,17 @@ void Cycle::step(std::uint64_t cycle) noexcept {
   link_.newest(controller_);
   // Grid time, not the clock, so that a replay of the history repeats the same steps.
   parts.estimator.step(grid_.time_of(cycle), readings_, controller_, offsets_);
-  // Before the offer: a kill in between must not leave an unrecorded offset at the controller.
+  // Precedes the offer: a kill in between must not leave an unrecorded offset at the controller.
   if (last_sent_ != nullptr) last_sent_->note(offsets_, parts.estimator.forgotten_axes());
   link_.offer(offsets_);
   if (parts.recorder)
     parts.recorder->record(cycle, readings_, controller_, offsets_, parts.estimator);
   if (parts.candidate) parts.candidate->step(grid_.time_of(cycle), readings_, controller_);
   publish(commanded);
-  // Returned only after the new parts have published a report.
+  // Only after the new parts have published a report.
   if (retiring_ != nullptr)
     retired_.store(std::exchange(retiring_, nullptr), std::memory_order_release);
-  // Last: a reader that sees the command done also sees a change-over of the same step.
+  // Last, so that a reader that sees the command done also sees a change-over of the same step.
   if (commanded) commands_done_.store(commands_.taken(), std::memory_order_release);
 }
 
@@ -205,7 +205,7 @@ void Cycle::take_over(std::uint64_t cycle) noexcept {
   if (next == nullptr) return;
   retiring_ = parts_.release();
   next->estimator.adopt(retiring_->estimator);
-  // The candidate's lags and input reference have the history that the promoted model needs.
+  // The candidate's lags and input reference have the history needed by the promoted model.
   if (next->promotes && retiring_->candidate)
     next->estimator.adopt_model(retiring_->candidate->estimator());
   if (next->candidate) next->candidate->adopt(retiring_->estimator, retiring_->candidate.get());

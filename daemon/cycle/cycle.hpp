@@ -37,7 +37,7 @@ class DurationHistogram {
   [[nodiscard]] std::chrono::nanoseconds max() const noexcept {
     return std::chrono::nanoseconds(max_ns_.load(std::memory_order_relaxed));
   }
-  /// Resets the counts; a concurrent reader may see a mixture.
+  /// Resets the counts; a concurrent reader may see mixed values.
   void clear() noexcept;
 
  private:
@@ -52,15 +52,15 @@ class DurationHistogram {
   std::atomic<std::int64_t> max_ns_{0};
 };
 
-/// Single producer, single consumer, wait-free. Commands not yet taken can be withdrawn.
+/// Single producer, single consumer, wait-free. Commands can be withdrawn until they are taken.
 class CommandQueue {
  public:
   static constexpr std::size_t capacity = 64;
 
-  /// Producer. @return the command's number, counted from 0; none: the queue is full
+  /// Producer. @return the command's number, counted from 0; none if the queue is full
   std::optional<std::uint64_t> try_push(const Command& command) noexcept;
   /// Producer. @param number  of a command that is not known to be done
-  /// @return false: the consumer has taken it
+  /// @return false if the consumer has taken it
   [[nodiscard]] bool withdraw(std::uint64_t number) noexcept;
   /// Consumer; skips withdrawn commands.
   [[nodiscard]] bool try_pop(Command& command) noexcept;
@@ -81,13 +81,13 @@ class CommandQueue {
   std::atomic<std::uint64_t> tail_{0};
 };
 
-/// The part of the cycle that depends on the configuration; a reload replaces it as a whole.
+/// The configuration-dependent part of the cycle; a reload replaces it as a whole.
 struct CycleParts {
   explicit CycleParts(Estimator made)
       : estimator(std::move(made)), reports(estimator.make_report()) {}
   Estimator estimator;
   std::unique_ptr<Candidate> candidate;     ///< none: no candidate model runs
-  bool promotes{false};                     ///< the model is the candidate of the previous parts
+  bool promotes{false};                     ///< the model is that of the previous parts' candidate
   std::unique_ptr<CycleRecorder> recorder;  ///< none: no history
   WaitFreeSlot<Report> reports;             ///< cycle -> main
 };
@@ -124,14 +124,14 @@ class Cycle {
 
   // Called by main, through CycleHandle.
 
-  /// @return the command's number; none: the queue is full
+  /// @return the command's number; none if the queue is full
   std::optional<std::uint64_t> send(const Command& command) noexcept {
     return commands_.try_push(command);
   }
-  /// @return false: the cycle has taken the command
+  /// @return false if the cycle has taken the command
   [[nodiscard]] bool withdraw(std::uint64_t number) noexcept { return commands_.withdraw(number); }
-  /// All commands before this number were carried out (or withdrawn), and report() includes their
-  /// effect; if new parts were handed over in the same step, after take_retired().
+  /// All commands before this number were carried out or withdrawn, and report() includes their
+  /// effect; if new parts were handed over in the same step, only after take_retired().
   [[nodiscard]] std::uint64_t commands_done() const noexcept {
     return commands_done_.load(std::memory_order_acquire);
   }
@@ -139,7 +139,7 @@ class Cycle {
   /// @pre the last parts handed over have been taken back or withdrawn
   void hand_over(std::unique_ptr<CycleParts> next) noexcept;
   [[nodiscard]] std::unique_ptr<CycleParts> take_retired() noexcept;
-  /// Takes back the parts handed over; null: the cycle has them already.
+  /// Takes back the parts handed over; null if the cycle already has them.
   [[nodiscard]] std::unique_ptr<CycleParts> withdraw_parts() noexcept;
   /// The newest report of the parts in use, as of the last take_retired().
   [[nodiscard]] const Report& report() noexcept;
@@ -149,7 +149,7 @@ class Cycle {
   /// Discards the timing of the start-up.
   void clear_timing() noexcept;
   /// Call after run() has returned. Records the offsets of the last step.
-  /// @return the cycle of that step; none: no step was made
+  /// @return the cycle of that step; none if there was no step
   std::optional<std::uint64_t> finish_recording() noexcept;
   /// The parts in use, as of the last take_retired().
   [[nodiscard]] CycleParts& parts() noexcept { return *observed_; }
@@ -179,7 +179,7 @@ class Cycle {
   ControllerState controller_;
   OffsetCommand offsets_;
   std::uint64_t cycle_{0};     ///< of the last step
-  std::uint64_t expected_{0};  ///< the next one; cycles from here to the next step were skipped
+  std::uint64_t expected_{0};  ///< the next cycle; those from here to the next step were skipped
   bool has_stepped_{false};
   std::uint64_t report_every_;
   std::uint64_t next_report_{0};

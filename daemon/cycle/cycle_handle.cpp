@@ -9,7 +9,7 @@ namespace thermocomp {
 
 CycleHandle::Tracked CycleHandle::send(const Command& command, Clock::time_point now) {
   THERMOCOMP_ENSURE(!replacing() || !has_index(command.kind));
-  // Overdue commands count too, so that a queue number is never reused.
+  // Overdue commands count too, so that no queue number is reused.
   if (commands_.size() >= CommandQueue::capacity) return nullptr;
   const auto number = cycle_.send(command);
   if (!number) return nullptr;

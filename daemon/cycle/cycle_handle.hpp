@@ -21,9 +21,9 @@ enum class Outcome {
 
 /// Nothing here blocks; poll() advances all operations. Main's thread only; time is an argument.
 ///
-/// A change-over is atomic: until poll() has finished it, Cycle::parts() and report() are those of
-/// the old parts. A command or parts that the cycle does not take within `patience` are withdrawn
-/// in one atomic step: main and cycle always agree on what was carried out.
+/// A change-over is atomic: until poll() has finished it, Cycle::parts() and report() belong to the
+/// old parts. A command or parts that the cycle does not take within `patience` are withdrawn in
+/// one atomic step, so that main and cycle always agree on what was carried out.
 class CycleHandle {
  public:
   using Clock = std::chrono::steady_clock;
@@ -37,12 +37,12 @@ class CycleHandle {
   CycleHandle(Cycle& cycle, CommandDone command_done)
       : cycle_(cycle), command_done_(std::move(command_done)) {}
 
-  /// @return null: too many commands are under way
+  /// @return null if too many commands are under way
   /// @pre !replacing() for a command that names an axis: the new parts may number axes differently
   [[nodiscard]] Tracked send(const Command& command, Clock::time_point now);
   /// @pre !replacing()
   Tracked replace(std::unique_ptr<CycleParts> next, Clock::time_point now);
-  /// Whether new parts are under way; they must be done or withdrawn before others can follow.
+  /// True while new parts are under way; they must be done or withdrawn before others can follow.
   [[nodiscard]] bool replacing() const noexcept { return replacement_.outcome != nullptr; }
   [[nodiscard]] bool is_busy() const noexcept { return replacing() || !commands_.empty(); }
 
@@ -76,12 +76,12 @@ class CycleHandle {
   Replacement replacement_;
 };
 
-/// Whether Command::axis is the index of an axis.
+/// True if Command::axis is the index of an axis.
 [[nodiscard]] constexpr bool names_axis(CommandKind kind) noexcept {
   return kind == CommandKind::measured || kind == CommandKind::prove ||
          kind == CommandKind::release || kind == CommandKind::saved;
 }
-/// Whether Command::axis is an index that depends on the configuration.
+/// True if Command::axis is an index that depends on the configuration.
 [[nodiscard]] constexpr bool has_index(CommandKind kind) noexcept {
   return names_axis(kind) || kind == CommandKind::accept;
 }

@@ -33,8 +33,8 @@ std::string lock_memory() {
   mallopt(M_ARENA_MAX, 1);
   mallopt(M_TRIM_THRESHOLD, -1);
   mallopt(M_MMAP_MAX, 0);
-  // MCL_ONFAULT locks pages once touched: unused library pages do not use up the machine's memory.
-  // The cycle touches all of its memory before the daemon reports ready.
+  // MCL_ONFAULT locks pages when they are touched, so that unused library pages need no memory. The
+  // cycle touches all of its memory before the daemon reports ready.
   if (mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) == 0) return {};
   return std::string("memory is not locked: ") + std::strerror(errno) +
          " (needs CAP_IPC_LOCK or a larger LimitMEMLOCK)";

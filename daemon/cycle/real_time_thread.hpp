@@ -15,8 +15,9 @@ class RealTimeError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Locks all memory of the process once touched, now and later, and disables returning heap memory.
-/// @return empty, or why it was not possible
+/// Locks all memory of the process, present and future, once touched, and disables returning heap
+/// memory.
+/// @return empty, or the reason of the failure
 [[nodiscard]] std::string lock_memory();
 
 struct RealTimeThreadConfig {
@@ -32,11 +33,11 @@ class RealTimeThread {
   RealTimeThread& operator=(const RealTimeThread&) = delete;
   ~RealTimeThread() { join(); }
 
-  /// @return empty, or why the thread runs with ordinary scheduling instead
+  /// @return empty, or why the thread has ordinary scheduling
   /// @throws RealTimeError when no thread can be created
   [[nodiscard]] std::string start(const RealTimeThreadConfig& config, std::function<void()> body);
   void join() noexcept;
-  /// @return false: still running after `patience`, and to be joined
+  /// @return false if it still runs after `patience` and must be joined
   [[nodiscard]] bool join_within(std::chrono::seconds patience) noexcept;
 
  private:

@@ -48,7 +48,7 @@ std::filesystem::path lock_path(const std::filesystem::path& file) {
   return canonical.concat(".lock");
 }
 
-/// False if the previous holder removed the file between our open() and flock().
+/// False if the previous holder removed the file between open() and flock().
 bool is_at(int fd, const std::filesystem::path& path) noexcept {
   struct stat ours {};
   struct stat there {};
@@ -68,8 +68,8 @@ std::string content(int fd) {
 
 FileLock::FileLock(const std::filesystem::path& file) : path_(lock_path(file)) {
   for (;;) {
-    // NOFOLLOW: in a folder that others can write to, a link must not point us to a file of ours.
-    // 0600: a user who can read the file could lock it and keep its owner out.
+    // NOFOLLOW: in a folder writable by others, a link must not lead to another file of ours. 0600:
+    // a user who can read the file could lock it and keep its owner out.
     fd_ = open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0600);
     if (fd_ < 0 && errno == ENOENT)
       throw LockImpossible(
@@ -189,8 +189,8 @@ std::vector<std::string> listened_with(const std::string& prefix) {
   return found;
 }
 
-/// When two processes start at the same moment, the one with the higher number refuses at once
-/// and the other one waits for that. A holder still present after the wait had the name before.
+/// When two processes start at the same moment, the one with the higher number refuses at once and
+/// the other waits for that. A holder still present after the wait had the name before.
 /// @throws LockHeld, LockImpossible
 void refuse_if_held(const std::string& name, const std::string& prefix, const std::string& own) {
   constexpr int looks_max = 20;

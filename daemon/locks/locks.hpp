@@ -28,7 +28,8 @@ class LockImpossible : public std::runtime_error {
 /// one lock. The lock file names its holder. The kernel releases the lock when the process ends; an
 /// orderly end also removes the lock file.
 ///
-/// The file itself cannot be locked: saving replaces a state file, damage moves a history aside.
+/// The file itself cannot be locked: a state file is replaced by saving, a damaged history is moved
+/// aside.
 class FileLock {
  public:
   /// @throws LockHeld, LockImpossible
@@ -43,7 +44,7 @@ class FileLock {
 };
 
 /// Lock for a name, such as a controller's address: a Unix socket in the abstract namespace. It
-/// needs no folder and no rights, the kernel frees it when the process ends and knows the holder.
+/// needs neither folder nor rights; the kernel frees it when the process ends and knows the holder.
 /// Valid within a network namespace, as the address is.
 ///
 /// Every user may bind any abstract name, so each holder binds `thermocomp/<name>/<random>`, which

@@ -45,7 +45,7 @@ double value_um(const json& params) {
   return params["value_um"].get<double>();
 }
 
-/// Whether the flag is set for any node of the axis.
+/// True if the flag is set for any node of the axis.
 bool any_node(const StatusView& view, std::size_t axis, bool AxisReport::*is_so) {
   const AxisSpan span = span_of(view.config.estimator.axes, axis);
   for (std::size_t i = span.first; i < span.end(); ++i)
@@ -53,7 +53,7 @@ bool any_node(const StatusView& view, std::size_t axis, bool AxisReport::*is_so)
   return false;
 }
 
-/// A figure of the axis, interpolated at the slide's position if the axis has nodes.
+/// A value of the axis, interpolated at the slide's position if the axis has nodes.
 template <class Figure>
 double figure_at_position(const StatusView& view, std::size_t axis, Figure figure) {
   const AxisSpan span = span_of(view.config.estimator.axes, axis);
@@ -143,7 +143,7 @@ MeasuredSource source_in(const json& params) {
 }
 
 Command measured_command(const StatusView& view, const json& params) {
-  // A part has errors beside the machine's: clamping, the tool's edge, the gauge.
+  // A part has further errors: clamping, the tool's edge, the gauge.
   constexpr double part_by_probe = 2.0;
   Command command{CommandKind::measured, axis_index(view, params), value_um(params)};
   command.source = source_in(params);
@@ -169,12 +169,12 @@ Command measured_command(const StatusView& view, const json& params) {
   return command;
 }
 
-/// Refuses a value that contradicts the model's claimed error, until the operator confirms it.
+/// Refuses a value that contradicts the model's claimed error until the operator confirms it.
 void ask_back(const StatusView& view, const Command& command, double expected_um,
               const json& params) {
   const bool is_confirmed = flag_in(params, "confirm");
   const AxisReport& axis = view.report.axes[command.axis];
-  // The larger of the claimed error and the RMS error of probings counts.
+  // The larger of claimed error and RMS error of probings.
   const double claimed_um = std::isfinite(axis.probed_rms_um) && std::isfinite(axis.claimed_sd_um)
                                 ? std::max(axis.probed_rms_um, axis.claimed_sd_um)
                                 : axis.claimed_sd_um;
@@ -203,10 +203,10 @@ RpcPending note_measured(const DaemonActions& actions, const json& params) {
     return std::isfinite(axis.applied_um) ? axis.applied_um : axis.offset_um;
   });
   const double effect_um = view.config.estimator.axes[command.axis].sign * applied_um;
-  // Expected at the tool if the model is right: displacement not compensated by the offset.
+  // Expected at the tool if the model is right: displacement less compensation by the offset.
   const double left_um = displacement_um + effect_um;
   const double expected_um = remains ? left_um : displacement_um;
-  // Zeros expect nothing, and without a correction nothing is learned from the value.
+  // A model of zeros expects nothing; without a correction nothing is learned from the value.
   if (moves(view.config.model) || view.config.estimator.correction.form != CorrectionForm::off) {
     require_possible(view, command, expected_um);
     ask_back(view, command, expected_um, params);
@@ -260,7 +260,7 @@ RpcPending release(const DaemonActions& actions, const json& params) {
   return actions.command(command);
 }
 
-/// Accepts an unconfirmed sensor value on the operator's word.
+/// Confirms an unconfirmed sensor value by the operator's decision.
 RpcPending accept(const DaemonActions& actions, const json& params) {
   const auto view = actions.view();
   if (!params.contains("sensor") || !params["sensor"].is_string())
@@ -296,7 +296,8 @@ RpcPending reload(const DaemonActions& actions,
   };
 }
 
-/// The person behind a client that serves many: noted beside the client's own user, which counts.
+/// The person behind a client that serves many. Recorded beside the client's own user, which alone
+/// decides permissions.
 std::string asked_for(const json& params) {
   constexpr std::size_t bytes_max = 64;
   const auto found = params.find("for");

@@ -87,7 +87,7 @@ void CycleRecorder::record(std::uint64_t cycle, std::span<const Reading> reading
       session_->requested.store(0, std::memory_order_relaxed);
     }
   } else if (broken_ && ring_.free_places() > ring_.capacity() / 2) {
-    // Only once the writer has caught up, or the new segment would break at once.
+    // Only after the writer has caught up, since the new segment would otherwise break at once.
     snapshot(cycle + 1, estimator, broken_reason_);
   }
 }

@@ -1,4 +1,4 @@
-/// The real-time side of the history: records only what changed since the last cycle.
+/// The real-time side of the history: records only changes since the last cycle.
 #pragma once
 
 #include <array>
@@ -15,7 +15,7 @@
 
 namespace thermocomp {
 
-/// Start point of a replay: the estimator's exact state and the inputs last seen.
+/// Start point of a replay: the estimator's exact state and the last inputs.
 /// Hand-over: the cycle fills it while `taken` is false, sets `taken` and sends a `segment_begin`;
 /// the writer copies it and clears `taken`.
 struct Snapshot {

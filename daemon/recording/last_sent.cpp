@@ -113,9 +113,9 @@ void LastSent::note(const OffsetCommand& command, std::uint32_t forgotten) noexc
   if (next.known == now_.known && next.forgotten == now_.forgotten &&
       next.offset_um == now_.offset_um)
     return;
-  // The daemon has sent nothing yet, so the record of another format is still valid.
+  // Nothing has been sent yet, so the record of another format is still valid.
   if (next.number == 0 && next.known == 0 && !problem_.empty()) return;
-  // Otherwise a later process with another key could read its own slot, obsolete by then.
+  // Otherwise a later process with another key could read its own obsolete slot.
   if (next.number == 0) *file_ = File{magic, format, {}};
   ++next.number;
   next.checksum = checksum_of(next);

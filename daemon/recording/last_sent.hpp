@@ -38,7 +38,7 @@ class LastSent {
   /// The previous process' offsets for this boot, controller and axes. NaN: lost by the controller.
   [[nodiscard]] const Offsets& before() const noexcept { return before_; }
 
-  /// Why an existing record is not read; else empty.
+  /// Reason why an existing record is not read; else empty.
   [[nodiscard]] const std::string& problem() const noexcept { return problem_; }
 
   /// Call before a command is offered to the controller: plain stores, no system call. An axis that

@@ -42,10 +42,10 @@ inline constexpr std::size_t record_kinds_count = 9;
 
 /// Why a segment of the history begins.
 enum class SegmentReason : std::uint8_t {
-  start,     ///< the daemon started
+  start,
   reload,    ///< another configuration or model
   periodic,  ///< `segment_h` is over, or the segment has become large
-  gap        ///< something before it was lost
+  gap        ///< earlier records were lost
 };
 [[nodiscard]] std::string_view to_string(SegmentReason reason) noexcept;
 

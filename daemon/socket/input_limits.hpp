@@ -23,9 +23,9 @@ class LineBuffer {
   /// @return false when no line is complete
   [[nodiscard]] bool take(std::string& line);
   [[nodiscard]] bool has_line() const noexcept { return end_ != std::string::npos; }
-  /// The first line, complete or not, exceeds line_bytes_max: it is never taken.
+  /// True if the first line, complete or not, exceeds line_bytes_max and is never taken.
   [[nodiscard]] bool is_too_long() const noexcept;
-  /// A line has begun and is incomplete.
+  /// True if a line has begun and is incomplete.
   [[nodiscard]] bool is_partial() const noexcept { return !has_line() && begin_ < bytes_.size(); }
   [[nodiscard]] std::size_t capacity_bytes() const noexcept { return bytes_.capacity(); }
 
@@ -67,8 +67,8 @@ inline void LineBuffer::find_end() {
   if (bytes_.empty() && bytes_.capacity() > kept_bytes) bytes_ = std::string();
 }
 
-/// Rate limit with bursts: level l grows by `per_s` up to `burst`; taking one needs l >= 1.
-/// Time is an argument.
+/// Rate limit with bursts: the level l grows by `per_s` up to `burst`; taking one token needs l >=
+/// 1. Time is an argument.
 class TokenBucket {
  public:
   using Clock = std::chrono::steady_clock;

@@ -26,7 +26,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr auto groups_known_for = std::chrono::seconds(5);
 /// Time-outs of the name service, which is queried on a side thread: local groups are found at
-/// once, and a server that does not answer delays nobody.
+/// once, and a server that does not answer delays no client.
 constexpr auto groups_first_within = std::chrono::seconds(2);
 constexpr auto groups_within = std::chrono::milliseconds(50);
 
@@ -81,7 +81,7 @@ PeerAccess access_of(const Peer& peer, uid_t daemon_user, const AccessGroups& gr
   if (peer.user == 0) return PeerAccess::of_root();
   const bool is_own_user = peer.user == daemon_user;
   const auto allowed = [&](const std::optional<gid_t>& group) {
-    // On a development system without these groups, the daemon's own user has their permissions.
+    // On a development system without these groups, the daemon's user has their permissions.
     return group ? is_member(peer, *group) : is_own_user;
   };
   PeerAccess access;
@@ -103,7 +103,7 @@ PeerAccess AccessRules::of(const Peer& peer, Clock::time_point now) {
 
 void AccessRules::ask_groups(Clock::duration at_most) {
   if (found_) {
-    at_most = {};  // waited for already
+    at_most = {};  // already waited for
   } else {
     found_ = std::make_shared<AccessGroups>();
     thread_.start([found = found_, asked = config_] { *found = look_up_groups(asked); });
@@ -134,8 +134,8 @@ constexpr int send_buffer_bytes = 32 * 1024;
 /// For buses, history, log and epoll.
 constexpr rlim_t other_descriptors = 128;
 
-/// Makes two daemons started at once see each other. The lock is on the socket's folder, so that no
-/// file is left behind. Any user who can read the folder could hold it, hence the time-out of 1 s.
+/// Serialises the start of two daemons. The lock is on the socket's folder, so that no file is left
+/// behind. Any user who can read the folder could hold it, hence the time-out of 1 s.
 class FolderLock {
  public:
   explicit FolderLock(const std::filesystem::path& folder)
@@ -245,7 +245,7 @@ std::size_t places_for_descriptors(std::size_t wanted) noexcept {
     if (setrlimit(RLIMIT_NOFILE, &raised) == 0) limit = raised;
   }
   if (limit.rlim_cur >= needed) return wanted;
-  // The limit is too low: leave half of the descriptors below FD_SETSIZE to the buses.
+  // The limit is too low: leaves half of the descriptors below FD_SETSIZE to the buses.
   const rlim_t half = std::min<rlim_t>(limit.rlim_cur, FD_SETSIZE) / 2;
   const rlim_t beyond = limit.rlim_cur > FD_SETSIZE ? limit.rlim_cur - FD_SETSIZE : 0;
   return std::min<std::size_t>(wanted, std::max(half, beyond));

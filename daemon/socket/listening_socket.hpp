@@ -35,7 +35,7 @@ struct AccessGroups {
   std::optional<gid_t> bridge;
 };
 
-/// May query a network name service: too slow for every connection.
+/// Resolves the groups. May query a network name service, too slow for every connection.
 [[nodiscard]] AccessGroups look_up_groups(const SocketConfig& config);
 /// @param daemon_user  the effective user of the daemon
 [[nodiscard]] PeerAccess access_of(const Peer& peer, uid_t daemon_user, const AccessGroups& groups);
@@ -80,8 +80,8 @@ class ListeningSocket {
   ino_t inode_{0};
 };
 
-/// Raises the process' soft limit of open files to what `wanted` connections and the rest of the
-/// daemon need. @return the number of connections possible
+/// Raises the process' soft limit of open files for `wanted` connections and the rest of the
+/// daemon. @return the number of connections possible
 [[nodiscard]] std::size_t places_for_descriptors(std::size_t wanted) noexcept;
 
 }  // namespace thermocomp

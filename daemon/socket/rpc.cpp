@@ -106,7 +106,7 @@ void parse_request(std::string_view line, Request& out) {
 }
 
 /// @param result  called once; none: not complete yet
-/// @return whether `answer` now holds the result or the error
+/// @return true if `answer` now holds the result or the error
 bool reply(const Request& request, const RpcPending& result, Answer& answer) {
   json message;
   try {

@@ -37,7 +37,7 @@ constexpr std::chrono::milliseconds connected_again_every(20);
   throw ClientError("no answer in time from the daemon at " + path);
 }
 
-/// Non-blocking: a server that hangs leaves its backlog full.
+/// Non-blocking, since a server that hangs leaves its backlog full.
 int connect_to(const std::filesystem::path& path, Clock::time_point deadline) {
   const std::string text = path.string();
   sockaddr_un address{};

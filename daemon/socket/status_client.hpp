@@ -1,5 +1,5 @@
-/// Client of the status socket, for commands and gateway: small, blocking, and robust against any
-/// server. A call never exceeds its time-out, an answer never exceeds JsonLimits in memory.
+/// Client of the status socket, for commands and gateway: small, blocking, robust against any
+/// server. A call never exceeds its time-out, nor an answer JsonLimits in memory.
 #pragma once
 
 #include <chrono>
@@ -20,7 +20,7 @@ class ClientError : public cli::Failure {
   using cli::Failure::Failure;
 };
 
-/// The daemon answered with an error. It ends a command with status 1 if the daemon refused a valid
+/// The daemon answered with an error; the command's exit status is 1 if the daemon refused a valid
 /// request.
 class RemoteError : public cli::Failure {
  public:

@@ -72,7 +72,7 @@ struct ServedClient {
   std::size_t sent{0};  ///< bytes of `output` already sent
 
   bool input_ended{false};  ///< the peer sends no more; answers may be pending
-  bool hung_up{false};      ///< the peer does not read either; received requests are still served
+  bool hung_up{false};  ///< the peer does not read either; received requests are still carried out
   bool close_when_sent{false};
   bool broken{false};  ///< unusable
   bool ended{false};   ///< to be closed at the end of the turn
@@ -87,7 +87,7 @@ struct ServedClient {
 
   Clock::time_point last_request;  ///< or time of connection
   Clock::time_point line_begun;    ///< while input.is_partial()
-  Clock::time_point last_taken;    ///< time when the peer took bytes or nothing was pending
+  Clock::time_point last_taken;    ///< time when the peer last took bytes, or nothing was pending
 };
 
 ServedClient::ServedClient(int fd_in, const PeerAccess& access_in, const TokenBucket& tokens_in,
@@ -133,7 +133,7 @@ void ServedClient::flush(Clock::time_point now) {
     sent += static_cast<std::size_t>(count);
     last_taken = now;
   }
-  line_begun = now;  // the server did not read from this client until now
+  line_begun = now;  // the server had not read from this client before
   sent = 0;
   output.clear();
   if (output.capacity() > kept_bytes) output = std::string();
@@ -320,7 +320,7 @@ void StatusServer::Parts::arrange(ClientId id, ServedClient& client) {
   statistics.buffered_bytes += held - client.counted_bytes;
   client.counted_bytes = held;
 
-  // A pending answer keeps a client open while it can still read.
+  // A pending answer keeps a client open as long as it can read.
   if (client.broken || (client.has_unsent() ? client.hung_up : client.close_when_sent)) {
     return end(id, client);
   }
@@ -328,7 +328,7 @@ void StatusServer::Parts::arrange(ClientId id, ServedClient& client) {
   if (client.has_unsent()) {
     events = EPOLLOUT;
   } else if (client.later) {
-    // Neither read nor closed: further requests follow the answer.
+    // Neither read nor closed, since further requests follow the answer.
   } else if (client.input.has_line()) {
     if (!client.queued) ready.push_back(id);
     client.queued = true;
@@ -477,7 +477,7 @@ void StatusServer::Parts::check_time_outs(Clock::time_point now) {
 void StatusServer::Parts::cut_off(ClientId id, ServedClient& client, const std::string& why,
                                   int code) {
   ++statistics.cut_off;
-  // Another line must not be inserted into an answer.
+  // No other line may be inserted into an answer.
   if (!client.has_unsent()) client.send(error_line(code, why), Clock::now());
   end(id, client);
 }
@@ -569,7 +569,7 @@ void StatusServer::handle(std::chrono::milliseconds timeout) {
   }
   parts.ask_waiting();
   parts.wake_rested(now);
-  // Half of the turn each: requests and subscriptions must not starve each other.
+  // Half of the turn each, so that requests and subscriptions do not starve each other.
   parts.notify(now + parts.limits.turn_max / 2);
   parts.serve(turn_end);
   parts.check_time_outs(now);

@@ -15,7 +15,7 @@ namespace thermocomp {
 struct SocketStatistics {
   std::uint64_t clients{0};  ///< connected now
   std::uint64_t accepted{0};
-  std::uint64_t refused{0};  ///< not accepted: no place left
+  std::uint64_t refused{0};  ///< not accepted: too many clients
   std::uint64_t requests{0};
   std::uint64_t errors{0};  ///< answered with an error
   std::uint64_t cut_off{
@@ -43,24 +43,23 @@ struct SocketLimits {
   Duration idle_max{std::chrono::minutes(10)};          ///< no request and no subscription
   Duration stranger_max{std::chrono::seconds(5)};
   Duration replaceable_after{
-      std::chrono::seconds(1)};  ///< idle time after which a client may be replaced by another
+      std::chrono::seconds(1)};  ///< idle time after which a new client may replace it
   Duration turn_max{std::chrono::milliseconds(10)};  ///< of handle(), plus at most one request
 };
 
 /// Single-threaded: the owner calls handle() when fd() is readable, or in a loop.
 ///
-/// The socket's mode is 0666 because a file has one group only: permissions are decided for each
-/// connection by the peer's credentials (user, group, supplementary groups at connect). A
-/// development daemon, not run by root and without those groups on the system, grants all of them
-/// to its own user.
+/// The socket's mode is 0666 because a file has only one group: permissions depend on the peer's
+/// credentials (user, group, supplementary groups at connect). A development daemon, not run by
+/// root and without those groups on the system, grants them all to its own user.
 ///
-/// Fair: clients take turns, one request each. A client is read from only after its answers are
-/// sent and if its rate allows; excess requests wait in its own socket.
+/// Fair: clients take turns, one request each. A client is read only after its answers are sent and
+/// if its rate allows; excess requests wait in its own socket.
 ///
 /// `subscribe` {"methods": ["status", ...], "period_s": 1.0}: sends the results of these reading
 /// methods (default: status) as notifications {"method": NAME, "params": RESULT} every period
-/// (0.1..60 s) until the client disconnects or calls it again. A slow client is later sent the
-/// number it missed: {"method": "missed", "params": {"notifications": N}}.
+/// (0.1..60 s) until the client disconnects or calls it again. A slow client later gets the number
+/// that it missed: {"method": "missed", "params": {"notifications": N}}.
 class StatusServer {
  public:
   /// Binds and listens; replaces a stale socket file. Raises the process' soft limit of open files
@@ -76,8 +75,8 @@ class StatusServer {
   void add_slow_method(const std::string& name, AccessClass access, RpcSlowHandler handler);
   /// Readable when there is work: for the owner's epoll or poll.
   [[nodiscard]] int fd() const noexcept;
-  /// Waits up to `timeout` for work and does it, or part of it: the rest makes fd() readable again.
-  /// Never throws because of a client.
+  /// Waits up to `timeout` for work and does at least part of it; any rest makes fd() readable
+  /// again. Never throws because of a client.
   void handle(std::chrono::milliseconds timeout);
   [[nodiscard]] SocketStatistics statistics() const noexcept;
   /// For a handler: user ID of the present request's client, from the kernel; -1: unknown.

@@ -24,7 +24,7 @@ using nlohmann::json;
 constexpr int format = 1;
 constexpr std::uintmax_t size_bytes_max = 1u << 20;
 
-/// A newer program's file, moved to a name of its own so that it is not overwritten.
+/// A file of a newer program, to be renamed so that it is not overwritten.
 class NewerFormat : public std::runtime_error {
  public:
   explicit NewerFormat(std::int64_t newer)
@@ -37,7 +37,7 @@ class NewerFormat : public std::runtime_error {
 json numbers(const std::map<std::string, double>& values) {
   json object = json::object();
   for (const auto& [name, value] : values) {
-    // JSON has no NaN; a missing name means the same.
+    // JSON has no NaN; a missing name means NaN.
     if (std::isfinite(value)) object[name] = value;
   }
   return object;
@@ -138,7 +138,7 @@ PersistentState from_text(const std::string& text, bool& reference_lost,
   return state;
 }
 
-/// Moves a file or folder out of the way of the next save.
+/// Renames a file or folder that is in the way of the next save.
 std::string move_aside(const std::filesystem::path& file, const std::string& ending) {
   constexpr int names_max = 9;
   std::error_code error;
@@ -157,7 +157,7 @@ std::string move_aside(const std::filesystem::path& file, const std::string& end
 }
 
 void write_flushed(const std::string& path, const std::string& text) {
-  // Created anew: a leftover or a pipe may have this name.
+  // Created anew, since a leftover file or a pipe may have this name.
   unlink(path.c_str());
   const FileDescriptor file(open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0640));
   if (file.get() < 0) fail(path);
@@ -290,7 +290,7 @@ bool StateKeeper::must_be_written(const PersistentState& state) const {
          (writing_ == nullptr && !is_on_disk_);
 }
 
-/// The state last handed over, against which changes are detected.
+/// The state last handed over, with which changes are compared.
 const SavedState& StateKeeper::newest() const noexcept {
   if (waiting_) return *waiting_;
   return writing_ != nullptr ? writing_->what : on_disk_;

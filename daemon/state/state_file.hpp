@@ -47,7 +47,8 @@ enum class ReferenceOrigin : std::uint8_t {
 struct ReferenceRecord {
   double wall_s{not_a_number};  ///< seconds since 1970, by the clock at that time; NaN: unknown
   ReferenceOrigin origin{ReferenceOrigin::unknown};
-  /// Change that speaks against it, seen after it was taken by itself: "bed_degC +12.0 K/h".
+  /// Change that contradicts a reference taken automatically, seen afterwards: "bed_degC +12.0
+  /// K/h".
   std::string changed{};
   [[nodiscard]] bool is_known() const noexcept {
     return std::isfinite(wall_s) && origin != ReferenceOrigin::unknown;
@@ -96,7 +97,7 @@ class StateKeeper {
   static constexpr Clock::duration disk_answers_within = std::chrono::seconds(5);
 
   /// @param start           the state at start; only changes from it are written
-  /// @param is_on_disk      `start` need not be written
+  /// @param is_on_disk      true if `start` need not be written
   /// @param reference_lost  the machine's reference is unknown; that of `start` is not valid
   /// @param reference       origin of the reference of `start`
   StateKeeper(std::filesystem::path file, PersistentState start, bool is_on_disk,
@@ -108,7 +109,7 @@ class StateKeeper {
   void save(const PersistentState& state, Clock::time_point now);
   /// Collects a finished write and starts the waiting one.
   void poll(Clock::time_point now);
-  /// Waits until nothing is being written. @return false: still writing after `at_most`
+  /// Waits until no write is under way. @return false if one still is after `at_most`
   bool wait(Clock::duration at_most);
 
   /// The newest state that is flushed to disk.
@@ -116,7 +117,7 @@ class StateKeeper {
   /// Serial of the last state handed over.
   [[nodiscard]] std::uint64_t serial() const noexcept { return serial_; }
   enum class Saving { under_way, on_disk, failed };
-  /// The state with that serial: `on_disk` also if a newer one is, `failed` also while a newer one
+  /// State of saving that serial: `on_disk` also if a newer one is, `failed` also while a newer one
   /// is being written.
   [[nodiscard]] Saving saving(std::uint64_t serial) const noexcept;
   [[nodiscard]] bool is_busy() const noexcept { return writing_ != nullptr; }
@@ -124,10 +125,10 @@ class StateKeeper {
   /// Error of the last attempt, or empty.
   [[nodiscard]] const std::string& error() const noexcept { return error_; }
 
-  /// The machine's reference is unknown until an operator takes a new one; displacement would be
-  /// relative to the machine's state at the daemon's start. Saved in the file.
+  /// True if the machine's reference is unknown until an operator takes a new one; displacement
+  /// would be relative to the state at the daemon's start. Saved in the file.
   [[nodiscard]] bool is_reference_lost() const noexcept { return reference_lost_; }
-  /// An operator has taken a reference. Saved with the next save().
+  /// Call when an operator has taken a reference. Saved with the next save().
   void reference_taken() noexcept;
 
   /// Sets the reference's origin. Saved with the next save().

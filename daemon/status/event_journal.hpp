@@ -1,4 +1,4 @@
-/// The events of this run and the faults that last.
+/// The events of this run and the present outages.
 #pragma once
 
 #include <chrono>
@@ -16,9 +16,9 @@
 
 namespace thermocomp {
 
-/// Main's thread only. Every change is one event; a repeated fault is none. A fault that returns
-/// within `returns_within` of its end is intermittent: one outage, which ends once the fault has
-/// stayed away for that time.
+/// Main's thread only. Every change is one event, without repetition of a fault. A fault that
+/// returns within `returns_within` of its end is intermittent: one outage, which ends when the
+/// fault has stayed away for that time.
 class EventJournal {
  public:
   struct Moment {
@@ -34,25 +34,25 @@ class EventJournal {
   /// Calls `listener` (the history's writer) with every event from now on.
   void on_event(std::function<void(const Event&)> listener) { listener_ = std::move(listener); }
 
-  /// The subject has this fault from now on. Each kind of fault is one event per outage, which
-  /// begins with the first.
+  /// Reports a fault of the subject. Each kind of fault is one event per outage, which begins with
+  /// the first.
   /// @param fault  subject, code, detail and value; the journal sets the rest
-  /// @return whether it became an event
+  /// @return true if it became an event
   bool fault(Event fault);
-  /// The subject has no fault; no effect if it had none.
+  /// Ends the subject's fault, if it has one.
   /// @param hold  time without a fault after which the outage ends
   /// @param value  of the end's event; NaN: that of the fault
-  /// @return how long the outage lasted [s] if its end became an event, else NaN
+  /// @return duration of the outage [s] if its end became an event, else NaN
   double recovery(const Subject& subject, std::chrono::nanoseconds hold = {},
                   double value = std::numeric_limits<double>::quiet_NaN());
-  /// Ends outages whose faults have stayed away long enough; to be called often.
+  /// Ends outages whose faults have stayed away long enough; call often.
   /// @return the events
   std::vector<Event> settle();
-  /// The subject has an outage whose end is not yet an event.
+  /// True if the subject has an outage whose end is not yet an event.
   [[nodiscard]] bool lasts(const Subject& subject) const;
-  /// The same, and its faults are intermittent.
+  /// True if, in addition, its faults are intermittent.
   [[nodiscard]] bool comes_and_goes(const Subject& subject) const;
-  /// A mode begins; no effect if unchanged.
+  /// Records the begin of a mode, if it is new.
   void mode(const std::string& name);
   /// @param command  its code, subject, value and user
   void command(Event command);
@@ -76,7 +76,7 @@ class EventJournal {
     bool is_end_reported{false};
     bool comes_and_goes{false};
   };
-  /// The end was reported and the fault stayed away: a new fault is another outage.
+  /// True if the end was reported and the fault stayed away: a new fault is another outage.
   [[nodiscard]] static bool is_over(const Outage& outage, std::chrono::nanoseconds now);
   [[nodiscard]] const Outage* find(const Subject& subject) const;
   Event end_of(Outage& outage);

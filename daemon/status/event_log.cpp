@@ -12,10 +12,10 @@
 namespace thermocomp {
 namespace {
 
-/// Clipped values in a row that are logged: the temperature departs from its past.
+/// Number of consecutive clipped values that is logged: the temperature departs from its history.
 constexpr std::uint32_t clipped_in_a_row_news = 5;
 
-/// A value close to a limit crosses it with the noise: such a reason ends after a minute without.
+/// A value close to a limit crosses it by noise: such a reason ends after a minute without it.
 nanoseconds hold_of(Reason reason) {
   const bool has_limit = reason == Reason::at_bound || reason == Reason::outside_domain;
   return has_limit ? std::chrono::minutes(1) : nanoseconds{};
@@ -83,7 +83,7 @@ void EventLog::note_report(const Report& report, const EstimatorConfig& config, 
   note_sensors(report, config);
   note_mismatches(report, config);
   note_returns(report, config);
-  note_mode(report, std::string(code_text(report.mode, dry_run).name));  // follows from the above
+  note_mode(report, std::string(code_text(report.mode, dry_run).name));  // implied by the above
   first_ = false;
 }
 
@@ -99,7 +99,7 @@ void EventLog::note_mode(const Report& report, const std::string& mode) {
   for (std::size_t i = 0; i < reasons_count; ++i) {
     const auto bit = std::uint32_t{1} << i;
     const auto reason = static_cast<Reason>(bit);
-    // Changes with every part: shown in the status, not logged.
+    // Changes with every part, so it is shown in the status, not logged.
     if (reason == Reason::cutting) continue;
     const bool is_given = has_reason(report.reasons, reason);
     note_reason(reason, is_given);
@@ -141,7 +141,7 @@ void EventLog::note_sensors(const Report& report, const EstimatorConfig& config)
       if (sensor.fault != Fault::none) {
         note_fault({.subject = subject, .code = std::string(to_string(sensor.fault))});
       } else {
-        // A change within the noise of a step is no news.
+        // A change within the noise of a step is not reported.
         const double change_K = sensor.raw_degC - good_degC_[i];
         const bool is_news = std::abs(change_K) > config.sensors[i].screening.rate_allowance_K;
         const double lasted_s = journal_.recovery(subject, {}, is_news ? change_K : not_a_number);
@@ -277,7 +277,7 @@ void EventLog::note_controller(const ControllerHealth& controller) {
   note_writes(controller);
 }
 
-/// One event per outage, with the failed write and its error; a single failure is none.
+/// Reports one event per outage, with the failed write and its error; a single failure is none.
 void EventLog::note_writes(const ControllerHealth& controller) {
   const Subject subject{SubjectKind::controller_writes, controller.name};
   const WriteHealth& write = controller.write;

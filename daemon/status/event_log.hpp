@@ -25,7 +25,8 @@ class EventLog {
   explicit EventLog(EventJournal& journal) : journal_(journal) {}
 
   /// The log begins with the first mode other than `starting` (if switched off: once only that
-  /// reason is left), or 5 s after the first report: missing readings at start are no event.
+  /// reason is left), or 5 s after the first report, since missing readings at start are not
+  /// events.
   void note_report(const Report& report, const EstimatorConfig& config, bool dry_run = false);
   /// @param columns  names of the report's inputs
   void note_estimates(const Report& report, const EstimatorConfig& config,
@@ -41,7 +42,7 @@ class EventLog {
   /// Refused or cut-off clients and missed notifications: at most one line per minute, so that
   /// clients cannot fill the log.
   void note_socket(const SocketStatistics& statistics);
-  /// @param is_stalled  the log's reader hangs and lines are lost
+  /// @param is_stalled  true if the log's reader hangs and lines are lost
   void note_log(bool is_stalled);
 
  private:
@@ -51,7 +52,7 @@ class EventLog {
   void note_sensors(const Report& report, const EstimatorConfig& config);
   void note_suspicion(std::size_t index, const SensorReport& sensor, const std::string& name);
   void note_mismatches(const Report& report, const EstimatorConfig& config);
-  /// A controller that was away and returns with another offset in effect has moved the tool.
+  /// Reports a controller that returns with another offset in effect, which has moved the tool.
   void note_returns(const Report& report, const EstimatorConfig& config);
   void note_link(const Subject& subject, bool connected, const std::string& error);
   void note_writes(const ControllerHealth& controller);
@@ -70,15 +71,15 @@ class EventLog {
   std::vector<bool> clipping_;
   std::vector<std::string> input_states_;
   std::vector<bool> latched_;
-  std::vector<double> in_effect_um_;  ///< by axis, at the last look with a controller; NaN: none
+  std::vector<double> in_effect_um_;  ///< by axis, when the controller was last seen; NaN: none
   bool away_{false};                  ///< the controller
   bool uncertain_{false};
   std::set<std::string> frozen_;  ///< modules
   std::map<Subject, bool> connected_;
   std::map<Subject, std::string> states_;  ///< of CAN interfaces
   std::uint64_t lost_{0};                  ///< records of the history
-  WriteHealth write_;                      ///< at the last look
-  std::uint64_t reads_{0};                 ///< at the last look
+  WriteHealth write_;                      ///< when last seen
+  std::uint64_t reads_{0};                 ///< when last seen
   bool unwritten_{false};                  ///< reported
   bool late_{false};                       ///< reported
   std::uint64_t missed_{0};

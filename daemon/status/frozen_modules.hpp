@@ -1,4 +1,4 @@
-/// Modules whose noisy values have become the very same ones.
+/// Modules whose noisy values have become constant.
 #pragma once
 
 #include <bitset>
@@ -11,11 +11,11 @@
 
 namespace thermocomp {
 
-/// A module is frozen when it has answered with bit-identical values, all channels, for `polls` new
-/// readings and `lasts`, and was noisy before: in more than a third of the `polls` readings up to
-/// its last change a channel turned to a third value. A channel that flickers between two steps of
-/// its resolution is no evidence of noise: it may come to rest. Main's thread only, so that no
-/// offset depends on it; time is that of the report.
+/// A module is frozen when all its channels have given bit-identical values for `polls` new
+/// readings and the time `lasts`, and it was noisy before: in more than a third of the `polls`
+/// readings up to its last change a channel turned to a third value. A channel that flickers
+/// between two steps of its resolution is no evidence of noise: it may come to rest. Main's thread
+/// only, so that no offset depends on it; time is that of the report.
 class FrozenModules {
  public:
   static constexpr std::size_t polls = 100;
@@ -23,7 +23,7 @@ class FrozenModules {
 
   /// To be called with every report that is seen.
   void note(const Report& report, const EstimatorConfig& config);
-  /// For how long each frozen module has shown the same values [s].
+  /// Time for which each frozen module has given the same values [s].
   [[nodiscard]] std::map<std::string, double> frozen_s() const;
 
  private:

@@ -12,7 +12,8 @@ namespace {
 /// Offsets up to this count as zero (as in AxisChannel) [um].
 constexpr double at_nothing_um = 0.3;
 
-/// The larger of sent offset and read-back [um]; in a dry run the offset shown by the controller.
+/// The larger of sent offset and read-back [um]; in a dry run the offset reported by the
+/// controller.
 double in_effect_um(const DaemonConfig& config, const Report& report,
                     const ControllerHealth& controller, std::size_t i) {
   if (config.dry_run) {
@@ -56,11 +57,11 @@ void add_axes(const DaemonConfig& config, const Report& report, const Controller
 }
 
 struct NamedChange {
-  std::string column;  ///< empty: the machine is even, as far as known
+  std::string column;  ///< empty: the temperatures are steady, as far as known
   TemperatureTrend::Change change;
 };
 
-/// The column that changes fastest; the others mostly follow it.
+/// The column that changes fastest; others mostly follow it.
 NamedChange fastest_change(const ThermalModel& model, const Report& report,
                            const TemperatureTrend& trend) {
   const auto columns = model.temperature_columns();
@@ -109,7 +110,7 @@ std::vector<std::string> against_reference(const DaemonConfig& config, const Rep
                                            const TemperatureTrend* trend) {
   std::vector<std::string> why;
   add_axes(config, report, controller, why);
-  // Without the controller it is held as if it were cutting.
+  // Without the controller it is held as during cutting.
   if (has_reason(report.reasons, Reason::cutting) &&
       !has_reason(report.reasons, Reason::controller_offline))
     why.emplace_back("the controller reports cutting: wait for the end of the cut");

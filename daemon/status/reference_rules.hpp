@@ -11,21 +11,21 @@
 
 namespace thermocomp {
 
-/// The model's temperatures without a good sensor, one sentence each: no reference without them.
+/// The model's temperatures without a good sensor, one sentence each; they prevent a reference.
 [[nodiscard]] std::vector<std::string> lost_for_reference(const ThermalModel& model,
                                                           const Report& report);
 
-/// The objections to a reference now, one sentence each: an axis is being proved, an offset is
-/// applied, the controller is cutting, the machine warms or cools. Unknown quantities do not count
-/// against it.
+/// The objections to taking a reference now, one sentence each: an axis is being proved, an offset
+/// is applied, the controller is cutting, the machine warms or cools. Unknown quantities are no
+/// objection.
 /// @param trend  nullptr: temperatures are not watched
 [[nodiscard]] std::vector<std::string> against_reference(const DaemonConfig& config,
                                                          const Report& report,
                                                          const ControllerHealth& controller,
                                                          const TemperatureTrend* trend);
 
-/// The fastest change since the temperatures have been watched, "bed_degC +12.0 K/h"; empty: the
-/// machine is even.
+/// The fastest change since the temperatures have been watched, "bed_degC +12.0 K/h"; empty:
+/// steady.
 [[nodiscard]] std::string change_since_start(const ThermalModel& model, const Report& report,
                                              const TemperatureTrend& trend);
 

@@ -60,7 +60,7 @@ CorrectionStatus correction_of(const CorrectionConfig& config, const CorrectionR
   return status;
 }
 
-/// What an absent controller reported last is not what it does now.
+/// True if the controller is absent: its last report is outdated.
 bool is_absent(const StatusView& view) {
   return has_reason(view.report.reasons, Reason::controller_offline);
 }
@@ -133,7 +133,7 @@ std::vector<InputStatus> inputs_of(const StatusView& view) {
   return list;
 }
 
-/// nullopt: the sensor agrees with its neighbours.
+/// Error of a suspected sensor; nullopt: it agrees with its neighbours.
 std::optional<SensorError> suspicion_of(const StatusView& view, const SensorReport& sensor) {
   if (!sensor.suspected) return std::nullopt;
   return SensorError{sensor.suspected_size_K,
@@ -141,7 +141,7 @@ std::optional<SensorError> suspicion_of(const StatusView& view, const SensorRepo
                      sensor.weighed_down};
 }
 
-/// nullopt: no change awaits confirmation.
+/// Jump of a sensor; nullopt: no change awaits confirmation.
 std::optional<Jump> jump_of(const StatusView& view, const SensorReport& sensor) {
   if (!sensor.jumped) return std::nullopt;
   return Jump{sensor.jump_K, view.wall_s - to_seconds(view.report.now - sensor.jumped_at)};
@@ -158,7 +158,7 @@ std::vector<std::string> blocks_of(const StatusView& view, std::size_t sensor) {
 
 SensorStatus sensor_of(const StatusView& view, std::size_t index) {
   const SensorReport& sensor = view.report.sensors[index];
-  // A sensor that jumped before a restart has no accepted value in this run.
+  // A sensor that jumped before a restart has no confirmed value in this run.
   const bool ever = sensor.taken_at > nanoseconds{};
   return {.name = view.config.estimator.sensors[index].name,
           .blocks = blocks_of(view, index),
@@ -226,7 +226,7 @@ WriteStatus write_of(const StatusView& view) {
   return status;
 }
 
-/// Empty if each report of the controller arrives before the last one is too old.
+/// Explanation of a slow link; empty if each report of the controller arrives in time.
 std::string slow_link_text(const StatusView& view) {
   const double aged_s = to_seconds(view.controller_health.report_aged);
   const double stale_after_s = view.config.estimator.compensation.controller_stale_after_s;
@@ -292,7 +292,7 @@ SocketStatus socket_of(const SocketStatistics& statistics) {
           .buffered_bytes = statistics.buffered_bytes};
 }
 
-/// Whether the reference equals that of the model file.
+/// True if the reference equals that of the model file.
 bool is_of_model_file(const StatusView& view) {
   const std::vector<double>& given = view.config.model.reference_degC;
   if (given.empty() || given.size() > view.report.inputs.size()) return false;
@@ -320,7 +320,7 @@ ReferenceStatus reference_of(const StatusView& view) {
   return status;
 }
 
-/// A figure of each axis, by axis name.
+/// A value of each axis, by axis name.
 std::map<std::string, double> by_axis(const StatusView& view, double AxisReport::*figure) {
   std::map<std::string, double> figures;
   for (std::size_t i = 0; i < view.report.axes.size(); ++i)
@@ -398,7 +398,7 @@ std::optional<ProbeDueStatus> probe_due_of(const StatusView& view) {
   return due.axes.empty() ? std::nullopt : std::optional(due);
 }
 
-/// Sensors whose new values do not count yet, by module.
+/// Sensors whose new values are not confirmed yet, by module.
 std::vector<Confirmation> confirmations_of(const StatusView& view) {
   const std::vector<SensorReport>& reports = view.report.sensors;
   std::map<std::string, std::vector<std::size_t>> modules;

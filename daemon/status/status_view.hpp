@@ -55,7 +55,7 @@ void add_status_methods(StatusServer& server, const std::function<StatusView()>&
 [[nodiscard]] Status status_of(const StatusView& view);
 [[nodiscard]] SensorsAnswer sensors_of(const StatusView& view);
 [[nodiscard]] OffsetsAnswer offsets_of(const StatusView& view);
-/// nullopt: no candidate is configured, or it is the model itself.
+/// Status of the candidate; nullopt: none is configured, or it is the model itself.
 /// @param contest  nullptr: no candidate runs
 [[nodiscard]] std::optional<CandidateStatus> candidate_of(const DaemonConfig& config,
                                                           const ModelContest::Score* contest);

@@ -163,7 +163,7 @@ RemainingDrift WarmUp::remaining_of(std::size_t axis, double bound_um) const {
       points.push_back({minutes, row.displacement_um[axis]});
       first_min = std::min(first_min, minutes);
     }
-    // Not enough data for this stretch: a shorter one is tried.
+    // Not enough data for this duration: a shorter one is tried.
     if (points.size() < points_min || first_min > -0.9 * stretch_min) continue;
     const double middle_um = points.back().um;  // for precision
     for (Point& point : points) point.um -= middle_um;

@@ -1,4 +1,4 @@
-/// Rates of the temperatures, remaining warm-up drift, and the error that makes a probing due.
+/// Rates of the temperatures, remaining warm-up drift, and the error that requests a probing.
 #pragma once
 
 #include <chrono>
@@ -18,11 +18,11 @@ namespace thermocomp {
 /// Main's thread only; time is an argument.
 class TemperatureTrend {
  public:
-  /// Longer than the limit cycles of coolers (28 min in the recorded spindle), which are no
+  /// Longer than the limit cycles of coolers (28 min in the recorded spindle), which are not
   /// warming.
   static constexpr nanoseconds window = std::chrono::minutes(30);
   static constexpr nanoseconds pace = std::chrono::seconds(5);
-  /// Pace of the first rows: a jumping temperature shows within seconds.
+  /// Period of the first rows, so that a jumping temperature shows within seconds.
   static constexpr nanoseconds first_pace = std::chrono::seconds(1);
   static constexpr std::size_t first_rows = 60;
 
@@ -30,7 +30,7 @@ class TemperatureTrend {
     double rate_K_per_h{not_a_number};  ///< slope of the fitted line; NaN: fewer than two values
     double span_s{0.0};                 ///< time between the first value and now
     double farthest_K{0.0};             ///< largest difference from the present value
-    /// Warming or cooling, by more than the resolution of a coarse module.
+    /// True if warming or cooling by more than the resolution of a coarse module.
     [[nodiscard]] bool is_uneven() const noexcept;
   };
   /// Largest rate of a column at rest, as needed for a reference [K/h]. In 32 h of a recorded
@@ -60,7 +60,7 @@ class TemperatureTrend {
 /// Displacement still to come if the load stays constant.
 struct RemainingDrift {
   double um{not_a_number};       ///< NaN: unknown
-  double minutes{not_a_number};  ///< until less than the bound remains; 0: it does already
+  double minutes{not_a_number};  ///< until less than the bound remains; 0: already so
 };
 
 /// Extrapolates the displacement of each axis as a sum of exponentials:
@@ -68,7 +68,7 @@ struct RemainingDrift {
 ///     d(t) = d_end + sum of a_k exp(-t / tau_k),   tau_k = 10, 30, 90, 270 min,
 ///
 /// all a_k of one sign, by least squares over the longest of 240, 120, 60, 30 or 20 min with an RMS
-/// misfit below a tenth of the bound: a change of load, which changes d_end, shows as misfit. The
+/// misfit below a tenth of the bound: a change of load changes d_end and so causes misfit. The
 /// slowest tau is used only if the others fit much worse. Accuracy: docs/measurements.md. Main's
 /// thread only; time is an argument.
 class WarmUp {

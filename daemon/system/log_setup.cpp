@@ -17,7 +17,8 @@
 namespace thermocomp {
 namespace {
 
-/// Room for some thousand lines, as at a start or a storm of events; bounded, as memory is locked.
+/// Enough for some thousand lines, as at a start or in a storm of events; bounded, as memory is
+/// locked.
 constexpr std::size_t waiting_bytes_max = std::size_t{2} * 1024 * 1024;
 
 std::size_t size_of(const spdlog::details::log_msg& line) {

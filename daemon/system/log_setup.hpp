@@ -13,15 +13,15 @@ void set_up_log();
 /// @param level  trace, debug, info, warning, error
 void set_log_level(const std::string& level);
 
-/// The oldest lines are dropped when the queue is full; their number is logged once the sink
-/// accepts lines again.
+/// Statistics of the queue. When it is full, the oldest lines are dropped; their number is logged
+/// once the sink accepts lines again.
 struct LogStatistics {
   std::uint64_t dropped{0};  ///< since the start
   bool is_stalled{false};    ///< lines are being dropped
 };
 [[nodiscard]] LogStatistics log_statistics();
 
-/// Waits until all lines are handed over. @return whether they are
+/// Waits until all lines are handed over. @return true if they are
 bool flush_log(std::chrono::milliseconds at_most);
 
 }  // namespace thermocomp

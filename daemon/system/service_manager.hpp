@@ -10,7 +10,7 @@
 
 namespace thermocomp {
 
-/// Never blocks, unlike sd_notify(): text that systemd did not accept is sent again with the next
+/// Never blocks, unlike sd_notify(): text that systemd did not accept is sent with the next
 /// notification; a watchdog signal is not repeated.
 class ServiceManager {
  public:
@@ -25,7 +25,7 @@ class ServiceManager {
   /// Announces a slow stop: extends the stop time-out by `time`.
   void extend_stop(std::chrono::microseconds time) noexcept;
   void status(const std::string& status) noexcept;  ///< sent on change only
-  /// Feeds the watchdog; to be called only when the cycle has advanced.
+  /// Feeds the watchdog; call only when the cycle has advanced.
   void alive() noexcept;
 
  private:

@@ -14,7 +14,7 @@ class SideThread {
   /// @param name  shown by the system, at most 15 characters
   /// @throws std::system_error when no thread can be created
   explicit SideThread(const char* name);
-  /// Waits for the running job, for at most `patience`.
+  /// Waits at most `patience` for the running job.
   ~SideThread();
   SideThread(const SideThread&) = delete;
   SideThread& operator=(const SideThread&) = delete;
@@ -25,7 +25,7 @@ class SideThread {
   void start(std::function<void()> job);
   /// False also makes the job's writes visible to the caller.
   [[nodiscard]] bool is_busy() const;
-  /// Waits for the job to end. @return whether it has ended
+  /// Waits for the job to end. @return true if it has ended
   bool wait(std::chrono::steady_clock::duration at_most) const;
 
  private:

@@ -33,7 +33,7 @@ struct CanSelector {
     bool operator==(const Pages&) const = default;
   };
   CanField field;
-  std::vector<Pages> pages;  ///< the frame carries the signal if its number is in one of them
+  std::vector<Pages> pages;  ///< the frame carries the signal if its number is in one of these
   bool operator==(const CanSelector&) const = default;
 };
 
@@ -61,7 +61,7 @@ struct CanSignal {
   std::vector<Sentinel> sentinels;
   std::vector<CanSelector> selectors{};  ///< all must match; empty: the signal is in every frame
   std::optional<CanStatus> status{};     ///< in the same frame
-  /// Bits of an extended id that are compared; with fewer, a J1939 group from any sender.
+  /// Bits of an extended id that are compared; fewer bits match a J1939 group from any sender.
   std::uint32_t id_mask{0x1FFFFFFF};
   bool operator==(const CanSignal&) const = default;
 };
@@ -69,7 +69,8 @@ struct CanSignal {
 struct CanChannel {
   std::size_t sensor{0};  ///< index of the sensor in the configuration
   CanSignal signal;
-  /// A counter or toggle in the same frame; without a change the reading's time stays.
+  /// A counter or toggle in the same frame; while it does not change, neither does the reading's
+  /// time.
   std::optional<CanField> counter{};
   bool operator==(const CanChannel&) const = default;
 };

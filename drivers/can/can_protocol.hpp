@@ -1,5 +1,5 @@
-/// A protocol above CAN frames: takes frames and times, gives frames and readings. No socket, no
-/// clock, no thread, so that tests, tools and drivers run the same code.
+/// A protocol above CAN frames: frames and times in, frames and readings out. Without socket, clock
+/// and thread, so that tests, tools and drivers run the same code.
 #pragma once
 
 #include <chrono>
@@ -19,7 +19,7 @@ namespace thermocomp {
 /// Bytes that a reading was decoded from; empty: none since the bus or its node was lost.
 struct RawReading {
   std::vector<std::uint8_t> value;   ///< frame, object, or part of a long message
-  std::vector<std::uint8_t> status;  ///< if it is requested separately
+  std::vector<std::uint8_t> status;  ///< only if it is requested separately
 };
 
 class CanProtocol {
@@ -31,13 +31,13 @@ class CanProtocol {
 
   /// Frames to receive; take() needs no others.
   [[nodiscard]] virtual std::vector<CanFilter> wanted() const = 0;
-  /// Index in the whole configuration of each reading's sensor.
+  /// Index in the whole configuration of the sensor of each reading.
   [[nodiscard]] virtual std::vector<std::size_t> sensors() const = 0;
 
-  virtual void opened(nanoseconds now) = 0;  ///< the bus is usable from now on
-  virtual void closed(nanoseconds now) = 0;  ///< ... no longer; every reading becomes no_answer
+  virtual void opened(nanoseconds now) = 0;  ///< the bus is now usable
+  virtual void closed(nanoseconds now) = 0;  ///< it is not: every reading becomes no_answer
   virtual void take(const CanFrame& frame) = 0;
-  /// Does what is due. Called after take(), and at least every 50 ms.
+  /// Performs what is due. Called after take(), and at least every 50 ms.
   virtual void advance(nanoseconds now) = 0;
   /// Frames to send, oldest first; each is returned once.
   [[nodiscard]] virtual std::optional<CanFrame> next_frame() = 0;

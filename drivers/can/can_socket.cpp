@@ -47,7 +47,7 @@ can_filter filter_for(const CanId& wanted) noexcept {
   return masked_filter({wanted, CAN_EFF_MASK});
 }
 
-/// @param raw  classic frames have the same layout, without the data after byte 8
+/// @param raw  a classic frame has the same layout, up to byte 8 of the data
 void to_frame(const canfd_frame& raw, bool fd, nanoseconds received_at, CanFrame& frame) noexcept {
   frame.id.extended = (raw.can_id & CAN_EFF_FLAG) != 0;
   frame.id.id = raw.can_id & (frame.id.extended ? CAN_EFF_MASK : CAN_SFF_MASK);
@@ -195,8 +195,8 @@ void CanSocket::report_state() {
 void CanSocket::look_for_carrier() {
   ifreq request{};
   interface_.copy(std::begin(request.ifr_name), IFNAMSIZ - 1);
-  if (::ioctl(socket_, SIOCGIFFLAGS, &request) < 0) return;  // receiving reports the error
-  if ((request.ifr_flags & IFF_UP) == 0) return;             // receiving reports it
+  if (::ioctl(socket_, SIOCGIFFLAGS, &request) < 0) return;
+  if ((request.ifr_flags & IFF_UP) == 0) return;  // receiving reports the error
   const bool none = (request.ifr_flags & IFF_RUNNING) == 0;
   if (none == without_carrier_) return;
   without_carrier_ = none;
@@ -230,7 +230,7 @@ bool CanSocket::configure() {
   interface_.copy(std::begin(request.ifr_name), IFNAMSIZ - 1);
   if (::ioctl(socket_, SIOCGIFINDEX, &request) < 0) return fail("no such interface", errno), false;
   const int index = request.ifr_ifindex;
-  // Binding to an interface that is down succeeds and fails only later.
+  // Binding to an interface that is down succeeds; only later calls fail.
   if (::ioctl(socket_, SIOCGIFFLAGS, &request) < 0) return fail("no such interface", errno), false;
   if ((request.ifr_flags & IFF_UP) == 0) return fail("interface", ENETDOWN), false;
 
@@ -264,7 +264,7 @@ bool CanSocket::configure() {
 }
 
 /// Enlarges the receive queue, since the default holds about 30 ms of 1 Mbit/s. Without the
-/// privilege the kernel gives up to net.core.rmem_max, which also works.
+/// privilege the kernel limits it to net.core.rmem_max, which also works.
 void CanSocket::ask_for_room() noexcept {
   const int bytes = 2'000'000;
   if (::setsockopt(socket_, SOL_SOCKET, SO_RCVBUFFORCE, &bytes, sizeof bytes) == 0) return;
@@ -276,7 +276,7 @@ std::span<const CanFrame> CanSocket::receive() {
   if (!is_open()) return {};
   if (without_carrier_ || carrier_known_at_ != nanoseconds{0}) {
     const bool is_known = monotonic_now() >= carrier_known_at_;
-    look_for_carrier();  // once more after that time, however seldom this is called
+    look_for_carrier();  // once more after that time, even if this is rarely called
     if (is_known) carrier_known_at_ = {};
   }
   buffers_->prepare();

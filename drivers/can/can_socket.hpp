@@ -49,13 +49,13 @@ struct CanFrame {
   }
 };
 
-/// State of the interface; the middle three are the error states of ISO 11898-1.
+/// State of the interface; active, warning and passive are the error states of ISO 11898-1.
 enum class CanState {
   down,  ///< not open: the interface is missing or not up
   active,
   warning,
   passive,
-  bus_off  ///< the interface takes no part in the bus until it is restarted
+  bus_off  ///< the interface is off the bus until it is restarted
 };
 [[nodiscard]] std::string_view to_string(CanState state) noexcept;
 
@@ -73,7 +73,7 @@ struct CanErrors {
 [[nodiscard]] std::string can_unavailable();
 
 /// Monotonic time of an event with a wall-clock stamp: now less its age, limited to [now - 1 s,
-/// now], so that a step of the wall clock cannot make a reading fresh for ever or stale at once.
+/// now], so that a step of the wall clock makes a reading neither stale nor fresh for ever.
 [[nodiscard]] nanoseconds monotonic_stamp(nanoseconds realtime_stamp, nanoseconds realtime_now,
                                           nanoseconds monotonic_now) noexcept;
 
@@ -81,8 +81,8 @@ struct CanErrors {
 /// @pre size <= can_bytes_max
 [[nodiscard]] std::size_t whole_frame_bytes(std::size_t size) noexcept;
 
-/// One bus through one socket, classic and FD frames; for one thread. Faults are data: no method
-/// throws after construction (except for lack of memory); a lost link closes the socket, and
+/// One bus through one socket, classic and FD frames; for one thread. Faults are data: after
+/// construction no method throws (except for lack of memory). A lost link closes the socket;
 /// error() gives the reason.
 class CanSocket {
  public:
@@ -110,11 +110,11 @@ class CanSocket {
   /// Readable when receive() has frames; -1 when closed.
   [[nodiscard]] int descriptor() const noexcept { return socket_; }
 
-  /// Received frames, without waiting, at most batch_max; valid until the next call. Error frames
-  /// are counted and not returned. Closes the socket when the link is lost.
+  /// Returns received frames without waiting, at most batch_max; valid until the next call. Error
+  /// frames are counted, not returned. Closes the socket when the link is lost.
   [[nodiscard]] std::span<const CanFrame> receive();
-  /// A frame of more than 8 bytes is sent as CAN FD, zero-padded to a valid size.
-  /// @return false when the kernel did not take the frame; the link may be lost then
+  /// Sends a frame; one of more than 8 bytes as CAN FD, zero-padded to a valid size.
+  /// @return false when the kernel did not take the frame; the link may then be lost
   bool send(const CanFrame& frame);
 
   /// Frames of watch_own() that receive() has seen leave the interface since the last open().
@@ -123,7 +123,7 @@ class CanSocket {
   [[nodiscard]] CanState state() const noexcept { return state_; }
   /// CLOCK_MONOTONIC of the last change of state().
   [[nodiscard]] nanoseconds state_since() const noexcept { return state_since_; }
-  /// The CAN controller has left the bus: neither frames nor a restart since.
+  /// True while the CAN controller is off the bus: no frame and no restart since.
   [[nodiscard]] bool bus_off() const noexcept { return state_ == CanState::bus_off; }
   /// Reason of the last failed open(), receive() or send(), or the bus' error state; else empty.
   [[nodiscard]] const std::string& error() const noexcept { return error_; }
@@ -136,8 +136,8 @@ class CanSocket {
   void enter(CanState state);
   void report_state();
   void look_for_carrier();
-  /// The interface takes part in the bus again, as a frame or the kernel has shown; its carrier may
-  /// follow a second later.
+  /// Ends bus-off: a frame or the kernel has shown that the interface is on the bus again. Its
+  /// carrier may follow a second later.
   void returned();
   void fail(const char* what, int code);
   /// Kernel time stamp of a frame; also records the kernel's count of dropped frames.
@@ -153,10 +153,10 @@ class CanSocket {
   int socket_{-1};
   CanState state_{CanState::down};
   nanoseconds state_since_;
-  /// Opened without a carrier, as a bus-off interface appears; no error frame reports the past.
+  /// Opened without a carrier, as after a bus-off; no error frame reports the past.
   bool without_carrier_{false};
-  /// The kernel withdraws the carrier up to a second after a bus-off: an opened socket looks until
-  /// then.
+  /// The kernel withdraws the carrier up to a second after a bus-off: an opened socket checks it
+  /// until then.
   nanoseconds carrier_known_at_{};
   bool send_failed_{false};
   std::string error_;

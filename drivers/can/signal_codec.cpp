@@ -157,7 +157,7 @@ void insert_raw(std::span<std::uint8_t> payload, const CanField& field,
   for (int left = field.length_bits; left > 0;) {
     const int place = bit % 8;
     const int count = std::min(8 - place, left);
-    // Bits of this byte that come first: at its low end, or (big_endian) at its high end.
+    // The first bits of this byte are at its low end or, for big_endian, at its high end.
     const int shift = up ? place : 8 - place - count;
     const std::uint64_t part = up ? raw >> (field.length_bits - left) : raw >> (left - count);
     const std::uint64_t mask = low_bits(count) << shift;

@@ -25,7 +25,7 @@ using CanBits = std::bitset<8 * can_bytes_max>;
 /// signal.
 /// @throws InvalidValue with the keys of CanSignal and CanField
 void check(const CanSignal& signal);
-/// The same for a field in a frame of a signal with this `fd`.
+/// Checks a field in a frame of a signal with this `fd`, with the same errors.
 void check(const CanField& field, bool fd);
 
 /// Smallest frame with the signal and its multiplexors [bytes]. @pre check(signal) passes

@@ -24,8 +24,8 @@ struct PiezoConfig {
   bool return_to_zero{true};     ///< to 0 V before each new voltage, against hysteresis
   double settle_s{0.2};          ///< at 0 V
   double steady_s{1.0};          ///< time that an offset must be steady before it is followed
-  double step_um{0.2};           ///< a smaller change is not followed
-  double tolerance_V{1.0};       ///< largest difference between read back and written voltage
+  double step_um{0.2};           ///< minimum change that is followed
+  double tolerance_V{1.0};       ///< maximum difference between voltage read back and written
   inline void validate() const;  ///< @throws InvalidValue
   bool operator==(const PiezoConfig&) const = default;
 };
@@ -76,12 +76,11 @@ struct ModbusSignal {
 };
 
 /// An axis whose controller interpolates the offset along its travel. The command has one offset
-/// per node, in consecutive entries; they are sent as a set of values that is taken over completely
-/// or not at all.
+/// per node, in consecutive entries; the controller takes their set as a whole or not at all.
 struct TravelShape {
   static constexpr std::size_t nodes_max = 16;
   std::vector<double> nodes_mm;  ///< increasing; for a line both ends of the travel
-  /// For a line: the values are K0, the offset at P0 [um], its slope [um/m] and, where it is
+  /// Only for a line: the values are K0, the offset at P0 [um], its slope [um/m] and, where it is
   /// written, P0 itself [mm]:  offset = K0 + slope (P - P0).  None: the offset at each node [um].
   std::optional<double> p0_mm;
   bool operator==(const TravelShape&) const = default;
@@ -92,13 +91,12 @@ struct TravelShape {
 ///     begin | values | end
 ///
 /// where begin and end hold the number of the set, written in one request, lowest address first. A
-/// reader that takes `end`, then the values, then `begin`, and finds both equal, has values of one
-/// set only.
+/// reader that takes `end`, then the values, then `begin`, and finds both equal, has one set only.
 struct ModbusTravel : TravelShape {
   ModbusValue begin;
   std::vector<ModbusValue> values;
   ModbusValue end;
-  std::vector<ModbusValue> applied;  ///< the same values as in effect; empty: not read back
+  std::vector<ModbusValue> applied;  ///< the same values in effect; empty: not read back
   bool operator==(const ModbusTravel&) const = default;
 };
 
@@ -148,8 +146,8 @@ struct ModbusControllerConfig {
   bool operator==(const ModbusControllerConfig&) const = default;
 };
 
-/// Values of one set in one or several frames. Each of these frames carries the number of the set:
-/// frames with the same number are of one set, however many were lost in between.
+/// Values of one set in one or several frames. Each frame carries the number of the set: frames
+/// with the same number belong to one set, however many were lost in between.
 struct CanSet {
   static constexpr int number_bits_min = 8;
   static constexpr int number_bits_max = 32;
@@ -158,8 +156,8 @@ struct CanSet {
   bool operator==(const CanSet&) const = default;
 };
 
-/// Over CAN a set arrives frame by frame, with losses: a reader takes it over when the newest
-/// frames of all its identifiers carry the same number. Numbers wrap around, so frames older than
+/// Over CAN a set arrives frame by frame, with losses: a reader uses it when the newest frames of
+/// all its identifiers carry the same number. Numbers wrap around, so frames older than
 /// forgotten_after_s() are ignored.
 struct CanTravel : TravelShape {
   CanSet sent;
@@ -212,7 +210,6 @@ struct CanControllerConfig {
   bool operator==(const CanControllerConfig&) const = default;
 };
 
-/// No controller, or one that is only read (make_controller.hpp).
 struct DryRunControllerConfig {
   std::string name;
   std::size_t axes{0};

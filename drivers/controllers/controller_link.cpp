@@ -50,7 +50,7 @@ void WriteGate::sent(nanoseconds now) noexcept {
   for (std::size_t axis = 0; axis < axes_max; ++axis) {
     SentLately& lately = sent_[axis];
     if (!command_.valid[axis] || !std::isfinite(command_.offset_um[axis])) {
-      // Driven again, the axis may start elsewhere: earlier offsets no longer count.
+      // Once driven again, the axis may start elsewhere: earlier offsets no longer count.
       lately.count = 0;
       continue;
     }
@@ -77,14 +77,14 @@ bool WriteGate::explains(const std::array<double, axes_max>& applied_um) noexcep
     }
     const SentLately& lately = sent_[axis];
     const bool to_be_driven = command_.link_epoch == epoch_ && command_.valid[axis];
-    // Until something is sent, a command starts from the read-back before it.
+    // Before the first offset is sent, a command starts from the previous read-back.
     if (lately.count != 0 || !to_be_driven || !std::isfinite(before_um))
       applied_um_[axis] = applied_um[axis];
     if (!std::isfinite(before_um)) continue;
     const bool is_unchanged = std::abs(applied_um[axis] - before_um) <= slack_um_[axis];
     if (!is_unchanged) unchanged_since_[axis] = look_;
     if (lately.count == 0) {
-      // Not driven yet: the first command starts from the read-back before it.
+      // Not driven yet: the first command starts from the previous read-back.
       explained = explained && (!to_be_driven || is_unchanged);
       continue;
     }
@@ -98,7 +98,7 @@ bool WriteGate::explains(const std::array<double, axes_max>& applied_um) noexcep
   return explained;
 }
 
-/// The first command of an axis was computed before the axis was read back where it is.
+/// True if the axis has moved since its first command was computed.
 bool WriteGate::starts_elsewhere(std::size_t axis) const noexcept {
   return command_.valid[axis] && sent_[axis].count == 0 && command_.look < unchanged_since_[axis];
 }

@@ -1,5 +1,5 @@
-/// Link to a machine controller that takes offsets and reports what it applies, and the rule when
-/// it may send them.
+/// Link to a machine controller that takes offsets and reports the applied ones, and the rule when
+/// offsets may be sent.
 #pragma once
 
 #include <algorithm>
@@ -37,20 +37,20 @@ struct ControllerHealth {
   std::uint64_t write_errors{0};
   std::uint64_t reads{0};
   std::uint64_t read_errors{0};
-  nanoseconds report_aged{};  ///< Modbus: age of the last report when the next one arrived
+  nanoseconds report_aged{};  ///< Modbus: age of the previous report when a new one arrives
   WriteHealth write;
   std::string last_error;  ///< empty if the last exchange and the last write were good
   /// CAN: "down", "active", "warning", "passive" or "bus_off"; else empty
   std::string state;
   nanoseconds state_since{};  ///< CLOCK_MONOTONIC of the change to `state`
   std::uint64_t bus_offs{0};  ///< CAN: number of times the interface left the bus
-  /// Dry run of a controller that is read: offsets really applied [um]; NaN: unknown.
+  /// Dry run with a controller that is read: offsets really applied [um]; NaN: unknown.
   std::optional<std::array<double, axes_max>> shown_um{};
 };
 
-/// Rule of the link: after every (re)connection and every failed write it takes a new epoch, reads
-/// back the applied offsets, publishes both together, and sends only offsets marked with that
-/// epoch. So the first offset sent starts from the applied one.
+/// Rule of the link: after every (re)connection and every failed write it reads back the applied
+/// offsets, publishes them with a new epoch, and sends only offsets of that epoch. So the first
+/// offset sent starts from the applied one.
 class ControllerLink {
  public:
   ControllerLink() = default;
@@ -68,9 +68,9 @@ class ControllerLink {
 enum class SendVerdict {
   send,
   /// No command of this epoch, the cycle has stopped, or a read-back is missing: not even a
-  /// heartbeat
+  /// heartbeat is sent.
   nothing_to_send,
-  resynchronise  ///< write overdue, or axis moved since the command was computed: read back
+  resynchronise  ///< write overdue, or axis moved since the command was computed: read back first
 };
 
 /// A command for the link's thread, with the time of its computation.
@@ -82,25 +82,24 @@ struct OfferedCommand {
 /// Decides when a link may send offsets: the rule of ControllerLink without I/O or clock.
 class WriteGate {
  public:
-  /// An older command is that of a hung cycle, and the controller's watchdog must trip. The slowest
-  /// cycle computes one per second.
+  /// Maximum age of a command. An older one comes from a hung cycle, and the controller's watchdog
+  /// must trip. The slowest cycle computes one per second.
   static constexpr nanoseconds renewal_max = std::chrono::seconds{2};
 
-  /// Largest unexplained distance of an axis from all offsets sent lately, in addition to two steps
-  /// of its register [um].
+  /// Largest unexplained distance of an axis from all offsets sent lately, besides two steps of its
+  /// register [um].
   static constexpr double unexplained_um = 1.0;
 
-  /// Fraction of a period between looks for the first command of an epoch, and their number.
+  /// Looks for the first command of an epoch: number per period, and total.
   static constexpr int first_looks = 4;
 
   /// @param period         of the link's writes
   /// @param resolution_um  one per axis: step of the read-back [um]; missing: 0
   explicit WriteGate(nanoseconds period, const std::vector<double>& resolution_um = {}) noexcept;
 
-  /// Everything has been read back: from here on commands of the new epoch may be sent. The epoch
-  /// begins another link if lost() was called since the last one, else it ends a pause.
-  /// @param applied_um  read back [um]; leaving it before the first command is written is
-  ///                    unexplained
+  /// Call when everything has been read back: commands of the new epoch may now be sent. The epoch
+  /// begins a new link if lost() was called since the last one, else it ends a pause.
+  /// @param applied_um  read back [um]; a change before the first command is written is unexplained
   /// @return the new epoch, never 0
   std::uint32_t synchronised(const std::array<double, axes_max>& applied_um) noexcept;
   std::uint32_t synchronised() noexcept;  ///< without read-back
@@ -110,7 +109,7 @@ class WriteGate {
     link_is_new_ = true;
     confirmed_at_.reset();
   }
-  /// The link pauses: nothing may be sent until synchronised(), but offsets sent still count.
+  /// Pauses the link: nothing may be sent until synchronised(), but offsets sent still count.
   void paused() noexcept { in_sync_ = false; }
   [[nodiscard]] bool in_sync() const noexcept { return in_sync_; }
   /// True if synchronised() will begin another link.
@@ -120,34 +119,34 @@ class WriteGate {
   /// Number of the last read-back: counts synchronised() and explains().
   [[nodiscard]] std::uint64_t look() const noexcept { return look_; }
 
-  /// The cycle has offered a command, possibly the same again.
+  /// Takes the command that the cycle offers, possibly the same again.
   void offered(const OffsetCommand& command, nanoseconds computed_at) noexcept;
   [[nodiscard]] const OffsetCommand& command() const noexcept { return command_; }
 
   [[nodiscard]] SendVerdict verdict(nanoseconds now) const noexcept;
-  /// The command was sent in full.
+  /// Call when the command was sent in full.
   void sent(nanoseconds now) noexcept;
-  /// The command has reached the controller.
+  /// Call when the command has reached the controller.
   void confirmed(nanoseconds now) noexcept { confirmed_at_ = now; }
   void unconfirmed() noexcept { confirmed_at_.reset(); }
   /// True if a write was confirmed on this link within patience().
   [[nodiscard]] bool written(nanoseconds now) const noexcept {
     return confirmed_at_ && now - *confirmed_at_ <= patience();
   }
-  /// Duration of the link's last exchange, so that a slow controller is waited for.
+  /// Notes the duration of the link's last exchange, so that patience() fits a slow controller.
   void turned(nanoseconds took) noexcept { turn_ = took; }
   /// Longest time between two writes: five periods, a second, or twice the last turned().
   [[nodiscard]] nanoseconds patience() const noexcept { return std::max(patience_min_, 2 * turn_); }
 
-  /// Pause before the link's next exchange; called once per exchange. A period, but a quarter of it
-  /// at first while nothing has been sent in the epoch: the cycle has been moving away from the
-  /// applied offset since it saw the epoch, and the first step should be small.
+  /// Pause before the link's next exchange; call once per exchange. A period, but at first a
+  /// quarter of it while nothing has been sent in the epoch: the cycle moves away from the applied
+  /// offset as soon as it sees the epoch, and the first step should be small.
   [[nodiscard]] nanoseconds next_pause() noexcept;
 
-  /// @param applied_um  just read [um]; NaN: unknown. An axis that was read back and now is not
-  ///                    may have been moved: nothing is sent while such an axis is driven.
-  /// @return false: no offset sent explains that of a driven axis (re-homed, overridden). An offset
-  ///         under way would be a jump from there: synchronised() must come before the next send.
+  /// @param applied_um  just read [um]; NaN: unknown. An axis without read-back that had one may
+  /// have moved: nothing is sent while such an axis is driven.
+  /// @return false if no offset sent explains that of a driven axis (re-homed, overridden): an
+  /// offset already computed would be a jump, so synchronised() must precede the next send
   [[nodiscard]] bool explains(const std::array<double, axes_max>& applied_um) noexcept;
 
  private:
@@ -166,8 +165,8 @@ class WriteGate {
   std::optional<nanoseconds> confirmed_at_;  ///< on this link
   int looks_{0};                             ///< for the first command of this epoch
 
-  /// Latest offsets of one axis in this epoch, a ring: a controller with a ramp or a delay may be
-  /// on its way to any of them.
+  /// Latest offsets of one axis in this epoch, a ring: a controller with a ramp or a delay may
+  /// still approach any of them.
   struct SentLately {
     static constexpr std::size_t length = 16;
     std::array<double, length> offset_um{};

@@ -1,4 +1,4 @@
-/// Offsets at the nodes of a travel <-> values that a controller interpolates by. Pure.
+/// Offsets at the nodes of a travel <-> the values that the controller interpolates. Pure.
 #pragma once
 
 #include <cstddef>
@@ -16,13 +16,13 @@ void check_shape(const TravelShape& shape);
 void check_count(const TravelShape& shape, std::size_t values, const char* key);
 
 /// Values of the set, in their units: K0, slope and P0, or the offsets themselves.
-/// @param count      number of values written: a line's P0 may be left out
+/// @param count      number of values written: P0 of a line may be missing
 /// @param offset_um  shape (nodes)
 [[nodiscard]] std::vector<double> travel_values(const TravelShape& shape, std::size_t count,
                                                 std::span<const double> offset_um);
 
 /// @param shown      values of a set
-/// @param offset_um  shape (nodes); overwritten: applied there, NaN: unknown
+/// @param offset_um  shape (nodes); overwritten: applied offset, NaN: unknown
 void offsets_shown(const TravelShape& shape, std::span<const double> shown,
                    std::span<double> offset_um) noexcept;
 

@@ -138,7 +138,7 @@ class ModbusConnection::Implementation {
   Exchange exchange(int unit, const Pdu& request, std::size_t answer_bytes);
   [[nodiscard]] std::span<const std::uint8_t> answer() const noexcept { return frames_.answer(); }
   Exchange write(int unit, const Pdu& request, std::size_t word);
-  /// The answer has the right function but not the requested content.
+  /// Rejects an answer with the right function but other content than requested.
   void reject(int unit, Exchange& exchange, const std::string& detail);
 
  private:
@@ -152,7 +152,7 @@ class ModbusConnection::Implementation {
   void settle(int unit, Exchange& exchange);
 
   ModbusLine line_;
-  bool serial_;    ///< a serial port: no peer opens or closes it
+  bool serial_;    ///< a serial port: without a peer that opens or closes it
   bool rtu_;       ///< serial frames
   bool numbered_;  ///< answers carry their request's transaction id
   nanoseconds timeout_{0};
@@ -165,7 +165,7 @@ class ModbusConnection::Implementation {
   std::uint64_t closed_unexpectedly_{0};
   std::string last_error_;
   int answers_{0};   ///< on this connection
-  int closings_{0};  ///< consecutive closings by the peer after one answer
+  int closings_{0};  ///< consecutive closings by the peer, each after one answer
   int time_outs_in_a_row_{0};
   nanoseconds line_free_at_{0};
   std::array<LateAnswers, 256> units_;
@@ -173,7 +173,7 @@ class ModbusConnection::Implementation {
   bool was_sent_{false};     ///< its request was sent
   bool in_step_{true};       ///< the start of the next frame is known
   int silent_unit_{-1};      ///< last unit without answer
-  int silent_asked_{0};      ///< requests that a gateway may still wait for
+  int silent_asked_{0};      ///< requests that a gateway may still be processing
   nanoseconds silent_since_{0};
   nanoseconds held_{0};
   std::atomic<bool> shared_{false};
@@ -260,7 +260,7 @@ void ModbusConnection::Implementation::await_answer(nanoseconds deadline, Exchan
   constexpr milliseconds rest_max{700};
   constexpr milliseconds block{100};  // serial adapters deliver in blocks
   constexpr milliseconds full{50};
-  // For the rest of a frame that has begun.
+  // Limit for the rest of a frame that has begun.
   const nanoseconds rest = rtu_ ? block : std::min<nanoseconds>(timeout_, rest_max);
   const nanoseconds end = deadline + rest;
   nanoseconds until = deadline;
@@ -359,7 +359,7 @@ Exchange ModbusConnection::Implementation::exchange(int unit, const Pdu& request
   if (closings_ < closings_of_a_habit || answers_ == 0 || opened_anew()) {
     const bool has_answered = answers_ > 0;
     exchange = try_once(unit, request, answer_bytes, deadline);
-    // A write may have taken effect: the caller reads before it writes again.
+    // A write may have taken effect: the caller must read before it writes again.
     const bool may_repeat = !was_sent_ || question_.function <= MODBUS_FC_READ_INPUT_REGISTERS;
     if (exchange.outcome == ExchangeOutcome::disconnected && has_answered && may_repeat) {
       closings_ = answers_ == 1 ? closings_ + 1 : 0;
@@ -407,15 +407,15 @@ void ModbusConnection::Implementation::settle(int unit, Exchange& exchange) {
       silent_unit_ = unit;
       ++silent_asked_;
       silent_since_ = exchange.sent_at;
-      // A peer that vanished (power cut) is only detected by reconnecting.
+      // The loss of a peer (power cut) is only detected by reconnecting.
       if (!serial_ && ++time_outs_in_a_row_ >= time_outs_of_dead_connection) disconnect();
       return;
     case ExchangeOutcome::bad_frame:
-      // The rest of an incomplete answer may come as late as the answer.
+      // The rest of an incomplete answer may arrive as late as the answer.
       late.spoiled(question_, frames_.has_part() && !frames_.is_full() ? now : exchange.sent_at,
                    timeout_);
       if (rtu_) {
-        // Drains the line until it is silent; bounded.
+        // Drains the line until it is silent, within this limit.
         constexpr milliseconds drain_max{300};
         const nanoseconds silence = std::max<nanoseconds>(gap_, silence_min);
         while (port_->now() < now + drain_max && discard() &&
@@ -443,7 +443,7 @@ void ModbusConnection::Implementation::reject(int unit, Exchange& exchange,
 
 // ---- public interface: requests, and checks of the answers
 
-/// A write; its answer repeats the address and this word.
+/// Writes; the answer repeats the address and this word.
 Exchange ModbusConnection::Implementation::write(int unit, const Pdu& request, std::size_t word) {
   constexpr std::size_t answer_bytes = 5;
   Exchange written = exchange(unit, request, answer_bytes);

@@ -35,10 +35,10 @@ struct Exchange {
   std::string detail{};      ///< received data or reason, for display; empty when ok
 
   [[nodiscard]] bool ok() const noexcept { return outcome == ExchangeOutcome::ok; }
-  /// Fault of the reading: exception 6 device_busy; a gateway's 10 and 11, a time-out and a lost
-  /// line no_answer; other exceptions device_error; a bad frame bad_frame.
+  /// Fault of the reading: device_busy for exception 6; no_answer for a gateway's 10 and 11, a
+  /// time-out and a lost line; device_error for other exceptions; bad_frame for a bad frame.
   [[nodiscard]] Fault fault() const noexcept;
-  /// The unit itself answered: a value or an exception of its own, not of a gateway.
+  /// True if the unit itself answered: a value or its own exception, not a gateway's.
   [[nodiscard]] bool unit_answered() const noexcept;
 };
 
@@ -58,16 +58,16 @@ inline constexpr nanoseconds gateway_wait_max = std::chrono::seconds(3);
 /// For one thread, except cancel().
 ///
 /// Late answers. TCP: each request has its own transaction id; an answer with another id is
-/// discarded. RTU has no such id: after a request without answer, its unit is not asked again
-/// before ready_at(), and answers of one unit that arrive during an exchange with another are
-/// discarded. The exchange calls wait for ready_at(); callers with other units to ask check it
-/// first.
+/// Late answers. TCP: each request has its own transaction id; an answer with another id is
+/// discarded. RTU has no id: after a request without answer, its unit is not asked again before
+/// ready_at(), and answers of another unit that arrive during an exchange are discarded. The
+/// exchange calls wait for ready_at(); callers with other units to ask check it first.
 ///
 /// A gateway that waits for a silent unit answers no other: over TCP the next unit's answer is
-/// awaited until the gateway must have given up the silent one (gateway_wait_max).
+/// awaited until the gateway must have stopped waiting (gateway_wait_max).
 ///
-/// A peer that closes a connection which has brought answers is reconnected within the exchange; a
-/// peer that closes after each answer gets a new connection for each request.
+/// If a peer closes a connection that has brought answers, it is reconnected within the exchange;
+/// if it closes after each answer, each request gets a new connection.
 class ModbusConnection {
  public:
   /// @throws DriverError as check_line()
@@ -79,8 +79,8 @@ class ModbusConnection {
   ModbusConnection& operator=(const ModbusConnection&) = delete;
   ~ModbusConnection();
 
-  /// Opens the line; returns true at once if it is open. Bounded by the line's time-out (2 s for
-  /// the name service, where cancel() works too).
+  /// Opens the line if it is closed. Bounded by the line's time-out (2 s for the name service,
+  /// where cancel() works too).
   /// @return true if open; else last_error() has the reason
   bool connect();
   void disconnect() noexcept;
@@ -90,16 +90,16 @@ class ModbusConnection {
   /// with unknown state of the peer.
   [[nodiscard]] std::uint64_t connects() const noexcept;
   [[nodiscard]] std::uint64_t links() const noexcept;
-  /// links() plus reconnections after a peer closed that does not do so after each answer: it may
-  /// have restarted.
+  /// links() plus reconnections after an unexpected close by the peer, which may have restarted.
   [[nodiscard]] std::uint64_t breaks() const noexcept;
-  /// How long the last silent unit kept a gateway from answering.
+  /// Time for which the last silent unit kept a gateway from answering.
   [[nodiscard]] nanoseconds held() const noexcept;
-  /// Silent units do not block others on this line: the next answer is not awaited longer.
+  /// Declares that silent units do not block others on this line: the next answer is not awaited
+  /// longer.
   void reset_silence() noexcept;
   void share() noexcept;  ///< the line has users other than sensors
   [[nodiscard]] bool is_shared() const noexcept;
-  /// Uses the timing of `line` from now on: each user of a line has its own.
+  /// Uses the timing of `line` from now on, since each user of a line has its own.
   void time_as(const ModbusLine& line) noexcept;
 
   /// Reads words.size() registers (at most 125), or bits, one per word (at most 2000). `words` is
@@ -122,7 +122,7 @@ class ModbusConnection {
   /// @return false when cancelled
   bool pause_until(nanoseconds time) noexcept;
 
-  /// From any thread, irreversible: every present and future call soon returns `cancelled`.
+  /// Makes every present and future call soon return `cancelled`; from any thread, irreversible.
   void cancel() noexcept;
   [[nodiscard]] bool cancelled() const noexcept;
 

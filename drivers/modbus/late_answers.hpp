@@ -1,5 +1,5 @@
-/// Earliest time to ask a unit on a serial line again after a request without answer. Pure; the
-/// time is passed in.
+/// Earliest time at which a unit on a serial line may be asked again after a request without
+/// answer. Pure; the time is passed in.
 #pragma once
 
 #include <algorithm>
@@ -16,8 +16,8 @@ struct ModbusQuestion {
   std::size_t answer_bytes{0};
 };
 
-/// True if an answer to `a` could be taken for one to `b`: an answer to a read has only its
-/// function and length; that to a write repeats what was written.
+/// True if an answer to `a` could be taken for one to `b`: an answer to a read contains only its
+/// function and length; one to a write repeats what was written.
 [[nodiscard]] constexpr bool confusable(const ModbusQuestion& a, const ModbusQuestion& b) noexcept {
   constexpr std::uint8_t last_read_function = 4;
   return a.function == b.function && b.function <= last_read_function &&
@@ -25,11 +25,11 @@ struct ModbusQuestion {
 }
 
 /// Modbus RTU answers carry no transaction id: a late answer looks like the answer to a later
-/// request to the same unit. So the unit is not asked for a while, longer each time; once it
-/// answers while earlier answers are outstanding, it is not asked for as long as it may be behind.
-/// An answer to the same request is at most `lateness_max` old; another request with the same form
-/// of answer waits until that can no longer come. Safe for units late by up to `lateness_max`;
-/// other units on the line need not wait, as answers carry their unit.
+/// request to the same unit. So the unit is not asked for a while, longer each time; if it answers
+/// while earlier answers are outstanding, it is not asked for as long as it may lag behind. An
+/// answer to the same request is at most `lateness_max` old; another request with the same form of
+/// answer waits until that time is over. Safe for units late by up to `lateness_max`; other units
+/// on the line need not wait, since answers carry their unit.
 class LateAnswers {
  public:
   using nanoseconds = std::chrono::nanoseconds;
@@ -49,7 +49,7 @@ class LateAnswers {
     pause_ = std::min(2 * pause_, lateness_max);
   }
 
-  /// Bytes came that are no answer: the unit is up, but the true answer may still come, mostly
+  /// Bytes other than an answer arrived: the unit is up, but the true answer may still come, mostly
   /// within `timeout`.
   void spoiled(const ModbusQuestion& question, nanoseconds sent_at, nanoseconds timeout) noexcept {
     question_ = question;
@@ -57,8 +57,8 @@ class LateAnswers {
     ready_at_ = std::max(ready_at_, sent_at + timeout);
   }
 
-  /// A good answer came for the request sent at `sent_at`. If others are outstanding it may be one
-  /// of theirs; the last to come is then no later than this one.
+  /// A good answer arrived for the request sent at `sent_at`. If others are outstanding, it may be
+  /// one of theirs; the last to arrive is then no later than this one.
   void answered(nanoseconds sent_at, nanoseconds arrived_at) noexcept {
     if (owed_ != 0 && sent_at - oldest_sent_at_ <= lateness_max) {
       ready_at_ = arrived_at + std::min(arrived_at - oldest_sent_at_, 2 * lateness_max);
@@ -74,7 +74,7 @@ class LateAnswers {
 
  private:
   ModbusQuestion question_;   ///< request without answer
-  nanoseconds others_at_{0};  ///< until then its answer may come
+  nanoseconds others_at_{0};  ///< time until which its answer may come
   nanoseconds oldest_sent_at_{0};
   nanoseconds ready_at_{0};
   nanoseconds pause_{first_pause};

@@ -1,5 +1,5 @@
-/// Modbus requests and answers as bytes, and registers <-> numbers. Pure: no I/O, no clock. The
-/// numbers neither allocate nor throw.
+/// Modbus requests and answers as bytes, and registers <-> numbers. Pure: no I/O, no clock.
+/// Conversions of numbers neither allocate nor throw.
 ///
 /// A register is a host uint16 as from libmodbus (the first byte on the wire is its high byte). A
 /// value of 2 or 4 registers is in consecutive registers, lowest address first. Bytes on the wire,
@@ -30,12 +30,12 @@ inline constexpr std::uint8_t exception_bit = 0x80;  ///< of the function code o
   return static_cast<std::uint16_t>((bytes[at] << 8) | bytes[at + 1]);
 }
 
-/// "0B 04 02 ...", for display; a long text is cut.
+/// "0B 04 02 ...", for display; long data is cut.
 [[nodiscard]] std::string hex_text(std::span<const std::uint8_t> bytes);
 
 /// Frames of one line. RTU: unit, function, data, checksum; an answer is also found after unrelated
-/// bytes, such as the echo of the request or a byte from switching the line. TCP: header with
-/// transaction id, length and unit.
+/// bytes (echo of the request, a byte from switching the line). TCP: header with transaction id,
+/// length and unit.
 class ModbusFrames {
  public:
   static constexpr std::size_t frame_bytes_max = 260;
@@ -51,7 +51,7 @@ class ModbusFrames {
   [[nodiscard]] std::span<std::uint8_t> room() noexcept;
   void took(std::size_t bytes) noexcept { received_ += bytes; }
   /// Discards bytes received before the request. RTU: all. TCP: whole frames; the start of one is
-  /// kept. @return false: the stream is out of step
+  /// kept. @return false if the stream is out of step
   bool discard() noexcept;
   void forget() noexcept;  ///< the line was closed
 
@@ -59,18 +59,19 @@ class ModbusFrames {
     nothing,  ///< not yet
     answer,   ///< answer() of the unit, to the function
     other,    ///< another frame, see came()
-    no_frame  ///< the same, and the start of the next frame is unknown
+    no_frame  ///< as `other`, and the start of the next frame is unknown
   };
   [[nodiscard]] Found look();
   [[nodiscard]] std::span<const std::uint8_t> answer() const noexcept { return answer_; }
-  /// A frame is incomplete.
+  /// True if a frame is incomplete.
   [[nodiscard]] bool has_part() const noexcept { return received_ > begin_; }
-  /// As many bytes as the answer has were received, without an answer: no more are expected.
+  /// True if as many bytes as the answer has were received, without an answer: no more are
+  /// expected.
   [[nodiscard]] bool is_full() const noexcept;
 
-  /// Description of bytes received in place of the answer; empty: none.
+  /// Description of bytes received instead of the answer; empty: none.
   [[nodiscard]] std::string came() const;
-  /// They were an answer to an earlier request, or the echo of this one.
+  /// True if they were an answer to an earlier request, or the echo of this one.
   [[nodiscard]] bool came_late() const noexcept { return late_ || (echoed_ && other_.empty()); }
 
  private:
@@ -141,8 +142,8 @@ struct Decoded {
 [[nodiscard]] Decoded decode(std::span<const std::uint16_t> registers, const NumberFormat& format,
                              std::span<const Sentinel> sentinels) noexcept;
 
-/// False for a value that no thermometer sends: a float closer to 0 than any of them resolves comes
-/// from the bytes of another number (wrong word_order or address); 0 itself is possible.
+/// False for a float that no thermometer sends: closer to 0 than any of them resolves, it comes
+/// from the bytes of another number (wrong word_order or address). 0 itself is possible.
 [[nodiscard]] bool may_be_measured(const ModbusChannel& channel, double temp_degC) noexcept;
 
 /// Fault (or none) of a status word: the one listed for its masked value. 0 is good if no good code

@@ -114,7 +114,7 @@ struct ModbusChannel {
 };
 
 /// A register that the device changes with each conversion; while it does not change, neither do
-/// the times of the device's readings.
+/// the times of its readings.
 struct ModbusRenewal {
   ModbusTable table{ModbusTable::input};
   std::uint16_t address{0};
@@ -124,9 +124,9 @@ struct ModbusRenewal {
 struct ModbusDeviceConfig {
   std::string name;
   int unit{1};           ///< 0..247 (255 on TCP)
-  double period_s{1.0};  ///< how often it is read
+  double period_s{1.0};  ///< interval of reading it
   int registers_per_request_max{125};
-  int gap_registers_max{8};  ///< unused registers that a request may read along
+  int gap_registers_max{8};  ///< unused registers that a request may include
   bool one_register_a_request{false};
   bool wide_registers{false};  ///< 32-bit registers: one address per value, answer of 4 bytes
   std::optional<ModbusRenewal> renewal;

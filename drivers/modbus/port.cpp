@@ -32,8 +32,8 @@ struct SocketAddress {
   socklen_t length{0};
 };
 
-/// Resolves a host name. A numeric address is resolved at once, a name by a thread of its own,
-/// which may outlive this object (the name service cannot be interrupted).
+/// Resolves a host name: a numeric address at once, a name in a thread of its own, which may
+/// outlive this object (the name service cannot be interrupted).
 class NameLookup {
  public:
   NameLookup(const std::string& host, int port);
@@ -142,13 +142,13 @@ bool NameLookup::done() const noexcept {
 }
 
 std::optional<SocketAddress> NameLookup::result(std::string& error) const {
-  THERMOCOMP_ENSURE(done());  // also makes the other thread's result visible here
+  THERMOCOMP_ENSURE(done());  // also synchronises with the other thread's result
   if (state_->error == 0) return state_->address;
   error = state_->host + ": " + ::gai_strerror(state_->error);
   return std::nullopt;
 }
 
-/// Waits for a descriptor, a time or cancel(), whichever is first.
+/// Waits for the first of a descriptor, a time and cancel().
 class InterruptibleWait {
  public:
   /// @throws DriverError when the system has no more descriptors
@@ -374,7 +374,7 @@ bool RtuPort::open(std::string& why) {
 void RtuPort::close_device() noexcept {
   if (!open_) return;
   open_ = false;
-  // close() of a serial port would wait for bytes that cannot be sent any more.
+  // close() of a serial port would wait for bytes that can no longer be sent.
   modbus_flush(context_.get());
   modbus_close(context_.get());
 }

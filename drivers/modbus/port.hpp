@@ -18,7 +18,7 @@ enum class PortWait : std::uint8_t { ready, late, cancelled };
 struct PortBytes {
   enum class Kind : std::uint8_t {
     bytes,    ///< `size` of them, at least one
-    nothing,  ///< none there yet
+    nothing,  ///< none yet
     lost      ///< the line is gone
   };
   Kind kind{Kind::nothing};
@@ -38,7 +38,7 @@ class ModbusPort {
   /// @pre closed
   /// @return true if open; else `why` has the reason
   virtual bool open(std::string& why) = 0;
-  virtual void close() noexcept = 0;  ///< also when closed
+  virtual void close() noexcept = 0;  ///< allowed when closed
 
   /// @param bytes  a whole frame. @return true if all of it was taken
   virtual bool send(std::span<const std::uint8_t> bytes) noexcept = 0;
@@ -52,7 +52,7 @@ class ModbusPort {
 
   /// @return false when cancelled
   virtual bool pause_until(nanoseconds time) noexcept = 0;
-  /// Irreversible: every present and future wait ends at once.
+  /// Ends every present and future wait at once; irreversible.
   virtual void cancel() noexcept = 0;
   [[nodiscard]] virtual bool cancelled() const noexcept = 0;
 };

@@ -65,7 +65,7 @@ Bytes job(std::size_t number, const Bytes& parameters, const Bytes& data = {}) {
 }
 
 Bytes connection_request(const S7Block& block) {
-  constexpr std::uint8_t basic = 3;  // basic connection, not of a programming device or a panel
+  constexpr std::uint8_t basic = 3;  // connection type: neither programming device nor panel
   const auto place = static_cast<std::uint8_t>(block.rack * S7Block::slots + block.slot);
   return framed(
       Bytes{17, 0xE0, 0, 0, 0, 1, 0, 0xC0, 1, 10, 0xC1, 2, basic, 0, 0xC2, 2, basic, place});
@@ -144,8 +144,8 @@ std::string refusal_of(int code, const std::string& block) {
   }
 }
 
-/// Modbus TCP requests and answers on an S7 link. A refused job is exception 0x80 | error class or
-/// return code.
+/// Carries Modbus TCP requests and answers over an S7 link. A refused job becomes exception 0x80 |
+/// error class or return code.
 class S7Port final : public ModbusPort {
  public:
   S7Port(const S7Block& block, std::unique_ptr<ModbusPort> tcp, nanoseconds timeout)
@@ -269,7 +269,7 @@ PortBytes S7Port::receive(std::span<std::uint8_t> into) noexcept {
   return {PortBytes::Kind::bytes, answer.size()};
 }
 
-/// PDU of frame_ in terms of Modbus; empty: not the answer to a job.
+/// PDU of frame_ as in Modbus; empty: not the answer to a job.
 Bytes S7Port::pdu_of_answer() {
   constexpr std::size_t item_head_bytes = 4;
   if (!is_answer(frame_)) return {};

@@ -57,7 +57,7 @@ void SharedLine::leave(LineUser& user, nanoseconds patience) noexcept {
     if (member.user == &user) member.is_leaving = true;
   changed_.notify_all();
   const auto is_gone = [&] { return !has(user); };
-  // Waits on the monotonic clock: a step of the wall clock must not prolong the stop.
+  // Waits on the monotonic clock, so that a step of the wall clock cannot prolong the stop.
   changed_.wait_until(lock, std::chrono::steady_clock::now() + patience, is_gone);
   if (!is_gone() && (members_.size() == 1 || acting_ == &user)) {
     connection_.cancel();

@@ -1,4 +1,4 @@
-/// A Modbus line with its thread and its users: sensors and a controller at one address share the
+/// A Modbus line with its thread and its users. Sensors and a controller at one address share the
 /// connection, because many gateways serve one client at a time and a serial line has one master.
 #pragma once
 
@@ -30,7 +30,7 @@ class LineUser {
 
 class SharedLine {
  public:
-  /// The line of this address; it exists as long as it has an owner.
+  /// The line of this address, which exists as long as it has an owner.
   /// @throws DriverError as check_line()
   [[nodiscard]] static std::shared_ptr<SharedLine> of(const ModbusLine& line);
   explicit SharedLine(const ModbusLine& line) : connection_(line) {}
@@ -39,7 +39,7 @@ class SharedLine {
   /// @param name  of the thread, for the first user
   /// @throws DriverError when the system cannot create a thread
   void join(LineUser& user, const std::string& name);
-  /// Lets the user end within `patience`; afterwards it is not called any more.
+  /// Ends the use within `patience`; afterwards the user is not called.
   void leave(LineUser& user, nanoseconds patience) noexcept;
 
  private:

@@ -129,7 +129,7 @@ void CanProtocolSource::bus_closed(nanoseconds now) {
 
 void CanProtocolSource::work() {
   for (const CanFrame& frame : socket().receive()) {
-    follow_link();  // the first frame after bus-off ends it
+    follow_link();  // only a frame ends a bus-off: notice it here
     protocol_->take(frame);
     send();
   }
@@ -138,7 +138,7 @@ void CanProtocolSource::work() {
   send();
 }
 
-/// A frame that the kernel does not take is lost: the protocol repeats unanswered requests.
+/// A frame that the kernel refuses is lost: the protocol repeats unanswered requests.
 void CanProtocolSource::send() {
   while (const auto frame = protocol_->next_frame()) socket().send(*frame);
 }

@@ -42,18 +42,18 @@ class CanInterfaceSource : public SensorSource {
   CanInterfaceSource(Setting setting, std::vector<CanId> wanted, std::vector<std::size_t> sensors,
                      std::vector<UnitHealth> units);
 
-  /// The bus is usable from now on ...
+  /// The bus is now usable.
   virtual void bus_opened(nanoseconds now) = 0;
-  /// ... no longer, or not yet: every reading becomes no_answer.
+  /// The bus is not usable: every reading becomes no_answer.
   virtual void bus_closed(nanoseconds now) = 0;
-  /// Receives frames and does what is due.
+  /// Receives frames and performs what is due.
   virtual void work() = 0;
   /// @param readings  shape (sensors of this bus); overwritten
   virtual void write_readings(std::vector<Reading>& readings) = 0;
   [[nodiscard]] virtual std::vector<UnitHealth> units(nanoseconds now) = 0;
 
   [[nodiscard]] CanSocket& socket() noexcept { return socket_; }
-  /// The bus is open and not bus-off, as last reported to the hooks.
+  /// True if the bus is open and not bus-off, as last reported to the hooks.
   [[nodiscard]] bool usable() const noexcept { return usable_.value_or(false); }
   /// Calls bus_opened() or bus_closed() when the state of the link has changed.
   void follow_link();
@@ -68,7 +68,7 @@ class CanInterfaceSource : public SensorSource {
   CanSocket socket_;
   WakeEvent wake_;
   std::atomic<bool> stopping_{false};
-  std::optional<bool> usable_;  ///< none: not reported to the hooks yet
+  std::optional<bool> usable_;  ///< none: not yet reported to the hooks
   WaitFreeSlot<std::vector<Reading>> slot_;
   mutable std::mutex health_mutex_;
   BusHealth health_;

@@ -100,7 +100,7 @@ void CanSource::bus_opened(nanoseconds now) {
   opened_at_ = now;
 }
 
-/// Marks every reading; readings marked before keep the time of their loss.
+/// Marks every reading; those marked before keep the time of their loss.
 void CanSource::bus_closed(nanoseconds now) {
   for (Reading& reading : readings_) {
     if (reading.fault != Fault::no_answer) reading = {not_a_number, now, Fault::no_answer};
@@ -109,7 +109,7 @@ void CanSource::bus_closed(nanoseconds now) {
 }
 
 void CanSource::work() {
-  constexpr int batches_max = 16;  // so that readings are published in a flood too
+  constexpr int batches_max = 16;  // so that readings are published even in a flood
   for (int batch = 0; batch < batches_max; ++batch) {
     const auto frames = socket().receive();
     for (const CanFrame& frame : frames) take(frame);
@@ -162,7 +162,7 @@ void CanSource::note_arrival(Arrival arrival, UnitHealth& unit) {
   }
 }
 
-/// Detects two senders of one group within a short time: their values cannot be attributed.
+/// Detects two senders of one group within a short time, whose values cannot be attributed.
 /// @return the problem; empty: there is one sender
 std::string CanSource::contest(const CanFrame& frame, Channel& channel) {
   const nanoseconds at = frame.received_at;

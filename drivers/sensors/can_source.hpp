@@ -13,7 +13,7 @@
 namespace thermocomp {
 
 /// Only listens. A reading's time is the arrival of its frame at the interface. A frame with
-/// unchanged counter is ignored: neither value nor time change (except for the first frame after a
+/// unchanged counter is ignored: neither value nor time changes (except for the first frame after a
 /// loss of the bus). A J1939 group is accepted from any sender; while two send it, its readings are
 /// device_error. While the interface is missing, down or bus-off the readings are no_answer;
 /// opening is retried for ever.
@@ -41,7 +41,7 @@ class CanSource final : public CanInterfaceSource {
     std::optional<CanId> sender{};  ///< of the last frame
     std::optional<CanId> rival{};   ///< second sender within a short time
     nanoseconds last_frame{};
-    nanoseconds contested_until{};  ///< until then two senders are assumed
+    nanoseconds contested_until{};  ///< two senders are assumed until then
   };
   enum class Arrival { other_page, unchanged, renewed, bad_frame };
 

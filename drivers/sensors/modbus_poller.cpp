@@ -134,7 +134,7 @@ bool is_serial(const ModbusLine& line) {
   return std::holds_alternative<ModbusRtu>(line.link);
 }
 
-/// Limits the answers of a slow serial line, which would delay stop() and the other units.
+/// Limits answers of a slow serial line, which would delay stop() and the other units.
 int registers_max_of(const ModbusLine& line) {
   if (!is_serial(line)) return registers_per_request_limit;
   constexpr double answer_s_max = 0.5;
@@ -279,7 +279,7 @@ void ModbusPoller::act() {
     Device& device = devices_[most_due()];
     if (connection_.pause_until(due(device))) poll(device);
   } else if (lost_ && !loss_reported_ && connection_.now() < next_connect_at_) {
-    set_lost();  // else closed on purpose: the failed exchanges were reported
+    set_lost();  // otherwise closed on purpose, and reported by the failed exchanges
   } else if (connection_.pause_until(next_connect_at_)) {
     connect();
   }
@@ -300,7 +300,7 @@ void ModbusPoller::connect() {
 /// The line was opened by this poller, within an exchange or by another user.
 void ModbusPoller::note_connected() {
   connects_ = connection_.connects();
-  if (lost_) {  // dead units may be back with the line
+  if (lost_) {  // dead units may have returned with the line
     for (Device& device : devices_) {
       device.backoff.answered();
       device.next_due = std::min(device.next_due, connection_.now());
@@ -314,7 +314,7 @@ void ModbusPoller::note_connected() {
   health_.last_error.clear();
 }
 
-/// Without a line no reading of the bus is valid.
+/// Marks every reading of the bus invalid.
 void ModbusPoller::set_lost() {
   lost_ = true;
   loss_reported_ = true;
@@ -332,7 +332,7 @@ nanoseconds ModbusPoller::due(const Device& device) const noexcept {
   return std::max({device.next_due, device.backoff.not_before(), ready_at(device, device.cursor)});
 }
 
-/// Earlier, an answer to another request may come that fits this one too.
+/// Before this time, an answer to another request may come that fits this one too.
 nanoseconds ModbusPoller::ready_at(const Device& device, std::size_t index) const noexcept {
   const PlannedRequest& planned = device.requests[index].planned;
   return connection_.ready_at(device.config.unit, planned.table, planned.address, planned.count);
@@ -344,7 +344,7 @@ std::size_t ModbusPoller::most_due() const noexcept {
                                   devices_.begin());
 }
 
-/// A unit alone on its line can be asked often without delay for others.
+/// A unit alone on its line can be asked often without delaying others.
 nanoseconds ModbusPoller::pause_max() const noexcept {
   const bool is_alone = devices_.size() == 1 && !connection_.is_shared();
   const ModbusLine& line = config_.line;
@@ -359,7 +359,7 @@ std::size_t ModbusPoller::dead_units() const noexcept {
 }
 
 /// One round over the device's requests from its cursor: an unanswered request is repeated first,
-/// so that a late answer can only be one to the same request.
+/// so that a late answer can only belong to the same request.
 void ModbusPoller::poll(Device& device) {
   const nanoseconds began_at = connection_.now();
   const nanoseconds period = std::max(from_seconds(device.config.period_s), nanoseconds{1});
@@ -372,7 +372,7 @@ void ModbusPoller::poll(Device& device) {
     const std::size_t index = (begin + k) % device.requests.size();
     if (k > 0 && ready_at(device, index) > connection_.now()) {
       device.cursor = index;
-      step = Step::again;  // the other units need not wait for it
+      step = Step::again;  // other units need not wait for it
     } else {
       step = ask(device, index);
     }
@@ -428,17 +428,17 @@ ModbusPoller::Step ModbusPoller::ask(Device& device, std::size_t index) {
   request.settled = true;
   request.fault = exchange.fault();
   if (exchange.ok()) {
-    // A gateway may have read a buffered answer at any time after the request.
+    // A gateway may return a buffered answer from any time after the request.
     const nanoseconds timeout = from_seconds(1e-3 * config_.line.timeout_ms);
     request.arrived_at = std::min(exchange.arrived_at, exchange.sent_at + timeout);
   }
   return Step::next;
 }
 
-/// A request without a usable answer: another attempt, or the fault.
+/// Handles a request without a usable answer: another attempt, or the fault.
 ModbusPoller::Step ModbusPoller::give_up(Device& device, std::size_t index,
                                          const Exchange& exchange) {
-  // A gateway that answers for a unit has asked it already.
+  // A gateway that answers for a unit has already asked it.
   const bool gateway = exchange.outcome == ExchangeOutcome::exception;
   if (!gateway && !device.backoff.dead() && device.tries < config_.line.retries) {
     ++device.tries;
@@ -449,7 +449,7 @@ ModbusPoller::Step ModbusPoller::give_up(Device& device, std::size_t index,
   device.cursor = (index + 1) % device.requests.size();
   const bool any_answered = std::any_of(device.requests.begin(), device.requests.end(),
                                         [](const Request& request) { return request.settled; });
-  // Registers that are never answered do not make the whole unit dead.
+  // A unit is not dead if only some registers are never answered.
   for (Request& request : device.requests) {
     if (!request.settled && (!any_answered || &request == &device.requests[index])) {
       request.fault = exchange.fault();

@@ -42,22 +42,22 @@ struct ModbusPlan {
   std::size_t words_a_register{1};  ///< in the answers; 2: of 32-bit registers
   std::vector<PlannedRequest> requests;
   std::vector<ChannelPlace> channels;  ///< in the order of the device's channels
-  /// In the first request: a counter read before the values never makes old values new.
+  /// Counter in the first request: read before the values, it never makes old values new.
   std::optional<WordPlace> renewal;
 };
 
 /// Neighbouring values share a request if the unused words between them are at most
 /// `gap_registers_max` (bits: 16 times that), and its length at most `registers_per_request_max`,
 /// `line_registers_max` and the protocol's limit. A value is never split. `one_register_a_request`:
-/// every value, status and counter has a request of its own.
+/// each value, status and counter has its own request.
 /// @pre the limits are at least as large as the largest value
 [[nodiscard]] ModbusPlan plan_requests(const ModbusDeviceConfig& device,
                                        int line_registers_max = registers_per_request_limit);
 
-/// Pauses between requests to a unit that does not answer. Pure; the time is passed in.
-/// They double from `pause_first` to `pause_max`; an answer ends them at once. From the third
-/// failure on they also limit the time-outs of all dead units of the line to `line_share_max` of
-/// its time, as far as `stretch_max` times `pause_max` allows.
+/// Pauses between requests to a unit that does not answer. Pure; the time is passed in. They double
+/// from `pause_first` to `pause_max`; an answer ends them at once. From the third failure on they
+/// also limit the time-outs of all dead units of the line to `line_share_max` of its time, as far
+/// as `stretch_max` times `pause_max` allows.
 class UnitBackoff {
  public:
   using nanoseconds = std::chrono::nanoseconds;
@@ -101,15 +101,15 @@ class UnitBackoff {
 };
 
 /// Each device is read at its period on an absolute schedule. `taken_at` of a reading is the
-/// arrival of the last answer with its value (with a renewal counter: the last answer in which the
-/// counter had changed); a reading with a fault keeps it and has no value.
+/// arrival of the last answer with its value (with a renewal counter: the last answer with a
+/// changed counter); a reading with a fault keeps it and has no value.
 ///
-/// A request for several values that a device refuses from the first time on (exception 2 or 3) is
-/// split: first without the registers between the values, then one request per value.
+/// If a device refuses a request for several values from the first time on (exception 2 or 3), the
+/// request is split: first without the registers between the values, then one request per value.
 ///
-/// A failed request is retried as often as the line's `retries` (for a unit that answered until
-/// then); a unit without answer is asked with growing pauses (UnitBackoff), alone on its line at
-/// least every `reconnect_s` (serial: every 3 s, for late answers). A lost line is reopened every
+/// A failed request is retried as often as the line's `retries` (if the unit answered until then).
+/// A unit without answer is asked with growing pauses (UnitBackoff); alone on its line, at least
+/// every `reconnect_s` (serial: every 3 s, for late answers). A lost line is reopened every
 /// `reconnect_s`.
 class ModbusPoller final : public LineUser {
  public:
@@ -118,7 +118,7 @@ class ModbusPoller final : public LineUser {
   ModbusPoller(const ModbusBusConfig& config, ModbusConnection& connection);
 
   [[nodiscard]] const ModbusLine& line() const noexcept override { return config_.line; }
-  /// Time of the next act(), which waits until then by itself.
+  /// Time of the next act().
   [[nodiscard]] nanoseconds next_action_at() const noexcept override;
   /// Connects, runs one device's requests, or reports the loss of the line.
   /// @pre the connection is not cancelled
@@ -137,9 +137,9 @@ class ModbusPoller final : public LineUser {
   };
   [[nodiscard]] Answer value_of(std::size_t device, std::size_t channel) const;
   [[nodiscard]] std::optional<Answer> status_of(std::size_t device, std::size_t channel) const;
-  /// Every request of the device was made, with its retries.
+  /// True if every request of the device was made, with its retries.
   [[nodiscard]] bool has_asked(std::size_t device) const noexcept;
-  /// The device refuses requests for several values and gets smaller ones.
+  /// True if the device refuses requests for several values and gets smaller ones.
   [[nodiscard]] bool is_split(std::size_t device) const noexcept {
     return devices_[device].is_split;
   }

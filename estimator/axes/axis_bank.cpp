@@ -85,7 +85,7 @@ void AxisBank::prove(std::size_t axis, double move_um) noexcept {
 void AxisBank::release(std::size_t axis) noexcept {
   const AxisSpan span = span_of_[axis];
   const std::span nodes = std::span(axes_).subspan(span.first, span.end() - span.first);
-  // For an unknown start the operator has set the whole axis to zero, including the nodes of a
+  // Ending an unknown start, the operator has set the whole axis to zero, including the nodes of a
   // travel whose offset is known.
   const bool at_zero = std::any_of(nodes.begin(), nodes.end(),
                                    [](const AxisChannel& node) { return node.start_unknown(); });
@@ -122,7 +122,7 @@ void Limiter::step(double target_um, double dt_s) noexcept {
   if (!(dt_s > 0)) return;
   const double step_um_max = rate_um_per_s() * std::min(dt_s, dt_s_max);
   const double way_um = bounded_um - offset_um_;
-  // Lands exactly on the target, so that a settled offset equals it to the last bit.
+  // Ends exactly on the target, so that a settled offset equals it to the last bit.
   offset_um_ = std::abs(way_um) <= step_um_max ? bounded_um
                                                : offset_um_ + std::copysign(step_um_max, way_um);
 }
@@ -132,17 +132,17 @@ namespace {
 /// Tolerance of a read-back outside our bound, for rounded registers.
 constexpr double register_rounding_um = 0.1;
 
-/// Good read-backs that outweigh one unexplained one; a second one within them latches.
+/// A second unexplained read-back within this many good ones latches the mismatch.
 constexpr std::uint8_t suspicion_of_one = 16;
 
-/// Read-backs of a new epoch: at its start, before its first command is written, with that command.
+/// Read-backs until a command of a new epoch is surely written.
 constexpr std::uint8_t read_backs_until_written = 3;
 
-/// On a link that was away for less, a read-back may be on its way to the offset sent last; set
-/// from the slowest read-backs tested (0.5 s) and the pauses of a reconnection.
+/// After a shorter absence, a read-back may still lag behind the offset sent last. From the slowest
+/// read-backs tested (0.5 s) and the pauses of a reconnection.
 constexpr nanoseconds lag_max = std::chrono::milliseconds(1500);
 
-/// The first link of a controller that was ready all the time is there by then.
+/// A controller that was ready before the start has its first link within this time.
 constexpr nanoseconds first_link_max = std::chrono::seconds(3);
 
 /// WriteGate::patience() of links with periods up to 0.6 s.
@@ -151,7 +151,7 @@ constexpr nanoseconds unwritten_max = std::chrono::seconds(3);
 /// WriteGate::epoch() of the first link since the daemon's start.
 constexpr std::uint32_t first_epoch = 1;
 
-/// Two read-backs after a release agree within this.
+/// Tolerance between two read-backs after a release.
 constexpr double same_read_back_um = 0.3;
 
 }  // namespace
@@ -195,11 +195,11 @@ void AxisChannel::move(const AxisInput& input) noexcept {
   check_.sent(input.now, limiter_.offset_um());
 }
 
-/// Without read-back the offset moves only while writes are confirmed: the first offset sent on a
-/// new link must be the one applied last. A controller that refuses an offset, as beyond a limit of
-/// its own, may take the one in effect: the offset goes back to it, no further, if the target is
-/// on that side. A value from farther away than the offset went since the last confirmed write is
-/// none of ours, such as another axis' register.
+/// Without read-back the offset moves only while writes are confirmed, since the first offset sent
+/// on a new link must be the one applied last. A controller that refuses an offset (beyond a limit
+/// of its own) may accept the one in effect: the offset returns to it, no further, if the target is
+/// on that side. A register value farther away than the offset has moved since the last confirmed
+/// write is not ours (another axis' register).
 void AxisChannel::follow(const AxisInput& input) noexcept {
   const bool is_refused = input.online && !input.written;
   const bool reaches = (input.online && input.written) || reads_back_;
@@ -233,8 +233,8 @@ void AxisChannel::begin_corridor(StartEvidence by) noexcept {
 }
 
 /// A pause of the same link does not change the comparison of read-backs. But the last offset may
-/// not have been written (a controller that refuses a write pauses the link each time), so the
-/// offset does not move on before a command of the new epoch is written.
+/// not have been written (each refused write pauses the link), so the offset stays until a command
+/// of the new epoch is written.
 void AxisChannel::take_epoch(std::uint32_t epoch) noexcept {
   if (is_same_link(epoch, state_.epoch))
     state_.read_backs_awaited = read_backs_until_written;
@@ -265,8 +265,8 @@ void AxisChannel::start_without_read_back(const AxisInput& input, nanoseconds aw
   const double register_um = input.applied_um;
   if (!std::isfinite(register_um)) {
     if (!start_.no_registers) begin_corridor(start_.by);
-    // It is unknown whether the controller restarted and what it applies since. That also holds for
-    // one that could not be reached when the program began.
+    // The controller may have restarted, so the offset that it applies is unknown; likewise if it
+    // could not be reached when the program began.
     if (away > (is_same_link(state_.epoch, first_epoch) ? first_link_max : lag_max))
       start_.by = StartEvidence::unknown;
     start_.unknown = start_.by == StartEvidence::unknown;
@@ -283,8 +283,8 @@ void AxisChannel::start_without_read_back(const AxisInput& input, nanoseconds aw
   start_from(input.now, std::clamp(register_um, -state_.trusted_um, state_.trusted_um));
 }
 
-/// The offset may have moved on for as long as a write may be unconfirmed. This does not hold for
-/// 0, which empty registers show too.
+/// True if the register may hold an offset sent before: the offset may have moved on for as long as
+/// a write may be unconfirmed. 0 does not count, since empty registers also hold 0.
 bool AxisChannel::can_be_ours(double register_um) const noexcept {
   return std::abs(register_um) > same_read_back_um &&
          std::abs(register_um - limiter_.offset_um()) <=
@@ -296,7 +296,7 @@ void AxisChannel::compare(const AxisInput& input) noexcept {
   state_.out_of_bound = is_out_of_bound(input.applied_um);
   const nanoseconds before = state_.read_back_at;
   const bool fresh = input.taken_at != before;
-  // A value beyond the bound on a new link was never sent, however long it is read back.
+  // A value beyond the bound on a new link was never sent, however often it is read back.
   const bool nonsense = state_.starting && !state_.latched && state_.out_of_bound;
   if (!nonsense) state_.read_back_at = input.taken_at;
   if (state_.latched) {
@@ -304,7 +304,8 @@ void AxisChannel::compare(const AxisInput& input) noexcept {
     state_.agreed_since = input.now;
     if (state_.releasing && fresh) check_release(input);
   } else if (state_.starting) {
-    // Away for longer than the largest lag, the controller no longer shows a value on the way.
+    // After an absence longer than the largest lag, the controller no longer shows an earlier
+    // offset.
     if (input.taken_at - before > lag_max) check_.restart(input.now, limiter_.offset_um());
     start_on_link(input, fresh);
   } else if (check_.agrees(input.applied_um) && !stands_still(input.applied_um)) {
@@ -314,8 +315,8 @@ void AxisChannel::compare(const AxisInput& input) noexcept {
   }
 }
 
-/// A controller that answers without a number for longer than a read-back may take: what it applies
-/// is not known, and the axis pauses until it is.
+/// A controller that reports no number for longer than mismatch_after_s pauses the axis, since its
+/// applied offset is unknown.
 void AxisChannel::miss_read_back(const AxisInput& input) noexcept {
   if (state_.starting || state_.latched || input.taken_at - state_.read_back_at <= mismatch_after_)
     return;
@@ -324,9 +325,9 @@ void AxisChannel::miss_read_back(const AxisInput& input) noexcept {
   state_.mismatch = true;
 }
 
-/// The axis is not driven until the read-back is within the bound. A controller that was away may
-/// have lost its offset; any other unexplained value is refused. One that shows an offset sent
-/// lately has kept it and reports late: the offset continues from the value sent.
+/// The axis is not driven until the read-back is within the bound. After an absence the controller
+/// may have lost its offset; any other unexplained value is refused. If it shows an offset sent
+/// lately, it has kept it and reports late: the offset continues from the value sent.
 void AxisChannel::start_on_link(const AxisInput& input, bool fresh) noexcept {
   if (state_.out_of_bound) return;
   if (state_.driven_once && !check_.agrees_after_absence(input.applied_um))
@@ -345,8 +346,8 @@ void AxisChannel::start_on_link(const AxisInput& input, bool fresh) noexcept {
   start_from(input.now, std::clamp(input.applied_um, -state_.trusted_um, state_.trusted_um));
 }
 
-/// An offset sent while the read-back was the same is far from all offsets sent lately: no delay
-/// within mismatch_after_s explains that.
+/// True if the read-back stayed the same while an offset far from all those sent lately was sent:
+/// no delay within mismatch_after_s explains that.
 bool AxisChannel::stands_still(double applied_um) const noexcept {
   const Standing found = state_.pairs.standing(limiter_.offset_um(), applied_um);
   return check_.is_far(found.low_um) || check_.is_far(found.high_um);
@@ -378,7 +379,7 @@ void AxisChannel::note_unexplained(const AxisInput& input, bool fresh) noexcept 
   state_.latched = true;
   state_.releasing = false;
   state_.starting = false;
-  // On a link that pauses, offsets newer than the last explained read-back have not been written.
+  // After a pause, offsets newer than the last explained read-back have not been written.
   const double sent_um = state_.read_backs_awaited > 0
                              ? state_.pairs.last_sent_um(limiter_.offset_um())
                              : limiter_.offset_um();
@@ -435,7 +436,7 @@ void AxisChannel::end_latch() noexcept {
   state_.suspicion = 0;
 }
 
-/// The last offset is written and no other is on its way.
+/// True if the last offset is written and no other is under way.
 bool AxisChannel::is_applied(const AxisInput& input) const noexcept {
   return std::abs(input.applied_um - limiter_.offset_um()) <= register_rounding_um;
 }

@@ -26,11 +26,11 @@ class AppliedCheck {
   void restart(nanoseconds now, double offset_um) noexcept;
   void sent(nanoseconds now, double offset_um) noexcept;
   [[nodiscard]] bool agrees(double applied_um) const noexcept;
-  /// More than one and a half tolerances from all of them: no rounding of the controller to steps
-  /// of 0.0001 inch makes both the same, with the default tolerance.
+  /// True if the offset is more than 1.5 tolerances from all of them: with the default tolerance, a
+  /// controller's rounding to 0.0001 inch cannot make both the same.
   [[nodiscard]] bool is_far(double offset_um) const noexcept;
-  /// True if a controller that was away may apply this by itself: an offset sent to it, 0, or a
-  /// value between on its way back.
+  /// True if a controller that was away may apply this value without a command: an offset sent to
+  /// it, 0, or a value between them on its way back.
   [[nodiscard]] bool agrees_after_absence(double applied_um) const noexcept;
   /// After a reload: offsets sent by `previous` count as sent.
   void adopt(const AppliedCheck& previous) noexcept { state_ = previous.state_; }
@@ -107,18 +107,18 @@ struct SentBefore {
 /// on a new link whose read-back is zero, or between zero and the offsets sent lately; and when an
 /// operator releases a mismatch. Otherwise it continues from the value sent.
 ///
-/// Unexplained is a read-back far from all offsets sent lately, and one that stands still while the
+/// A read-back is unexplained if it is far from all offsets sent lately, or stands still while the
 /// offset sent moves. It pauses the axis; a second one within the next sixteen good ones latches
 /// the mismatch: the axis is not driven until release(). Reports without a number for longer than
-/// mismatch_after_s pause it too.
+/// mismatch_after_s also pause it.
 ///
 /// Without read-back the offset continues, on each new link, from the one sent last. Its sources,
 /// in this order: the registers read when the link began (in place of the read-back), the offset
-/// sent until then, the last-sent record, the state file. If the registers contradict the other
-/// sources, or if the link was away (or, at the program's start, not there) for longer than a
-/// controller needs to restart and no registers can be read, the start is unknown: the axis is not
-/// driven until release(), which starts from 0. While no registers can be read, the offset stays
-/// within restart_leap_um_max of every offset that may be on disk, and waits for the disk.
+/// sent until then, the last-sent record, the state file. The start is unknown if the registers
+/// contradict the other sources, or if no registers can be read and the link was absent (also at
+/// the program's start) for longer than a controller needs to restart. Then the axis is not driven
+/// until release(), which starts from 0. While no registers can be read, the offset stays within
+/// restart_leap_um_max of every offset that may be on disk, and waits for the disk.
 class AxisChannel {
  public:
   AxisChannel(const AxisConfig& config, const CompensationConfig& compensation, bool reads_back);
@@ -148,17 +148,17 @@ class AxisChannel {
   /// Last read-back; NaN without read-back.
   [[nodiscard]] double applied_um() const noexcept { return state_.applied_um; }
   [[nodiscard]] bool synced() const noexcept { return state_.synced; }
-  /// True if the offset may be sent: synchronised, started, no unexplained read-back.
+  /// True if the offset may be sent: synchronised, started, and the read-back is explained.
   [[nodiscard]] bool driven() const noexcept {
     return state_.synced && !state_.starting && !state_.in_doubt && !state_.latched &&
            !start_.unknown && !(in_corridor() && std::isnan(start_.saved_um));
   }
-  /// The offset to continue from is not known.
+  /// True if the offset to continue from is unknown on this link.
   [[nodiscard]] bool start_unknown() const noexcept { return state_.synced && start_.unknown; }
   [[nodiscard]] StartEvidence start() const noexcept {
     return start_.unknown ? StartEvidence::unknown : start_.by;
   }
-  /// The last sent offset is not known, with or without a link.
+  /// True if the last sent offset is unknown, with or without a link.
   [[nodiscard]] bool forgotten() const noexcept {
     return !reads_back_ && start_.by == StartEvidence::unknown;
   }
@@ -166,7 +166,7 @@ class AxisChannel {
   [[nodiscard]] double corridor_um() const noexcept {
     return in_corridor() ? corridor_um_ : not_a_number;
   }
-  /// The offset would move on if a newer state were on disk.
+  /// True if the offset moves on only after a newer state is on disk.
   [[nodiscard]] bool waits_for_disk() const noexcept {
     return in_corridor() && (start_.held || !std::isfinite(start_.saved_um));
   }
@@ -222,7 +222,7 @@ class AxisChannel {
     /// After a pause of the link: read-backs until a command of the new epoch is surely written.
     std::uint8_t read_backs_awaited{0};
     std::uint8_t unwritten_for{0};  ///< read-backs until they surely show our offset
-    nanoseconds seen_at{};          ///< of the newest report, with or without offsets
+    nanoseconds seen_at{};          ///< time of the newest report, with or without offsets
     nanoseconds read_back_at{};
     nanoseconds driven_at{};
     Prove prove;
@@ -234,12 +234,12 @@ class AxisChannel {
 
   struct Start {
     StartEvidence by{StartEvidence::unknown};  ///< source of the offset sent last
-    bool unknown{false};                       ///< on this link
-    bool no_registers{false};       ///< on this link, so that only the disk keeps the offset
+    bool unknown{false};                       ///< no source on this link
+    bool no_registers{false};       ///< none on this link, so that only the disk keeps the offset
     double saved_um{not_a_number};  ///< in the newest state on disk
     bool held{false};               ///< limited by the corridor in the last step
-    /// Range of the offset since the last saved(), and between the two before: a state still being
-    /// written was taken then.
+    /// Range of the offset since the last saved(), and between the two before it, when a state
+    /// still being written was taken.
     std::array<double, 2> low_um{};
     std::array<double, 2> high_um{};
     void visit_state(StateArchive& archive) {
@@ -298,7 +298,7 @@ class AxisBank {
  public:
   explicit AxisBank(const EstimatorConfig& config);
 
-  /// @param online   the controller's report is fresh
+  /// @param online   true if the controller's report is fresh
   /// @param command  overwritten: offsets of all axes, with the look that they were computed from
   void step(const StepTime& time, const Targets& targets, bool online,
             const ControllerState& controller, OffsetCommand& command) noexcept;
@@ -308,18 +308,18 @@ class AxisBank {
   [[nodiscard]] const AxisChannel& operator[](std::size_t axis) const noexcept {
     return axes_[axis];
   }
-  /// All axes are synchronised, and the last sent offset of at least one is known.
+  /// True if all axes are synchronised and the last sent offset of at least one is known.
   [[nodiscard]] bool synced() const noexcept;
-  /// One bit per axis: the last sent offset is not known.
+  /// One bit per axis: 1 if the last sent offset is unknown.
   [[nodiscard]] std::uint32_t forgotten() const noexcept;
   /// True if the offset may be sent: all nodes of the axis' travel are driven.
   [[nodiscard]] bool driven(std::size_t axis) const noexcept { return driven(span_of_[axis]); }
   [[nodiscard]] const AxisSpan& span(std::size_t axis) const noexcept { return span_of_[axis]; }
 
-  /// Offset in effect as a displacement [um]: read back, or as sent where nothing is read back.
+  /// Offset in effect as a displacement [um]: read back, or as sent without read-back.
   [[nodiscard]] double compensated_um(std::size_t axis) const noexcept;
 
-  /// Moves the tool by `move_um`, hence the offset by `sign` times that. All nodes of a travel, or
+  /// Moves the tool by `move_um`, hence the offset by `sign` times that: all nodes of a travel, or
   /// none.
   void prove(std::size_t axis, double move_um) noexcept;
   void release(std::size_t axis) noexcept;

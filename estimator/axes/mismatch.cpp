@@ -11,16 +11,17 @@ namespace {
 constexpr double noise_um = 0.3;
 /// Closer pairs count as one, closer read-backs as the same.
 constexpr double apart_um = 0.2;
-/// Largest deviation of the older pairs from the cause of the newest, as a share of the mismatch;
-/// and the limit for a sure cause, which prevents a release while it still explains the read-backs.
+/// Largest deviation of the older pairs from the cause of the newest, as a share of the mismatch.
+/// Also the limit for a certain cause, which prevents a release while it still explains the
+/// read-backs.
 constexpr double share_of_mismatch = 0.35;
 constexpr double sure_share_of_mismatch = 0.1;
 /// Smallest offset sent that gives a factor.
 constexpr double sent_um_min = 0.2;
-/// An exact negative of at least this much is no coincidence.
+/// From this offset on, an exact negative is not a coincidence.
 constexpr double negative_um_min = 3.0;
-/// The offset sent must have changed by this much, and by this share of the mismatch, before a
-/// factor is no coincidence.
+/// Smallest change of the offset sent, and below it as a share of the mismatch, that confirms a
+/// factor.
 constexpr double spread_um_min = 0.5;
 constexpr double spread_share_min = 0.2;
 
@@ -93,7 +94,7 @@ void SentAndRead::note(double sent_um, double read_um) noexcept {
   ++count_;
 }
 
-/// The newest pair lies between others, or beside an older one.
+/// True if the newest pair lies between others or equals an older one.
 bool SentAndRead::adds_nothing(double next_sent_um, double next_read_um) const noexcept {
   if (count_ < 2) return false;
   const double sent_um = sent_um_[index_of(0)];
@@ -152,7 +153,7 @@ Standing SentAndRead::standing(double sent_um, double read_um) const noexcept {
   return found;
 }
 
-/// In all pairs, or since the read-back was an offset sent.
+/// True for all pairs, or for those since the read-back was an offset sent.
 bool SentAndRead::stands_still(double sent_um, double read_um) const noexcept {
   const Standing found = standing(sent_um, read_um);
   const bool was_sent = read_um >= found.low_um - noise_um && read_um <= found.high_um + noise_um;

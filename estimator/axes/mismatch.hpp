@@ -13,10 +13,10 @@ namespace thermocomp {
 
 enum class MismatchCause : std::uint8_t {
   none,
-  factor,         ///< reads back a multiple of the offset sent
-  opposite_sign,  ///< reads back its negative
-  constant,       ///< reads back more by the same amount each time
-  stands_still,   ///< reads back the same whatever is sent
+  factor,         ///< read-back is a multiple of the offset sent
+  opposite_sign,  ///< read-back is the negative of the offset sent
+  constant,       ///< read-back minus offset sent is constant
+  stands_still,   ///< read-back is constant while the offset sent changes
   changes_alone   ///< the read-back changes while the offset sent does not
 };
 
@@ -26,7 +26,7 @@ struct Mismatch {
   double read_um{not_a_number};
   MismatchCause likely{MismatchCause::none};
   double size{not_a_number};  ///< factor: read / sent; constant: read - sent [um]
-  /// More than one offset sent confirms the factor, sign or constant.
+  /// True if more than one offset sent confirms the factor, sign or constant.
   bool sure{false};
   /// A constant fits as well as the factor: too little was sent to distinguish them.
   bool or_constant{false};
@@ -54,16 +54,16 @@ struct Standing {
 /// always that of the last read-back.
 class SentAndRead {
  public:
-  /// @param read_um  NaN: the read-back begins anew, and earlier pairs do not show it standing
+  /// @param read_um  NaN: the read-back begins anew, and earlier pairs no longer count as standing
   /// still
   void note(double sent_um, double read_um) noexcept;
-  /// The likeliest cause of a pair that disagrees. A factor or constant is taken from that pair and
+  /// The likeliest cause of a pair that disagrees. A factor or constant follows from that pair and
   /// must hold for the older ones too, each of which may show the offset sent one pair before. A
   /// constant or an opposite sign may be recent: then it must hold for the pairs since the last
-  /// agreement, at least two; an exact negative is shown by this pair alone. A read-back may stand
-  /// still since it last agreed.
+  /// agreement, at least two; one pair is enough for an exact negative. A read-back may stand still
+  /// since its last agreement.
   [[nodiscard]] Mismatch judge(double sent_um, double read_um) const noexcept;
-  /// The newest pairs have this read-back; range of their offsets sent and `sent_um`.
+  /// The newest pairs with this read-back, and the range of their offsets sent, `sent_um` included.
   [[nodiscard]] Standing standing(double sent_um, double read_um) const noexcept;
   /// Offset sent at the last read-back; without one `otherwise_um`.
   [[nodiscard]] double last_sent_um(double otherwise_um) const noexcept {

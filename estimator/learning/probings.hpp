@@ -31,11 +31,11 @@ struct CorrectionReport {
   double bias_um{0.0};
   double bias_used_um{0.0};
   double sd_um{0.0};           ///< of the corrected displacement now, from the gains
-  bool probing_wanted{false};  ///< sd_um is above probe_sd_um
+  bool probing_wanted{false};  ///< sd_um exceeds probe_sd_um
   std::uint8_t phase{1};       ///< two_phase: 1 or 2
   std::uint64_t taken{0};      ///< probings that changed the gains
   std::uint64_t refused{0};    ///< outliers, and probings without information
-  bool has_record{false};      ///< the model has a course of this axis; then also:
+  bool has_record{false};      ///< the model has a course of this axis; only then valid:
   std::array<double, correction_groups_max> recorded{};     ///< recorded gains at the present state
   std::array<double, correction_groups_max> recorded_sd{};  ///< ... and their standard deviations
 };
@@ -70,9 +70,9 @@ class RunningCorrection {
   RunningCorrection(const CorrectionConfig& config, const ThermalModel& model, std::size_t output);
 
   /// @param rise_K      of the model's temperature columns
-  /// @param may_change  false while cutting: learned values wait
+  /// @param may_change  false while cutting: learned values are not used yet
   void step(nanoseconds now, std::span<const double> rise_K, bool may_change) noexcept;
-  /// Corrected displacement less the model's [um].
+  /// Displacement with correction minus that of the model [um].
   [[nodiscard]] double correction_um() const noexcept { return correction_of(state_.used); }
   /// The same at another state of the machine.
   [[nodiscard]] double correction_um(std::span<const double> rise_K) const noexcept {
@@ -85,14 +85,14 @@ class RunningCorrection {
     std::optional<Contributions> contributions_um{};  ///< at that time; none: now
   };
   void measured(const Measured& measured) noexcept;
-  /// Counts a probing without information.
+  /// Counts a probing from which nothing can be learned.
   void refuse() noexcept { ++state_.refused; }
   [[nodiscard]] const Contributions& contributions_um() const noexcept {
     return state_.contributions_um;
   }
   /// Correction with all learned values, in use or not yet [um].
   [[nodiscard]] double learned_um() const noexcept { return correction_of(joint_gains()); }
-  /// A new reference: displacements count from here. Gains stay as they are.
+  /// A new reference: displacements count from it. Gains do not change.
   void restart() noexcept;
 
   [[nodiscard]] CorrectionReport report() const noexcept;
@@ -144,10 +144,10 @@ class RunningCorrection {
   };
 
   void look_up(std::span<const double> rise_K) noexcept;
-  /// Variance of a learned gain now; infinite before the first probing since the start.
+  /// Present variance of a learned gain; infinite before the first probing since the start.
   [[nodiscard]] double learned_variance(std::size_t group) const noexcept;
-  /// Variance of the gain in use: the smaller of the two, since learning started from the record
-  /// and is not independent of it.
+  /// Variance of the gain in use: the smaller of learned and recorded, which are not independent
+  /// since learning started from the record.
   [[nodiscard]] double joint_variance(std::size_t group) const noexcept;
   /// Learned gains, joined with those of the course if there is one.
   [[nodiscard]] Gains joint_gains() const noexcept;
@@ -237,8 +237,8 @@ inline constexpr double question_sigma = 3.0;
   return "perhaps another axis or another tool";
 }
 
-/// Offsets entered at the controller since the reference, as displacement of the axis. They stay
-/// there, so the correction must not compensate the same displacement again.
+/// Offsets entered at the controller since the reference, as displacement of the axis. They stay in
+/// effect there, so the correction must not compensate the same displacement again.
 struct OperatorOffset {
   double entered_um{0.0};
   double absorbed_um{0.0};  ///< part of the correction in use
@@ -271,7 +271,7 @@ class Probings {
   Probings(const EstimatorConfig& config, const ThermalModel& model,
            const std::vector<std::size_t>& axis_output);
 
-  /// @param may_change  false: learned values wait for the end of the cut
+  /// @param may_change  false: learned values are not used before the end of the cut
   void step(nanoseconds now, std::span<const double> temps_degC,
             std::span<const double> reference_degC, bool may_change) noexcept;
   /// Correction of the model's displacement, less the part entered at the controller [um].
@@ -291,7 +291,7 @@ class Probings {
                : value_um;
   }
 
-  /// Records a value from an operator or a probe, also if nothing can be learned from it.
+  /// Records a value from an operator or a probe, even if nothing can be learned from it.
   void note(std::size_t axis, double value_um) noexcept { measured_um_[axis] = value_um; }
   /// @param moment  state of the axis at the time of the measurement; see past()
   void learn(std::size_t axis, const MeasuredValue& measured, const PastMoment& moment) noexcept;
@@ -311,7 +311,7 @@ class Probings {
   void remember(std::size_t axis, const PastMoment& moment) noexcept;
   /// Counts a value from which nothing can be learned.
   void refuse(std::size_t axis) noexcept { corrections_[axis].refuse(); }
-  /// A new reference: displacements count from here.
+  /// A new reference: displacements count from it.
   void restart() noexcept;
 
   [[nodiscard]] double measured_um(std::size_t axis) const noexcept { return measured_um_[axis]; }
@@ -330,7 +330,7 @@ class Probings {
   void restore(const std::map<std::string, double>& corrections);
   /// @param axes  from plan_names()
   void adopt(const Probings& previous, const std::vector<int>& axes) noexcept;
-  /// The error of probings, which is that of a model.
+  /// Takes over the error of probings, which belongs to a model.
   void adopt_errors(const Probings& previous, const std::vector<int>& axes) noexcept;
   void visit_learned(StateArchive& archive);
   void visit_measured(StateArchive& archive) { archive(measured_um_); }

@@ -43,7 +43,7 @@ double HeatPhase::since_s() const noexcept {
 namespace {
 
 constexpr double unknown_at_bandwidths = 3.0;
-// Smallest spreads: a quantity not varied in the record must not decide which point is near.
+// Smallest spreads: a quantity not varied in the record must not select the nearest point.
 constexpr double since_spread_s_min = 60.0;
 constexpr double rise_spread_K_min = 0.5;
 

@@ -14,9 +14,9 @@
 
 namespace thermocomp {
 
-/// heating: the heat source's contribution grows; turned: it still grows, but the displacement has
-/// come back from its extreme; cooling: it shrinks. A direction changes when the value has come
-/// back by `back_um`, with effect from the time of its extreme. Never allocates, never throws.
+/// heating: the contribution of the heat source grows; turned: it still grows, but the displacement
+/// has returned from its extreme; cooling: it shrinks. A direction changes when the value has
+/// returned by `back_um`, with effect from the time of its extreme. Never allocates, never throws.
 /// Source: Teratani et al. 1995, section 5 (response of the tie in the course of the heat).
 class HeatPhase {
  public:
@@ -27,7 +27,7 @@ class HeatPhase {
   /// @param displacement_um  of the whole model
   void step(nanoseconds now, double heat_um, double displacement_um) noexcept;
   [[nodiscard]] CoursePhase phase() const noexcept;
-  /// Since heating or cooling began [s]; 0 before the first step.
+  /// Time since heating or cooling began [s]; 0 before the first step.
   [[nodiscard]] double since_s() const noexcept;
   /// The next step begins a heating phase.
   void restart() noexcept { state_ = {}; }
@@ -44,7 +44,7 @@ class HeatPhase {
     double heat_extreme_um{0.0};  ///< maximum since heating began, minimum since cooling began
     nanoseconds extreme_at{};
     double began_um{0.0};  ///< displacement when heating began
-    double away_um{0.0};   ///< largest distance from there
+    double away_um{0.0};   ///< largest distance from began_um
     void visit_state(StateArchive& archive) {
       auto& [a, b, c, d, e, f, g, h, i] = *this;
       archive(a, b, c, d, e, f, g, h, i);

@@ -72,8 +72,8 @@ Guideway guideway_from(const GuidewaySpec& spec, const ThermalModel& model,
   return guideway;
 }
 
-/// Orders by all that a term's state depends on. Gains are not part of the state, so a term with
-/// new gains keeps it.
+/// Orders by everything that determines a term's state. Gains do not, so a term with new gains
+/// keeps its state.
 struct ByState {
   bool operator()(const TermSpec* a, const TermSpec* b) const {
     const auto key = [](const TermSpec& term) {
@@ -230,8 +230,9 @@ void DisplacementModel::adopt_terms(const DisplacementModel& other,
 namespace {
 
 constexpr nanoseconds between_looks = std::chrono::seconds(1);
-/// Behaviour that a single run has not shown, as a share of the displacement without a model. Set,
-/// with the fourth root of the runs, on all 86 splits of measured machines (docs/measurements.md).
+/// Behaviour not shown by a single run, as a share of the displacement without a model. Fitted,
+/// together with the fourth root of the runs, to all 86 splits of measured machines
+/// (docs/measurements.md).
 constexpr double unseen_share = 0.25;
 
 bool is_input(const MadeFrom& made_from, std::size_t column) {

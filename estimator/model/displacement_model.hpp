@@ -1,5 +1,5 @@
 /// delta = P (T - T_ref), with rows of guideways at the present position and extension terms; and
-/// the distance of the machine from the data of its model.
+/// the distance of the machine from its model's data.
 #pragma once
 
 #include <array>
@@ -112,13 +112,12 @@ class OutsideShare {
 ///
 ///     hypot(left_out_rms_um, 0.25 no_model_rms_um / runs^(1/4)).
 ///
-/// The second part is for behaviour that the runs have not shown; outside the domain runs = 1.
+/// The second part is for behaviour not shown by the runs; outside the domain runs = 1.
 /// Measured machines show no further growth with the distance (docs/measurements.md).
 [[nodiscard]] double spread_um(const MadeFrom& made_from, const MadeFrom::Output& output,
                                bool outside);
 
-/// Distance of the model's inputs from the rows that it was made from, in the metric of their
-/// covariance S,
+/// Distance of the model's inputs from the fitted rows, in the metric of their covariance S,
 ///
 ///     d^2 = (x - m)^T S^-1 (x - m) / n,
 ///

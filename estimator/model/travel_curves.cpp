@@ -34,7 +34,7 @@ struct Levelled {
   }
 };
 
-/// The point replaces its neighbour on the same side of the line.
+/// Exchanges the point for its neighbour on the same side of the line.
 std::array<std::size_t, 3> exchanged(const Levelled& line, std::size_t point, double above) {
   const auto [a, b, c] = line.at;
   const bool like_middle = std::signbit(above) == std::signbit(line.level);

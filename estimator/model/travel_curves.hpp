@@ -19,21 +19,21 @@ struct CurveLine {
   double deviation{0.0};  ///< largest |y_i - line(x_i)|
 };
 
-/// The line with the smallest maximum deviation from the points: it passes three of them at equal
-/// distances on alternating sides, and no other point is further off. NaN if a value is not finite.
+/// The line with the smallest maximum deviation from the points: three of them are at equal
+/// distances on alternating sides, no other is farther off. NaN if a value is not finite.
 /// @param x  strictly increasing, two points at least
 /// @param y  shape (x)
 /// Never throws, never allocates.
 /// Source: E. Ya. Remez, exchange algorithm for a polynomial of the first degree on a finite set.
 [[nodiscard]] CurveLine minimax_line(std::span<const double> x, std::span<const double> y) noexcept;
 
-/// Sample positions of an output's curve: its kinks (positions of guideways) and `even` equidistant
-/// places, both ends among them; increasing.
+/// Sample positions of an output's curve, increasing: its kinks (positions of guideways) and `even`
+/// equidistant places, both ends included.
 [[nodiscard]] std::vector<double> travel_samples_mm(const ThermalModel& model,
                                                     const std::string& position, double low_mm,
                                                     double high_mm, std::size_t even);
 
-/// Offsets at the nodes: of a table the curve itself, of a line the ends of its minimax line.
+/// Offsets at the nodes: for a table the curve itself, for a line the ends of its minimax line.
 class TravelCurves {
  public:
   /// @throws InvalidValue for a position that is not a signal of the model, or nodes out of order
@@ -41,8 +41,8 @@ class TravelCurves {
 
   [[nodiscard]] bool empty() const noexcept { return travels_.empty(); }
 
-  /// @param evaluate  (signals, displacement_um of the outputs): the model at this time with the
-  ///                  slides at these positions; must not change its state
+  /// @param evaluate  (signals, displacement_um of the outputs): the model at the present time with
+  /// the slides at these positions; must not change its state
   /// @param signals   shape (signal_columns), present values
   /// @param axis_um   one per axis; only nodes are overwritten
   /// Never allocates.

@@ -26,7 +26,7 @@
 
 namespace thermocomp {
 
-/// In the order of a step; each stage uses only its arguments.
+/// Stages in the order of a step; each uses only its arguments.
 struct Stages {
   /// @throws InvalidValue when configuration and model do not fit each other
   Stages(const EstimatorConfig& estimator_config, const ThermalModel& thermal_model);
@@ -74,7 +74,7 @@ namespace {
 const EstimatorConfig& checked(const EstimatorConfig& config, const ThermalModel& model) {
   config.compensation.validate();
   check_reference(config, model);
-  // Refuses a broken model before a stage reads its rows.
+  // Rejects an invalid model before a stage reads its rows.
   [[maybe_unused]] const DisplacementModel whole{model};
   return config;
 }
@@ -136,7 +136,7 @@ class ReasonSet {
   std::uint32_t bits_{0};
 };
 
-/// Reasons of a step, a set of Reason, from the results of the stages.
+/// Set of Reason of a step, from the results of the stages.
 /// @param written  see ControllerState
 std::uint32_t reasons_of(const Signals& signals, bool written, const Temperatures& temps,
                          const ReferenceState& reference, const Displacement& displacement,
@@ -168,7 +168,7 @@ std::uint32_t reasons_of(const Signals& signals, bool written, const Temperature
   return reasons.bits();
 }
 
-/// Offset of the tool now, as a displacement; for a travel interpolated between its nodes.
+/// Offset in effect at the tool, as a displacement; for a travel interpolated between its nodes.
 double compensated_now_um(const Stages& stages, std::size_t axis) noexcept {
   const AxisSpan span = stages.axes.span(axis);
   if (span.count == 1) return stages.axes.compensated_um(axis);
@@ -242,8 +242,8 @@ void Estimator::step(nanoseconds now, std::span<const Reading> readings,
 
 namespace {
 
-/// Takes the reference only if all inputs are good: values of two moments would be a state in which
-/// the machine never was.
+/// Takes the reference only if all inputs are good: values of two moments would be a state that the
+/// machine never had.
 void take_reference(Stages& stages) noexcept {
   if (!stages.sensing.all_good()) return;
   const std::span<const double> temps_degC = stages.sensing.blocks().temps_degC();
@@ -254,7 +254,7 @@ void take_reference(Stages& stages) noexcept {
   stages.cycle_update.restart(stages.record.now, temps_degC, stages.signals.of_model());
 }
 
-/// State at the time of a `measured` command; none: not kept.
+/// State at the time of a `measured` command; none if it was not kept.
 std::optional<PastMoment> moment_of(const Stages& stages, const Command& command,
                                     std::size_t axis) noexcept {
   if (command.ago_s == 0) return present(stages, axis);

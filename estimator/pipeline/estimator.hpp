@@ -61,8 +61,8 @@ class Estimator {
   /// @param report  of this estimator (sizes are checked)
   [[nodiscard]] PersistentState persistent_state(const Report& report) const;
   /// Before the first step; allocates. A reference outside the screening range of its column was
-  /// never measured. Then none is restored and the compensation is switched off, because the next
-  /// reference would be taken in an arbitrary state of the machine.
+  /// never measured. Then no reference is restored and the compensation is switched off, because
+  /// the next one would be taken in an arbitrary state of the machine.
   /// @return refused references by key, value and rule
   std::vector<std::string> restore(const PersistentState& state);
   /// Bumpless reload: takes over offsets, switches, references, smoothing and lag states by name.
@@ -70,7 +70,8 @@ class Estimator {
   /// adopt() neither allocates nor throws.
   void plan_adoption(const Estimator& previous);
   void adopt(const Estimator& previous) noexcept;
-  /// After adopt(): takes the model states of a parallel estimator. @pre made from the same model
+  /// After adopt(): takes the model states of an estimator run in parallel. @pre made from the same
+  /// model
   void adopt_model(const Estimator& beside) noexcept;
 
   [[nodiscard]] const EstimatorConfig& config() const noexcept;

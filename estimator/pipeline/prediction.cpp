@@ -10,7 +10,7 @@
 namespace thermocomp {
 namespace {
 
-/// Larger values are garbled registers, whose squares would stay in the lags for ever.
+/// Larger values are garbled registers, whose squares would never leave the lags.
 constexpr double signal_magnitude_max = 1e9;
 
 std::vector<std::size_t> indices_of_model(const EstimatorConfig& config,
@@ -104,7 +104,7 @@ ReferenceState Reference::step(nanoseconds now, const Temperatures& temps,
     }
     if (!std::isfinite(temps_degC_[i])) state.known = false;
   }
-  // Signals of an offline controller are not those of this moment.
+  // Signals of an offline controller are outdated.
   for (std::size_t i = 0; signals.online && i < signals_.size(); ++i)
     if (!std::isfinite(signals_[i])) {
       signals_[i] = signals.of_model[i];
@@ -148,8 +148,8 @@ void Reference::complete(const Reference& same) noexcept {
 
 namespace {
 
-/// Share of the limit below which an uncertain estimate is used again, so that a moving slide does
-/// not switch it on and off.
+/// Share of the limit below which an uncertain estimate is used again: hysteresis against a moving
+/// slide.
 constexpr double certain_again = 0.9;
 
 }  // namespace
@@ -268,7 +268,7 @@ void Prediction::predict(nanoseconds now, const Temperatures& temps,
   if (!curves_.empty()) look_along_travels(now, temps, reference, signals);
 }
 
-/// At the same time again, so that no lag advances.
+/// Evaluated at the same time again, so that no lag advances.
 void Prediction::look_along_travels(nanoseconds now, const Temperatures& temps,
                                     const ReferenceState& reference,
                                     const Signals& signals) noexcept {

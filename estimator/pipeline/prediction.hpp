@@ -28,14 +28,14 @@ namespace thermocomp {
 /// Signals of the controller; while it is offline, the last ones.
 struct Signals {
   bool online{false};    ///< the controller answers and its report is fresh
-  bool complete{false};  ///< every value that the model or disable_signal needs is known
+  bool complete{false};  ///< true if every value that the model or disable_signal needs is known
   std::span<const double> of_model;  ///< shape (signal_columns)
   bool watches_cutting{false};       ///< a cutting_signal is configured
   double cutting{not_a_number};      ///< NaN: unknown or not configured; so are the next two
   double disable{not_a_number};
   double cycle_end{not_a_number};
 
-  /// An unknown signal does not count as "not cutting".
+  /// True only if the signal is known: an unknown one does not count as "not cutting".
   [[nodiscard]] bool surely_not_cutting() const noexcept { return online && cutting < 0.5; }
   [[nodiscard]] bool may_be_cutting() const noexcept {
     return watches_cutting && !surely_not_cutting();
@@ -107,7 +107,7 @@ class Reference {
   /// Takes references that are missing and measured now.
   [[nodiscard]] ReferenceState step(nanoseconds now, const Temperatures& temps,
                                     const Signals& signals) noexcept;
-  /// Displacement is zero now. The signals are taken at the next step.
+  /// Sets displacement to zero in this state. The signals are taken at the next step.
   /// @pre all temperatures are good
   void take(std::span<const double> temps_degC) noexcept;
 
@@ -166,10 +166,10 @@ class Certainty {
             const std::vector<std::size_t>& axis_output);
 
   /// @return true if each column is measured, or estimated well enough. Without signals or a
-  ///         reference the last answer holds.
+  /// reference, the last result
   [[nodiscard]] bool step(const LostBlocks& lost, const DisplacementModel& model,
                           const ReferenceState& reference, const Signals& signals) noexcept;
-  /// Answer of step() with a margin, for use before a sensor is excluded.
+  /// Result of step() with a margin, for use before a sensor is excluded.
   [[nodiscard]] bool would_serve(const LostBlocks& lost, const DisplacementModel& model,
                                  const ReferenceState& reference, const Signals& signals) noexcept;
   [[nodiscard]] double offset_sd_um(std::size_t axis) const noexcept {

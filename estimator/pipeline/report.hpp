@@ -21,7 +21,7 @@ struct InputReport {  ///< a temperature column of the model
   bool good{false};
   bool estimated{false};           ///< lost, and temp_degC is an estimate from the others
   double sd_K{0.0};                ///< standard deviation of the estimate
-  double held_degC{not_a_number};  ///< update = each_cycle: temperature compensated by
+  double held_degC{not_a_number};  ///< update = each_cycle: temperature that is compensated for
 };
 
 struct SignalReport {  ///< an operating signal or position of the model
@@ -39,9 +39,9 @@ struct AxisReport {
   double applied_um{not_a_number};   ///< read back
   double measured_um{not_a_number};  ///< last `measured` value
   bool synced{false};
-  bool driven{false};  ///< offset marked valid
+  bool driven{false};  ///< true if the offset is marked valid
   StartEvidence start{StartEvidence::unknown};
-  bool start_unknown{false};  ///< a link is up, and the last sent offset is not known
+  bool start_unknown{false};  ///< a link is up, but the last sent offset is unknown
   bool waits_for_disk{false};
   /// Largest distance of the offset from the one in the state file on disk; NaN: not limited.
   double corridor_um{not_a_number};
@@ -60,7 +60,7 @@ struct AxisReport {
   double probed_rms_um{not_a_number};
   std::uint64_t probings{0};  ///< number of measured displacements
   double entered_um{0.0};     ///< at the controller since the reference, as displacement
-  double absorbed_um{0.0};    ///< part of it in the correction
+  double absorbed_um{0.0};    ///< part of it included in the correction
   CorrectionReport correction;
 };
 
@@ -94,19 +94,19 @@ struct Report {
 struct PersistentState {
   bool enabled{true};
   std::map<std::string, double> reference_degC;  ///< by temperature column
-  /// Reference of the model file at the time, by input; empty: first sample. Other numbers in the
+  /// Reference in the model file at that time, by input; empty: first sample. Other numbers in the
   /// file at a restart are deliberate and replace the stored ones.
   std::map<std::string, double> model_reference_degC;
   std::map<std::string, double> reference_signals;  ///< at the reference, by column
   std::map<std::string, double> offset_um;          ///< by axis, last sent
   /// By axis with a corridor: largest distance of the sent offset from the saved one [um]. The
-  /// saved one is the start where nothing better is known.
+  /// saved one is the start if no better source is known.
   std::map<std::string, double> corridor_um;
-  std::map<std::string, double> sign;         ///< by axis: direction in which an offset counted
-  std::string controller;                     ///< that the offsets were sent to; empty: unknown
+  std::map<std::string, double> sign;  ///< by axis, at the time of the offset
+  std::string controller;              ///< controller that the offsets were sent to; empty: unknown
   std::map<std::string, double> recorded_um;  ///< by axis, last-sent record; not in the file
   std::map<std::string, double> temp_degC;    ///< in use, by temperature column
-  /// By sensor with a jump: its value before, so that a restart does not confirm the jump.
+  /// By sensor with a jump: its value before the jump, so that a restart does not confirm it.
   std::map<std::string, double> jumped_from_degC;
   std::map<std::string, double> held_degC;     ///< InputReport::held_degC, by column
   std::map<std::string, double> held_signals;  ///< SignalReport::held, by column
@@ -117,7 +117,7 @@ struct PersistentState {
 /// Reference of a model file, by input.
 [[nodiscard]] std::map<std::string, double> reference_numbers(const ThermalModel& model);
 
-/// True if a difference must be written at once: switch, references, jumps, learned and held
+/// True if the difference must be written at once: switch, references, jumps, learned and held
 /// values, and an offset that has used a quarter of its corridor. Other offsets and temperatures
 /// change all the time and may wait.
 [[nodiscard]] bool must_be_saved(const PersistentState& now, const PersistentState& saved);

@@ -58,8 +58,8 @@ class ModeDecision {
   void enable(bool enabled) noexcept { state_.enabled = enabled; }
   void stop() noexcept { state_.stopping = true; }
   [[nodiscard]] const State& state() const noexcept { return state_; }
-  /// Mode for the targets: while an axis holds only because the controller takes no offset, it
-  /// still has a target, towards which it may move back (AxisChannel).
+  /// Mode for the targets: an axis that holds only because the controller takes no offset still has
+  /// a target, towards which it may move back (AxisChannel).
   [[nodiscard]] Mode targeted() const noexcept {
     return state_.mode == Mode::holding && only_unwritten_ ? Mode::compensating : state_.mode;
   }
@@ -129,7 +129,7 @@ class CycleEnds {
   State state_;
 };
 
-/// The held quantity is a state, not a displacement: block temperatures, operating signals and the
+/// The held quantity is a state, not a displacement: block temperatures, operating signals and
 /// states of the terms, extrapolated by a share of an interval:
 ///   T_held = T_n + ahead (T_n - T_(n-1))
 /// The displacement is evaluated from it at the present positions (signals in mm) and with the
@@ -147,7 +147,7 @@ class CycleHold {
   /// @param live        the same model, stepped to `now` with these values
   void cycle_end(nanoseconds now, std::span<const double> temps_degC,
                  std::span<const double> signals, const DisplacementModel& live) noexcept;
-  /// A new reference: displacement is zero in this state, with no cycle end to extrapolate from.
+  /// A new reference: displacement is zero in this state, without a cycle end to extrapolate from.
   void restart(nanoseconds now, std::span<const double> temps_degC,
                std::span<const double> signals) noexcept;
 

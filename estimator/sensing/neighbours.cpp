@@ -53,7 +53,8 @@ double scatter_factor(const CovarianceGrowth& growth, std::size_t input) noexcep
 
 namespace {
 
-/// Smallest standard deviation of a thermocouple over hours, whatever the record's matrix gives.
+/// Smallest standard deviation of a thermocouple over hours, even if the record's matrix gives
+/// less.
 constexpr double floor_K = 0.1;
 /// A remainder below this share of the limit is explained.
 constexpr double clean_share = 0.75;
@@ -91,7 +92,7 @@ void NeighbourCheck::prepare(std::span<const double> change_K) noexcept {
   }
 }
 
-/// Precision of the other inputs without this one.
+/// Removes the input from the precision matrix.
 void NeighbourCheck::leave_out(std::size_t input) noexcept {
   present_[input] = 0;
   --present_count_;
@@ -148,8 +149,8 @@ NeighbourCheck::Choice NeighbourCheck::choose() const noexcept {
   for (std::size_t i = 0; i < inputs_; ++i)
     if (present_[i] != 0) largest = std::max(largest, score(y_[i], left_[at(i, i)], i));
   if (!(largest > asked_.sd_limit)) return choice;
-  // Not only inputs beyond the limit: a wrong one with a large weight in the expectation of another
-  // shifts that one further than itself.
+  // All inputs, not only those beyond the limit: a wrong one with a large weight in another's
+  // expectation shifts the other further than itself.
   for (std::size_t i = 0; i < inputs_; ++i) {
     if (present_[i] == 0) continue;
     const double rest = rest_without(i);
@@ -181,7 +182,7 @@ NeighbourCheck::Answer NeighbourCheck::find(std::span<const double> change_K,
     wrong = {i, y_[i] / left_[at(i, i)], std::sqrt(variance_K2(i, left_[at(i, i)]))};
     leave_out(i);
     if (choice.rest > clean) continue;
-    // The first of two was judged with the second among its neighbours.
+    // The first of two was judged while the second still counted as a neighbour.
     if (answer.count > 1) {
       const std::size_t first = answer.wrong[0].input;
       std::copy(change_K.begin(), change_K.end(), motions_.begin());
@@ -270,23 +271,23 @@ void LostBlocks::step(nanoseconds now, std::span<const double> temps_degC,
   grow(now);
 }
 
-/// From here on a block without a good sensor is lost, not starting up.
+/// From now on a block without a good sensor is lost, not starting up.
 void LostBlocks::begin(std::span<const double> temps_degC,
                        std::span<const std::uint8_t> good) noexcept {
   state_.begun = true;
   for (std::size_t i = 0; i < inputs_; ++i) {
     if (good[i] != 0 || state_.restored[i] == 0) {
       state_.temps_degC[i] = temps_degC[i];
-      // Good once and lost again within the settling time: the others were not recorded then.
+      // Good once and lost again within the settling time, when the others were not recorded.
       state_.known[i] = good[i];
       if (good[i] == 0) state_.lost[i] = 1;
-      // Restored values are of one moment; together they are the anchor.
+      // Restored values share one moment; together they are the anchor.
       if (state_.restored[i] == 0) state_.anchor_degC[i] = temps_degC[i];
       continue;
     }
     state_.lost[i] = 1;
     state_.known[i] = 1;
-    // Lost an unknown time ago: its drift counts as fully grown.
+    // The time of its loss is unknown, so its drift counts as fully grown.
     state_.lost_since[i] = nanoseconds::min() / 2;
     state_.temps_degC[i] = state_.anchor_degC[i];
   }
@@ -327,7 +328,7 @@ void LostBlocks::take_back(std::size_t input, double temp_degC) noexcept {
 
 void LostBlocks::change_pattern(nanoseconds now, std::span<const double> temps_degC,
                                 std::span<const std::uint8_t> good) noexcept {
-  // Carries the drift so far over.
+  // Adds the drift so far.
   const double drift = grown(now - state_.anchored_at, growth_.drift_time_s);
   for (std::size_t a = 0; a < state_.lost_count; ++a)
     for (std::size_t b = 0; b < state_.lost_count; ++b) {

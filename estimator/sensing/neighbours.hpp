@@ -38,9 +38,9 @@ struct ChangeAsked {
 ///     sd_i^2 = share a^2 (2 noise^2 + (d_i^2 g(age / drift_time) + s_i^2 g(age / scatter_time)) /
 ///              Q_ii) + floor^2,       g(h) = 1 - exp(-h),
 ///
-/// with the growth that the model file gives for estimates in hours that it was not made from. The
-/// error of a linear expectation is proportional to the motion: the change relative to those of the
-/// record is a = max(1, median of |x_j| / sqrt(2 C_jj)).
+/// with the growth that the model file gives for estimates in other hours than those of the record.
+/// The error of a linear expectation is proportional to the motion: the change relative to those of
+/// the record is a = max(1, median of |x_j| / sqrt(2 C_jj)).
 ///
 /// A wrong input also shifts the expectation of its neighbours. The wrong one is the input c
 /// without which no other remainder is left unexplained:
@@ -48,12 +48,12 @@ struct ChangeAsked {
 ///     y = Q x,   without c:  y_i - Q_ic y_c / Q_cc,   Q_ii - Q_ic^2 / Q_cc;
 ///
 /// or two inputs if one is not enough. None is named if three would be needed, or if another input
-/// explains as much: then the machine does what the record never showed, or the two cannot be
+/// explains as much: then the machine does something not in the record, or the two cannot be
 /// distinguished.
 /// Source: conditional distribution of a Gaussian vector by its precision matrix.
 class NeighbourCheck {
  public:
-  static constexpr std::size_t inputs_min = 3;  ///< the wrong one of two inputs cannot be found
+  static constexpr std::size_t inputs_min = 3;  ///< two inputs do not show which one is wrong
   static constexpr std::size_t wrong_max = 2;
 
   struct Wrong {

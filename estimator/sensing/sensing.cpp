@@ -46,7 +46,7 @@ Temperatures Sensing::step(nanoseconds now, std::span<const Reading> readings) n
   return join(now, suspect(now));
 }
 
-/// A waiting sensor must agree with the estimate of its lost input.
+/// Compares waiting sensors with the estimate of their lost input.
 void Sensing::weigh_waiting() noexcept {
   for (std::size_t i = 0; i < columns_.size(); ++i) {
     expected_degC_[i] = lost_.estimated(i) ? lost_.temps_degC()[i] : not_a_number;
@@ -268,8 +268,8 @@ void BlockBank::surround(std::span<const double> expected_degC,
   }
 }
 
-/// All channels that answer show one value, although their last good values differed, and one of
-/// them is not near its own: as from a module that answers before its first conversion.
+/// True if all channels that answer show one value, although their last good values differed, and
+/// one of them is far from its own: a module that answers before its first conversion.
 bool BlockBank::is_not_ready(const std::vector<std::size_t>& module) const noexcept {
   double least_degC = std::numeric_limits<double>::infinity();
   double most_degC = -least_degC;
@@ -278,7 +278,7 @@ bool BlockBank::is_not_ready(const std::vector<std::size_t>& module) const noexc
   for (const std::size_t i : module) {
     const Screening& screening = sensors_[i].screening;
     if (screening.usable(now_)) return false;
-    if (!screening.shows_unconfirmed()) continue;  // a fault of its own, such as an open circuit
+    if (!screening.shows_unconfirmed()) continue;  // another fault, such as an open circuit
     if (std::isnan(shown_degC)) shown_degC = screening.newest_degC();
     if (screening.newest_degC() != shown_degC) return false;
     if (!screening.has_good()) continue;

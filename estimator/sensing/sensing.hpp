@@ -29,7 +29,7 @@ class BlockBank {
   void read(nanoseconds now, std::span<const Reading> readings) noexcept;
   /// Number of sensors with an unconfirmed value.
   [[nodiscard]] std::size_t waiting() const noexcept { return waiting_; }
-  /// ... of these, after a jump.
+  /// Number of these after a jump.
   [[nodiscard]] std::size_t jumped() const noexcept { return jumped_; }
   /// Before read(), while values wait: the expectation from the other blocks.
   /// @param expected_degC, sd_K  of a column; NaN: no expectation
@@ -38,16 +38,16 @@ class BlockBank {
   void restore_jump(const std::string& name, double from_degC);
   /// Confirms the sensor's newest value. @return true if one was waiting
   bool accept(std::size_t sensor) noexcept;
-  /// Shape (columns): start of the last confirmed jump of a sensor, which shows that the values
-  /// before it were wrong; `never`: none.
+  /// Shape (columns): start of the last confirmed jump of a sensor, which refutes the values before
+  /// it; `never`: none.
   [[nodiscard]] std::span<const nanoseconds> refuted_at() const noexcept { return refuted_at_; }
   /// Screened values before smoothing; one per sensor, NaN: none.
   void screened(nanoseconds now, std::span<double> values_K) const noexcept;
   /// @param left_out  one per sensor: 1 excludes it; empty: all are used
   /// @return true if every column has a usable temperature
   bool join(std::span<const std::uint8_t> left_out) noexcept;
-  /// A sensor of the block is excluded: the block continues from `temp_degC`, and the deviations of
-  /// its other sensors count from there.
+  /// Call when a sensor of the block is excluded: the block continues from `temp_degC`, the
+  /// reference for the deviations of its other sensors.
   void continue_from(std::size_t column, double temp_degC) noexcept;
 
   /// Shape (columns): block temperatures; the last known one where not good, NaN before the first.
@@ -92,7 +92,7 @@ class BlockBank {
   /// Index of the reference sensor in the previous bank, or no_sensor.
   [[nodiscard]] int previous_reference(const Sensor& sensor) const noexcept;
   [[nodiscard]] bool update(Block& block, double& temp_degC) noexcept;
-  /// Mean of the remaining sensors, less their deviations. @return false if none remains
+  /// Sets the mean of the remaining sensors, less their deviations. @return false if none remains
   [[nodiscard]] bool update_without_the_missing(const Block& block,
                                                 double& temp_degC) const noexcept;
 
@@ -104,7 +104,7 @@ class BlockBank {
   std::vector<nanoseconds> refuted_at_;  ///< one per column
   std::vector<double> values_K_;         ///< of this step, one per sensor; NaN: not usable
   std::vector<double> kept_K_;           ///< scratch: the same, NaN where excluded
-  std::span<const double> in_use_K_;     ///< during join(), one of the two
+  std::span<const double> in_use_K_;     ///< one of the two, during join()
   std::vector<Block> blocks_;            ///< one per column
   std::vector<double> temps_degC_;
   std::vector<std::uint8_t> good_;
@@ -136,11 +136,11 @@ class Sensing {
   /// @param readings  one per sensor, order of the configuration (checked)
   [[nodiscard]] Temperatures step(nanoseconds now, std::span<const Reading> readings) noexcept;
 
-  /// Uses the excluded sensors after all, since their estimates are too uncertain.
+  /// Includes the excluded sensors again, since their estimates are too uncertain.
   /// @return the temperatures of this step, computed again
   [[nodiscard]] Temperatures use_all(nanoseconds now) noexcept;
   void accept(std::size_t sensor) noexcept;
-  /// A new reference: the present readings are right, and suspicions end.
+  /// A new reference: the present readings are taken as right, and suspicions end.
   void end_suspicions() noexcept;
 
   void report(std::span<SensorReport> sensors) const noexcept;

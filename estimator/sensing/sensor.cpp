@@ -12,14 +12,14 @@ namespace {
 
 /// Fastest change of a machine's structure over hours.
 constexpr double slow_K_per_ns = 10.0 / 3600.0 * 1e-9;
-/// Largest miss of a return, as a share of the jump: much nearer to the past than to the jump.
+/// Largest miss of a return, as a share of the jump.
 constexpr double return_share = 0.25;
-/// Largest standard deviation of an expectation that confirms, as a share of the allowance.
+/// Largest standard deviation, as a share of the allowance, of an expectation that can confirm.
 constexpr double expectation_share = 0.5;
-/// Standard deviations beyond which (and beyond the allowance) an expectation contradicts.
+/// An expectation contradicts beyond this many standard deviations and the allowance.
 constexpr double unexpected_sd = 2.5;
 
-/// Modules filter, and renew values once a second or less often: a change shows late, as a step.
+/// Modules filter, and renew values once a second or less often: a change appears late, as a step.
 constexpr nanoseconds shown_late_max = std::chrono::seconds{2};
 
 /// Half of min(), so that differences do not overflow.
@@ -57,7 +57,7 @@ bool Screening::take(nanoseconds now, const Reading& reading) noexcept {
   return false;
 }
 
-/// Fast path for most readings: near the one before, which was confirmed. Times are compared
+/// Fast path for most readings: near the previous one, which was confirmed. Times are compared
 /// without differences, which could overflow.
 bool Screening::is_continuous(nanoseconds now, const Reading& reading) const noexcept {
   return reading.fault == Fault::none && !state_.waiting && state_.good.known &&
@@ -73,7 +73,7 @@ Fault Screening::check(nanoseconds now, const Reading& reading) const noexcept {
   // Written so that NaN fails.
   if (!(reading.temp_degC >= config_.temp_degC_min && reading.temp_degC <= config_.temp_degC_max))
     return Fault::out_of_range;
-  // A time far ahead would make every later reading look old.
+  // A time far in the future would make every later reading look old.
   if (!(reading.taken_at >= now - stale_after_ && reading.taken_at <= now + stale_after_))
     return Fault::stale;
   // A late or duplicated reading has no new information.
@@ -113,7 +113,7 @@ Fault Screening::judge() noexcept {
   return Fault::none;
 }
 
-/// The newest value contradicts an earlier or an expected one.
+/// Reports a newest value that contradicts an earlier or expected one.
 Fault Screening::jump(double from_degC) noexcept {
   const nanoseconds at = state_.newest.at;
   if (!state_.jumped) {
@@ -157,7 +157,7 @@ double Screening::change_K(nanoseconds unread) const noexcept {
                   config_.outage_K_max + slow_K_per_ns * unread_ns);
 }
 
-/// True if the structure can have changed from the last confirmed value to the newest one.
+/// True if the structure can have reached the newest value from the last confirmed one.
 bool Screening::possible() const noexcept {
   const double off_K = std::abs(state_.newest.temp_degC - state_.good.temp_degC);
   const nanoseconds since_good = state_.newest.at - state_.good.at;
@@ -166,7 +166,7 @@ bool Screening::possible() const noexcept {
   const double shown_late_K = config_.rate_K_per_s_max * 1e-9 * static_cast<double>(late.count());
   const double allowed_K =
       config_.rate_allowance_K + std::max(change_K(state_.unread), shown_late_K);
-  // What was off by as much before an outage is not explained by it.
+  // An outage does not explain an error that was as large before it.
   const bool is_still_off = state_.jumped && off_K > config_.rate_allowance_K + shown_late_K &&
                             std::abs(off_K - state_.jump_K_max) <= config_.rate_allowance_K;
   if (off_K <= allowed_K && !is_still_off) return true;
@@ -189,7 +189,7 @@ bool Screening::expected() const noexcept {
              config_.rate_allowance_K;
 }
 
-/// False without an expectation.
+/// True if the expectation contradicts; false without one.
 bool Screening::unexpected() const noexcept {
   return std::abs(state_.newest.temp_degC - surroundings_.expected_degC) >
          std::max(config_.rate_allowance_K, unexpected_sd * surroundings_.expected_sd_K);
@@ -370,12 +370,12 @@ void Smoother::keep_screened(Form& form, const Sample& sample, double distance_K
   ++far_count_;
   if (far_count_ < agreeing_values) return;
   if (!agree(far_, far_K())) {
-    // The newest values may begin a run that agrees.
+    // The newest values may begin a consistent run.
     std::copy(far_.begin() + 1, far_.end(), far_.begin());
     --far_count_;
     return;
   }
-  // They agree: the temperature has changed, and the history restarts with them.
+  // Consistent: the temperature has changed, and the history restarts with these values.
   form.restart();
   for (const Sample& far : far_) form.keep(far);
   far_count_ = 0;

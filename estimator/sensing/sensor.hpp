@@ -48,11 +48,11 @@ struct SensorReport {
 ///
 ///     |T - T0| <= rate_allowance_K + max(rate min(t, 2 s), min(rate u, outage_K_max + 10 K/h u)),
 ///
-/// where t is the time since T0 while T0 is in use, and u the time in which *nothing* was read.
-/// Modules show a change late and as a step, hence the 2 s. A value that does not follow (a jump)
-/// adds nothing to u, however long it lasts: it is confirmed by the expectation of its neighbours,
-/// by an operator, or by its return to where T0 allows. After a jump J a return may miss by 10 K/h
-/// since its start, up to J / 4.
+/// where t is the time since T0 while T0 is in use, and u the time without *any* value. Modules
+/// show a change late and as a step, hence the 2 s. A value that does not follow (a jump) adds
+/// nothing to u, however long it lasts: it is confirmed by the expectation of its neighbours, by an
+/// operator, or by its return to the range that T0 allows. After a jump J, a return may miss by 10
+/// K/h since the jump's start, up to J / 4.
 ///
 /// After an outage, and at the start, a value is confirmed by consecutive readings over settle_s,
 /// at least settle_readings of them. An exact 0, or raw 0, does not settle: devices send it while
@@ -63,13 +63,13 @@ class Screening {
 
   explicit Screening(const ScreeningConfig& config);
 
-  /// @return true for a new good reading, which good_degC() and good_at() then give
+  /// @return true for a new good reading, available by good_degC() and good_at()
   bool look(nanoseconds now, const Reading& reading) noexcept {
     if (reading.taken_at == state_.seen_at && reading.fault == state_.seen_fault) return false;
     return take(now, reading);
   }
 
-  /// Context of the next readings. The expectation is NaN if nothing independent of this sensor
+  /// Context of the next readings. The expectation is NaN if no source independent of this sensor
   /// gives one.
   struct Surroundings {
     double expected_degC{not_a_number};
@@ -108,7 +108,7 @@ class Screening {
     return state_.jumped ? state_.jump_from_degC : not_a_number;
   }
   [[nodiscard]] nanoseconds jumped_at() const noexcept { return state_.jumped_at; }
-  /// The last confirmed value ended a jump without return: the values before it were wrong.
+  /// True if the last confirmed value ended a jump without return: the values before it were wrong.
   [[nodiscard]] bool refuted() const noexcept { return state_.refuted; }
   [[nodiscard]] double newest_degC() const noexcept { return state_.newest.temp_degC; }
   [[nodiscard]] bool has_good() const noexcept { return state_.good.known; }
@@ -189,7 +189,7 @@ class TemperatureRange {
   double degC_max_{not_a_number};
 };
 
-/// Kept references outside the range of their column, as text: "reference_degC.t1_degC = 1e+300
+/// Stored references outside the range of their column, as text: "reference_degC.t1_degC = 1e+300
 /// must be in ...".
 [[nodiscard]] std::vector<std::string> impossible_references(
     const EstimatorConfig& config, const std::vector<std::string>& columns,
@@ -344,8 +344,8 @@ class Smoother {
   [[nodiscard]] std::uint32_t clipped_in_a_row() const noexcept { return clipped_in_a_row_; }
   void visit_state(StateArchive& archive);
 
-  /// Number of consecutive values far outside that must agree, with each other or on one line, to
-  /// become the new history.
+  /// Consecutive values far outside that become the new history if they agree with each other or
+  /// lie on one line.
   static constexpr std::size_t agreeing_values = 3;
   /// Far outside: this many times the half-width or the robust spread, whichever is larger.
   static constexpr double far_factor = 3.0;

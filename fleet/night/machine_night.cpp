@@ -34,7 +34,7 @@ constexpr double probability_least = 1e-30;  ///< close to the smallest PostgreS
 constexpr int machines_min = 3;              ///< besides the one under test
 constexpr std::size_t sisters_max = 3 + 60;  ///< arguments of the command; more hardly improve S
 
-/// Offsets, sent or applied, are not inputs of a machine's displacement.
+/// True unless the column is an offset, sent or applied: not an input of a machine's displacement.
 bool is_column_of_run(const std::string& name) {
   return !name.ends_with("_offset_um") && !name.ends_with("_applied_um");
 }
@@ -120,7 +120,7 @@ std::string subject_text(const nlohmann::json& answer) {
   return "its residual is larger than its sisters'";
 }
 
-/// The last compared night was unusual too; a single unusual night happens by chance.
+/// True if the last compared night was unusual too; a single one happens by chance.
 bool was_unusual(pqxx::connection& store, const MachineNight& night) {
   pqxx::nontransaction work(store);
   const pqxx::result before = work.exec_params(

@@ -53,8 +53,8 @@ NightOutcome work_off(pqxx::connection& store, const MachineNight& night);
 /// Stores the failure with its reason; the next run retries.
 void note_failure(pqxx::connection& store, const MachineNight& night, const std::string& why);
 
-/// Makes the series of a type, of each machine's sisters and of its own past from the seven nights
-/// before `night`, if the type's series is older than a week. A machine's own past is made once.
+/// If the type's series is older than a week, makes the series of the type and of each machine's
+/// sisters from the seven nights before `night`. The series of a machine's own past is made once.
 void make_series(pqxx::connection& store, const std::string& type, const std::string& night);
 
 }  // namespace thermocomp::fleet

@@ -1,5 +1,5 @@
 /// Exchange of releases between the store and `thermocomp admit`: offers in one direction, steps in
-/// the other. It decides nothing and needs no access to the daemon's socket.
+/// the other. Makes no decisions and needs no access to the daemon's socket.
 #pragma once
 
 #include <filesystem>

@@ -135,7 +135,7 @@ int MachineRows::setup_number(pqxx::work& work, const MeansBatch& batch) {
   return find().at(0)[0].as<int>();
 }
 
-/// Whether the store has another position than this sender left.
+/// True if the store's position differs from that left by this sender.
 bool MachineRows::is_moved(pqxx::work& work) const {
   const pqxx::result found = work.exec_params(
       "SELECT segment, segment_wall_ns, cycle FROM fleet.uplink WHERE machine = $1 AND history = "

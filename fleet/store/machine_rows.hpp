@@ -25,7 +25,7 @@ struct Taken {
   std::uint64_t sent{0};
   std::uint64_t refused{0};   ///< impossible time
   std::uint64_t repeated{0};  ///< time already present
-  bool by_another{false};     ///< somebody else has sent of this history since the last send()
+  bool by_another{false};     ///< another sender has sent from this history since the last send()
 };
 
 class MachineRows {

@@ -167,8 +167,8 @@ struct LoadOptions {
   std::string model;
 };
 
-/// Whether the column is measured displacement: of an export, not the offsets of each row nor the
-/// values as entered.
+/// True if the column is measured displacement: of an export, neither the offsets of each row nor
+/// the values as entered.
 bool is_probed(const std::string& column) {
   return is_output(column) && !column.ends_with("_offset_um") && !column.ends_with("_applied_um") &&
          !column.ends_with("_measured_um");

@@ -41,11 +41,11 @@ class Uplink {
  public:
   Uplink(const UplinkSettings& settings, Pace& pace);
 
-  /// Sends new data of all histories; one that cannot be read is reported and does not stop the
-  /// others. After an error the next call reconnects and resumes.
-  /// @return there was new data. @throws pqxx::failure, std::runtime_error, Stopped
+  /// Sends new data of all histories; an unreadable one is reported and does not stop the others.
+  /// After an error the next call reconnects and resumes.
+  /// @return true if there was new data. @throws pqxx::failure, std::runtime_error, Stopped
   bool send_new();
-  /// At the last send_new().
+  /// True if all histories were readable at the last send_new().
   [[nodiscard]] bool all_readable() const noexcept;
   /// Closes the connection; the next send_new() reconnects.
   void hang_up() noexcept;
@@ -58,7 +58,7 @@ class Uplink {
     std::int64_t event_run{0};
     std::uint64_t event_number{0};
     bool by_another{false};  ///< reported that another uplink sends it, too
-    std::string error;       ///< why the history cannot be read; empty: it can
+    std::string error;       ///< reason why the history cannot be read; empty: readable
   };
   bool send_if_readable(Source& source);
   bool send_new(Source& source);

@@ -10,10 +10,10 @@
 namespace thermocomp::gateway {
 namespace {
 
-/// Values are confirmed and the link is made within this, with the default settle_s.
+/// Duration of a start, with the default settle_s: values are confirmed and the link is up.
 constexpr double beginning_s = 60.0;
 
-/// Normal at start-up, while the values are not yet valid for long enough.
+/// True at start-up, while values are not yet confirmed.
 bool begins(const Status& status) {
   double settle_s = 0.0;
   for (const Confirmation& values : status.confirming)

@@ -15,13 +15,13 @@ struct AlarmCondition {
   std::string name;  ///< "compensation", "sensor/bed_front", "suspected/bed_front", "bound/z",
                      ///< "domain", "bus/cabinet", "unit/bed", "frozen/bed", "daemon"
   std::string text;
-  std::string remedy;  ///< what to do; empty: unknown
+  std::string remedy;  ///< empty: unknown
 };
 
-/// Conditions present in a snapshot. While the daemon is away: that condition only.
+/// Conditions present in a snapshot. While the daemon is away: only that one.
 [[nodiscard]] std::vector<AlarmCondition> active_conditions(const Snapshot& snapshot);
 
-/// False while the daemon is away or begins: an alarm raised before is neither over nor not.
+/// False while the daemon is away or starts: the state of a raised alarm is then unknown.
 [[nodiscard]] bool is_judged(const Snapshot& snapshot);
 
 struct Alarm {

@@ -80,7 +80,8 @@ struct HookRunner::Parts {
 
   const GatewaySettings& settings;
   HookLimit limit;
-  HookLimit limit_of_loss;  ///< a flapping bus must not use up what tells of the compensation's end
+  HookLimit limit_of_loss;  ///< separate limit, so that a flapping bus cannot suppress the report
+                            ///< that the compensation has ended
   std::size_t dropped{0};   ///< since the limit was reached
   std::mutex mutex;
   std::condition_variable changed;

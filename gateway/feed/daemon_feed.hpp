@@ -11,7 +11,7 @@
 
 namespace thermocomp::gateway {
 
-/// Receives status and sensors twice a second, events when there are new ones. After 1.5 s of
+/// Receives status and sensors twice a second, and events when there are new ones. After 1.5 s of
 /// silence the daemon counts as away, with a snapshot every second.
 class DaemonFeed {
  public:
@@ -29,7 +29,7 @@ class DaemonFeed {
 
   /// The daemon counts as away if there was no snapshot for follows_within.
   [[nodiscard]] SnapshotPointer newest() const;
-  /// False if the feed's thread stands still.
+  /// False if the feed's thread hangs.
   [[nodiscard]] bool follows() const;
   static constexpr std::chrono::seconds follows_within{10};
   /// History file from the configuration, else from the daemon; empty: unknown.

@@ -22,7 +22,7 @@ constexpr double near_s = 5.0;
 constexpr double unknown_end_s = std::numeric_limits<double>::infinity();
 
 /// Causes come before their effects: a link before its sensors, these before inputs of the model
-/// and reasons, all of them and commands before the mode.
+/// and reasons, all of these and commands before the mode.
 enum class Rank { link, sensor, input, order, mode, alone };
 
 Rank rank_of(const Event& event) {

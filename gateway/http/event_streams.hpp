@@ -1,5 +1,5 @@
-/// Server-sent events to any number of pages. Each page gets the newest state once it has taken the
-/// previous one: a slow page skips states and costs no memory.
+/// Server-sent events to any number of pages. Each page gets the newest state after it has taken
+/// the previous one: a slow page skips states and needs no memory.
 #pragma once
 
 #include <cstddef>

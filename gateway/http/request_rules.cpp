@@ -93,7 +93,7 @@ std::optional<Refusal> judge_request(const RequestFacts& request, const HostRule
   if (request.path.empty() || request.path.front() != '/')
     return Refusal{400, "the path must begin with /"};
   if (request.hosts_given != 1) return Refusal{400, "exactly one header Host is required"};
-  // If a proxy uses another length than libmicrohttpd, the rest is parsed as someone else's
+  // If a proxy uses another length than libmicrohttpd, the rest is parsed as another client's
   // request.
   if (request.lengths_given > 1) return Refusal{400, "the length of a body must be given once"};
   if (!hosts.allows(request.host))

@@ -43,7 +43,7 @@ class HostRules {
 /// Host without port and IPv6 brackets; nullopt: malformed.
 [[nodiscard]] std::optional<std::string> host_name(std::string_view host);
 
-/// @return why the request is refused; nullopt: accepted
+/// @return reason for refusing the request; nullopt: accepted
 [[nodiscard]] std::optional<Refusal> judge_request(const RequestFacts& request,
                                                    const HostRules& hosts);
 
@@ -61,7 +61,7 @@ struct HistoryRequest {
                                                                   double now_s, std::string& why);
 
 /// Closes slow connections. libmicrohttpd closes a silent one; a peer that sends or takes a byte
-/// now and then would otherwise keep its place forever.
+/// now and then would otherwise keep its place for ever.
 class SlowConnections {
  public:
   using Clock = std::chrono::steady_clock;
@@ -70,8 +70,8 @@ class SlowConnections {
   /// The same while all places are taken.
   static constexpr std::chrono::seconds request_max_when_full{3};
   static constexpr std::chrono::seconds answer_max_when_full{10};
-  /// Bytes of a stream that the peer has not taken: above this it is closed at once; between the
-  /// normal amount in transit and this, after the time of an answer.
+  /// Bytes of a stream that the peer has not taken. Above this limit it is closed at once; between
+  /// the usual amount in transit and this limit, after the time of an answer.
   static constexpr std::size_t untaken_bytes_max = std::size_t{64} * 1024;
 
   enum class Stage { request, answer, stream };

@@ -251,7 +251,7 @@ void MqttPublisher::show(const SnapshotPointer& snapshot) {
     // The status (first) is sent at once, the others once per period.
     if (i > 0 && !is_due) return;
     nlohmann::json& last_state = parts_->last_state[states[i].topic];
-    // A broker keeps the newest status for as long as it likes: its time must show that it is old.
+    // A broker may keep the newest status for any time, so its time must show its age.
     const double status_age_s = snapshot->wall_s - parts_->status_at_s;
     const bool repeats = i == 0 && parts_->is_connected &&
                          !(status_age_s >= 0.0 && status_age_s < status_every_s - early_s);

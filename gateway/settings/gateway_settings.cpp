@@ -45,8 +45,7 @@ void read_text(const fs::path& file) {
   static_cast<void>(read_text_file(file));
 }
 
-/// The same for a file that must exist and that `read` accepts, since start-up would fail
-/// otherwise.
+/// The same for a file that must exist and be accepted by `read`; otherwise start-up would fail.
 fs::path existing_in(const TomlTable& table, std::string_view key, const fs::path& folder,
                      ReadFile read) {
   fs::path named = path_in(table, key, folder);

@@ -65,8 +65,8 @@ ThermalModel corrected(ThermalModel model, const std::vector<Eigen::VectorXd>& e
   return model;
 }
 
-/// Takes the fitted coefficients of the outputs that they and the finding leave no worse on the
-/// test runs. Fitted beside a finding of approximate form they fit its error, and are wrong
+/// Takes the fitted coefficients of outputs that are no worse with them and the finding on the test
+/// runs. Fitted with a finding of approximate form, coefficients fit its error, which is wrong
 /// elsewhere.
 void take_coefficients(Extended& longer, const ThermalModel& fitted, const Extended& before,
                        const MeasuredData& test) {
@@ -78,8 +78,8 @@ void take_coefficients(Extended& longer, const ThermalModel& fitted, const Exten
       longer.model.matrix_um_per_K[output] = before.model.matrix_um_per_K[output];
 }
 
-/// Extends the model by one finding after another and measures the gain of each; an output takes
-/// the coefficients fitted jointly with all findings as soon as they leave it no worse. A finding
+/// Extends the model by one finding after another and measures the gain of each. An output takes
+/// the coefficients fitted jointly with all findings as soon as it is no worse with them. A finding
 /// that the test runs contradict is reported, not added.
 Extended extend(Diagnosis& diagnosis, const SearchResult& result, const MeasuredData& train,
                 const MeasuredData& test) {

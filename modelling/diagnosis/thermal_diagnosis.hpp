@@ -34,10 +34,10 @@ using NetworkView = std::function<void(const ThermalRuns&, const HeatNetwork&, c
 
 /// Multiplies films, conductances, capacities and heats by their factors, and adds missing sources
 /// and lags of thermocouples. Findings without a key become comments at the top; comments of the
-/// file are lost. A signal that only a missing source uses is added with the constant value 0.
+/// file are lost. A signal used only by a missing source is added with the constant value 0.
 /// @param path  a machine file that load_thermal_plant() accepts
-/// @return the file's text; nothing where the machine is a body, whose matrices are not edited
-/// @throws toml::parse_error when the file has become unreadable since
+/// @return the file's text; none for a body, whose matrices are not edited
+/// @throws toml::parse_error if the file has become unreadable
 [[nodiscard]] std::optional<std::string> corrected_machine(
     const std::filesystem::path& path, const std::vector<NamedFinding>& findings);
 

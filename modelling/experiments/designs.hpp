@@ -1,6 +1,6 @@
 /// Designs of tests by factors and levels. Orthogonal arrays L4, L8, L9, L12, L16, L18 and L27:
-/// levels of any two columns combine equally often. All-pairs plans: all pairs of levels of two
-/// factors occur in some test, unless forbidden.
+/// levels of any two columns combine equally often. All-pairs plans: every pair of levels of two
+/// factors occurs in some test, unless forbidden.
 #pragma once
 
 #include <cstddef>
@@ -54,7 +54,7 @@ class Constraints {
 
   [[nodiscard]] bool empty() const noexcept { return forbidden_.empty(); }
   [[nodiscard]] const std::vector<int>& level_counts() const noexcept { return level_counts_; }
-  /// The row's set levels contain no forbidden combination.
+  /// True if the row's set levels contain no forbidden combination.
   [[nodiscard]] bool kept_by(const std::vector<int>& row) const noexcept;
   /// The row with its open levels filled in; empty if impossible.
   /// @throws std::runtime_error if the search takes more than a million steps

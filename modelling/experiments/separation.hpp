@@ -30,7 +30,7 @@ struct Separation {
 /// of squares S so far (unit^2 h), the largest recorded range A of the moved column within a run,
 /// its largest recorded change v within an hour, and b at rest:
 ///
-///     D = S_aa (r^2 / c^2 - 1)              what a must add by itself
+///     D = S_aa (r^2 / c^2 - 1)              additional sum of squares of a
 ///     a signal, half of the time up         t = 4 D / A^2
 ///     a temperature, up and down at v       t = (48 D / v^2)^(1/3)   while v t / 2 <= A,
 ///                                           t = 12 D / A^2           else: several times

@@ -49,7 +49,7 @@ struct Options {
   double drift_percent{5.0};
   double years{-1.0};  ///< negative: not given
 
-  /// An option that only applies to few-sensor equations was given.
+  /// True if an option was given that only applies to few-sensor equations.
   [[nodiscard]] bool few_asked_for() const {
     return terms_given || free_choice || lags || threshold >= 0 || sensor_error_K >= 0;
   }
@@ -116,7 +116,7 @@ int run_few(const Options& options, const MeasuredTests& tests, const FitOptions
   const Fit fit = fit_equation(tests, fit_options);
   cli::write_file(options.model, model_text(options, model_of(tests, fit)));
   if (!options.report.empty()) cli::write_file(options.report, fit_html(tests, fit));
-  // A model on standard output must not be mixed with other text.
+  // A model on standard output must not be mixed with text.
   if (options.model == "-") return 0;
   cli::write_file("-", options.json ? fit_json(tests, fit) : fit_text(tests, fit));
   return 0;
@@ -181,7 +181,7 @@ int run_prior(const Options& options, const std::vector<RunFile>& runs, const Me
   return 0;
 }
 
-/// JP7689460B2 chooses among places on the machine, so the room temperature is excluded.
+/// JP7689460B2 chooses among places on the machine, without the room temperature.
 void leave_out_room(const std::vector<RunFile>& runs, TestOptions& options) {
   for (const std::string& column : runs.front().columns) {
     if (!is_temperature(column)) continue;
@@ -194,7 +194,7 @@ void leave_out_room(const std::vector<RunFile>& runs, TestOptions& options) {
   }
 }
 
-/// Leaves out temperatures that the model of --like does not have: its daemon may not have them.
+/// Leaves out temperatures that the model of --like lacks, since its daemon may lack them.
 void leave_out_foreign(const ThermalModel& like, const std::vector<RunFile>& runs,
                        TestOptions& options) {
   const std::vector<std::string> known = like.temperature_columns();

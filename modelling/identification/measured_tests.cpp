@@ -73,8 +73,8 @@ double spike_limit_K(const std::vector<double>& values) {
 }
 
 /// Replaces by NaN spikes, which are faster than any structure, and values beyond the reading's
-/// range: of an open sensor, and at an end of the run, where the first row is the reference of all
-/// rises and a smaller spike looks like a heater that was just switched on.
+/// range: of an open sensor, and at an end of the run. The first row is the reference of all rises,
+/// where a smaller spike looks like a heater that was just switched on.
 void leave_out_spikes(RunFile& run, std::vector<std::string>& notes) {
   for (std::size_t i = 0; i < run.columns.size() && run.rows() >= near; ++i) {
     if (!is_temperature(run.columns[i])) continue;
@@ -201,8 +201,8 @@ TestRun make_run(const RunFile& run, const std::vector<std::string>& places,
   return test;
 }
 
-/// Moves displacements that were probed one after another, as each axis is entered by itself, into
-/// the last row of their set: only rows with every output are fitted.
+/// Moves displacements that were probed one after another, each axis separately, into the last row
+/// of their set, since only rows with every output are fitted.
 void gather_probings(RunFile& run, const std::vector<std::string>& outputs,
                      std::vector<std::string>& notes) {
   constexpr double set_s_max = 120.0;
@@ -341,7 +341,7 @@ bool is_constant(const MeasuredTests& tests, std::size_t signal) {
 
 /// Course of a signal over the selected rows of all runs.
 struct Ways {
-  int count{0};              ///< how often it goes up or down
+  int count{0};              ///< number of rises and falls
   double largest_step{0.0};  ///< between two rows, as a share of its range
 };
 

@@ -36,14 +36,14 @@ constexpr int findings_max = 12;  // removed one after another
 constexpr double taken_out_score_min = 5.0;
 // Strongest candidate of the median column on a calm machine.
 constexpr double usual_level = 3.0;
-/// Exchanged readings agree with the other runs if they are at most so many times as far from them
-/// as these from each other.
+/// Exchanged readings agree with the other runs if their distance from them is at most this
+/// multiple of the distances between those.
 constexpr double alike_max = 2.0;
 constexpr double loose_gain_max = 0.9;
 constexpr double loose_gain_min = -0.3;
-// A signal explains a step if, within so many rows of it, it changes by more than this share of its
-// range and by more than so many times its usual change: the current of a battery cell that is
-// discharged at a constant rate has no range but its noise.
+// A signal explains a step if, within this number of rows, it changes by more than this share of
+// its range and this multiple of its usual change: the current of a battery cell that is discharged
+// at a constant rate has only noise as its range.
 constexpr Index operated_reach = 3;
 constexpr double operated_share = 0.05;
 constexpr double times_usual = 3.0;  ///< also for the column itself, see is_sudden()
@@ -187,8 +187,8 @@ class ChangeSearch {
     }
   }
 
-  /// The candidate that stands out most from the other columns' candidates of the same kind, since
-  /// on a machine where every place wanders, wandering is no fault.
+  /// The candidate that stands out most from the other columns' candidates of the same kind: on a
+  /// machine where every place wanders, wandering is not a fault.
   [[nodiscard]] std::optional<Suspicion> likeliest() const {
     std::optional<Suspicion> best;
     for (const Suspicion& offer : offers_) {
@@ -247,7 +247,7 @@ class ChangeSearch {
     });
   }
 
-  /// A signal changed nearby, so the machine moved, not the sensor.
+  /// True if a signal changed nearby, so the machine moved, not the sensor.
   [[nodiscard]] bool is_operated(Index row, std::size_t run, Index reach = operated_reach) const {
     const Index first = std::max(recording_.begins[run], row - reach);
     const Index last = std::min(recording_.begins[run + 1] - 1, row + reach);
@@ -281,7 +281,7 @@ class ChangeSearch {
     return recording_.after_gap.col(column).segment(first, last - first + 1).any();
   }
 
-  /// No nearby step reverses it by half or more.
+  /// True if no nearby step reverses it by half or more.
   static bool stays(const std::vector<Expectation::Evidence>& steps, std::size_t at) {
     constexpr std::size_t near = 60;
     const std::size_t begin = at < near ? 0 : at - near;
@@ -291,8 +291,9 @@ class ChangeSearch {
         [&](const auto& other) { return other.size / steps[at].size < -0.5; });
   }
 
-  /// The column itself jumps: by at least half the size within two rows, by several times the usual
-  /// change of the surrounding rows, and not as steeply three rows away, unlike a heater's ramp.
+  /// True if the column itself jumps: by at least half the size within two rows, by several times
+  /// the usual change of the surrounding rows, and more steeply than three rows away, unlike a
+  /// heater's ramp.
   [[nodiscard]] bool is_sudden(const Judged& judged, const Target& target, std::size_t run,
                                Index row, double size) const {
     constexpr Index beside = 15;

@@ -31,20 +31,20 @@ void check_spikes(RunFile& run, std::size_t index, Suspicions& found);
 /// that duplicate another.
 void check_values(const std::vector<RunFile>& runs, Suspicions& found);
 
-/// Compares each reading with its expectation from the others: steps, drift, loosening of
-/// temperatures; steps of displacements. Findings are removed from `recording` and the rest is
+/// Compares each reading with its expectation from the others: steps, drift and loosening of
+/// temperatures, steps of displacements. Findings are removed from `recording` and the rest is
 /// checked again, so that a sensor's fault is not attributed to its neighbours.
 enum class Looked { all, displacements };
 void check_changes(Recording recording, Looked looked, Suspicions& found,
                    const std::function<void(double)>& progress);
-/// Pairs of readings that agree with the other runs only if exchanged.
+/// Finds pairs of readings that agree with the other runs only if exchanged.
 void check_exchanged(const Recording& recording, Suspicions& found);
 
 [[nodiscard]] std::vector<std::vector<std::string>> groups_of(const Recording& recording);
 /// Fills `excited` and `experiments`.
 void judge_excitation(const Recording& recording, Inspection& inspection);
 
-/// Writes `text`.
+/// Fills `text`.
 void describe(Finding& finding, const std::vector<RunFile>& runs);
 
 }  // namespace thermocomp::inspection

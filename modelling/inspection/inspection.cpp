@@ -93,7 +93,7 @@ RunFile selected_part(RunFile run, const std::vector<std::string>& outputs) {
 }
 
 /// The run without values that hide or imitate changes: outliers, which are added to `found`, and
-/// stuck displacements, whose leap at the end looks like another zero.
+/// stuck displacements, whose jump at the end resembles a new zero.
 RunFile without_blunders(RunFile run, std::size_t index, Suspicions& found) {
   check_spikes(run, index, found);
   std::vector<std::string> outputs = run.columns;

@@ -9,12 +9,12 @@
 namespace thermocomp::inspection {
 namespace {
 
-/// Rows closer in time are of a program that writes on events, too.
+/// Programs that write on events also produce rows closer in time.
 constexpr double set_back_s_min = 10.0;
 constexpr double hour_s = 3600.0;
 
-/// The temperatures continue over a row as if no time had passed: each changes by at most five
-/// times its usual change per row.
+/// True if the temperatures continue over a row as if no time had passed: each changes by at most
+/// five times its usual change per row.
 bool continues_over(const RunFile& run, std::size_t row) {
   std::size_t judged = 0;
   for (std::size_t i = 0; i < run.columns.size(); ++i) {
@@ -46,7 +46,7 @@ std::vector<Span> gaps_of(const RunFile& run, const std::vector<double>& column)
   return gaps;
 }
 
-/// The column has values in at least half of the rows, unlike occasional probings.
+/// True if the column has values in at least half of the rows, unlike occasional probings.
 bool is_dense(const RunFile& run, std::size_t column) {
   const std::vector<double>& values = run.values[column];
   const auto count = std::count_if(values.begin(), values.end(),
@@ -128,7 +128,8 @@ void check_clock(const RunFile& run, std::size_t index, const RunSampling& sampl
     const double hours = std::round(jump_s / hour_s);
     const bool whole_hours = hours >= 1 && std::abs(jump_s - hours * hour_s) <= 2 * sampling.step_s;
     const bool set_forward = gap && regular && whole_hours && continues_over(run, i + 1);
-    // Set back by less than a row, not a row in between: the rows after it are off the grid, too.
+    // If set back by less than a row, without a row in between, the rows after it are off the grid
+    // too.
     const double over_two_s = i > 0 && i + 1 < steps.size() ? steps[i - 1] + steps[i] + steps[i + 1]
                                                             : 2.0 * sampling.step_s;
     const bool is_row_between =

@@ -41,7 +41,8 @@ Suspicion suspicion(const std::string& kind, const std::string& column, std::siz
   return made;
 }
 
-/// Another temperature jumps likewise in that row, so the place changed, not the sensor.
+/// True if another temperature jumps likewise in that row, so that the place changed, not the
+/// sensor.
 bool others_leap(const RunFile& run, std::size_t column, std::size_t row, double leap) {
   for (std::size_t i = 0; i < run.columns.size(); ++i) {
     if (i == column || !is_temperature(run.columns[i])) continue;
@@ -51,7 +52,7 @@ bool others_leap(const RunFile& run, std::size_t column, std::size_t row, double
   return false;
 }
 
-/// The column returns: it changes by less than the jump.
+/// True if the column returns: it changes by less than the jump.
 bool returns(const std::vector<double>& values, std::size_t row, double leap) {
   const auto at = values.begin() + static_cast<std::ptrdiff_t>(row);
   const auto before = static_cast<std::ptrdiff_t>(std::min(half_window, row));
@@ -59,7 +60,7 @@ bool returns(const std::vector<double>& values, std::size_t row, double leap) {
   return std::abs(median({at + 1, at + 1 + after}) - median({at - before, at})) < std::abs(leap);
 }
 
-/// The value is on a line through those before it or after it: a corner of the course.
+/// True if the value is on a line through those before or after it: a corner of the course.
 bool continues(const std::vector<double>& values, std::size_t row, double leap) {
   for (const bool after : {false, true}) {
     const double off = values[row] - line_beside(values, row, half_window, after);
@@ -68,9 +69,9 @@ bool continues(const std::vector<double>& values, std::size_t row, double leap) 
   return false;
 }
 
-/// Deviation of the noise in the `reach` rows on each side: the larger of what the distances from
-/// the median of the neighbours, which is 0 on a slope, and the second differences show. One
-/// outlier is in three of these: they need more rows.
+/// Standard deviation of the noise in the `reach` rows on each side: the larger of the estimates
+/// from the distances to the neighbours' median, which is 0 on a slope, and from second
+/// differences. One outlier affects three of the latter, which therefore need more rows.
 double noise(const std::vector<double>& leaps, const std::vector<double>& bends, std::size_t row,
              std::size_t reach) {
   const std::size_t begin = row - std::min(reach, row);
@@ -175,7 +176,8 @@ double range_of(const std::vector<double>& values, StillRows rows) {
   return high > low ? high - low : 0.0;
 }
 
-/// A signal has the same value throughout: the reading is at a setpoint. 0 is too common to count.
+/// True if a signal has the same value throughout: the reading is at a setpoint. 0 is too common to
+/// count.
 bool is_held(const RunFile& run, std::size_t column, StillRows rows) {
   const double value = run.values[column][rows.begin];
   return value != 0 && std::any_of(run.columns.begin(), run.columns.end(), [&](const auto& name) {
@@ -202,7 +204,7 @@ void check_stuck(const RunFile& run, std::size_t index, std::size_t column, Susp
   }
   if (others.empty()) return;
   const double moved = median(others);
-  // A reading that works moves by the same share of its range as the others do of theirs.
+  // A working reading moves by the same share of its range as the others do of theirs.
   const double expected = throughout ? *std::min_element(others.begin(), others.end())
                                      : median(shares) * range_of(run.values[column], all);
   if (!(moved > others_moved_K_min) || !(expected > stuck_steps_min * step_K)) return;
@@ -234,12 +236,12 @@ double first_value(const std::vector<double>& values) {
   return found == values.end() ? std::numeric_limits<double>::quiet_NaN() : *found;
 }
 
-/// A reading of more than 200 degC, its drop-outs left out, that begins where the others begin once
-/// it counts as kelvin.
+/// Checks a reading of more than 200 degC, without its drop-outs: in kelvin it would begin like the
+/// others.
 void check_unit(const RunFile& run, std::size_t index, std::size_t column, Suspicions& found) {
   constexpr double hot_degC = 200.0;
   constexpr double near_K = 5.0;
-  constexpr std::ptrdiff_t drop_outs = 20;  // at most one in so many
+  constexpr std::ptrdiff_t drop_outs = 20;  // at most one in this number of rows
   const auto is_cool = [](double value) { return value <= hot_degC; };
   const std::vector<double>& values = run.values[column];
   const auto cool = std::count_if(values.begin(), values.end(), is_cool);

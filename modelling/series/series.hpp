@@ -67,10 +67,10 @@ struct PriorJudgement {
   std::vector<double> own_um;    ///< the machine's own fit
   std::vector<double> none_um;
 
-  /// False unless the prior leaves a tenth less than no model, in geometric mean of the outputs.
+  /// True if the prior leaves a tenth less than no model, in geometric mean of the outputs.
   [[nodiscard]] bool holds() const;
-  /// A reason to compare the two later, not to choose: all four measured machines with this result
-  /// on the first part of a run had the smaller error with the prior on the rest.
+  /// Reason to compare the two later, not to choose: all four measured machines with this result on
+  /// the first part of a run had the smaller error with the prior on the rest.
   [[nodiscard]] bool own_is_better() const;
   [[nodiscard]] std::string text(const std::vector<std::string>& outputs) const;
 };

@@ -176,8 +176,8 @@ void SmoothCourse::place_windows(std::span<const double> breaks_s) {
   block_ = longest;
 }
 
-/// Residuals in units of a single value's noise. Smoothing removes part of the noise, by the weight
-/// of a value in its own window; the scale corrects this. Unsmoothed: second differences.
+/// Residuals in units of a single value's noise. The scale corrects for the noise that smoothing
+/// removes, by the weight of a value in its own window. Unsmoothed: second differences.
 void SmoothCourse::keep_what_is_left(double noise) {
   if (!smoothed_) {
     left_ = second_differences(time_s_, raw_);

@@ -100,8 +100,8 @@ bool has_a_course(const RunFile& run, const std::string& column) {
   return count >= 2;
 }
 
-/// The column named like an axis: measured at the tool, or a displacement. Skips columns without a
-/// course: a history has columns of all axes, measured or not.
+/// The column named like an axis: measured at the tool, or a displacement. Columns without a course
+/// are skipped, since a history has columns of all axes, measured or not.
 std::optional<std::string> column_called(const RunFile& run, const std::string& axis) {
   for (const char* end : {"_measured_um", "_um", "_measured_urad", "_urad"})
     for (const std::string& column : run.columns) {

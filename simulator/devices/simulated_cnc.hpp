@@ -38,9 +38,9 @@ struct CncOrder {
 };
 
 /// An axis takes a new offset while its valid bit is set, the offset is within the controller's
-/// bound and the heartbeat has changed within its timeout; else the applied offset holds. The
-/// applied offset follows with a time constant and a slew limit. The nodes of a travel are taken
-/// all or none, and the tool follows the interpolation at the slide's position.
+/// bound and the heartbeat has changed within its timeout; else it keeps the applied offset. The
+/// applied offset follows with a time constant and a slew limit. The nodes of a travel are taken as
+/// a whole or not at all, and the tool follows the interpolation at the slide's position.
 class SimulatedCnc {
  public:
   explicit SimulatedCnc(const SimulatedController& config);

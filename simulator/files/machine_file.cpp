@@ -34,7 +34,7 @@ SimulatedStatus read_simulated_status(const TomlTable& table) {
 
 CanStatusCodes read_can_status_codes(const TomlTable& table) {
   CanStatusCodes status;
-  status.codes = read_fault_codes(table, INT64_MIN, INT64_MAX);  // limited by the place's reader
+  status.codes = read_fault_codes(table, INT64_MIN, INT64_MAX);  // checked by the place's reader
   const auto good = table.integers("good_codes", INT64_MIN, INT64_MAX, std::vector<std::int64_t>{});
   if (!good.empty()) status.good = good.front();
   return status;

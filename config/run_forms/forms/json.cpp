@@ -92,7 +92,7 @@ PlainTable plain_store(const Log& log, const json& store) {
 
 // ---- records
 
-/// The first member of one of these names; null: none.
+/// The first member with one of these names; null: none.
 json first_of(const json& object, std::initializer_list<const char*> names) {
   for (const char* name : names)
     if (object.is_object() && object.contains(name)) return object[name];
@@ -159,7 +159,7 @@ class Records {
       set(name, in_quotes(value.get<std::string>()));
   }
 
-  /// The elements are called as they say themselves, else by their number.
+  /// Names each element by its own name, else by its number.
   void add_list(const std::string& name, const json& list) {
     bool has_names = !list.empty();
     std::set<std::string> seen;

@@ -85,8 +85,8 @@ std::string words_of(std::string_view text) {
   return words;
 }
 
-/// Refuses lines of equal names that differ in other words, each again and again: they may be of
-/// several sensors.
+/// Refuses lines of equal names with differing words that all recur: they may be of several
+/// sensors.
 class WordsBesideNames {
  public:
   void add(const Log& log, int line, const Labelled& found) {

@@ -1,9 +1,9 @@
 /// Lossless compression of records into the bytes of one chunk.
 ///
-/// A record is: kind, detail, cycle (difference to the previous record), index, time (difference to
-/// the last one of its kind), value (XOR with the last one of its kind and index: a byte with the
-/// numbers of zero bytes at either end, then the bytes between). A typical reading takes 15 bytes
-/// instead of 32. Each chunk can be read without the others.
+/// A record is: kind, detail, cycle (difference from the previous record), index, time (difference
+/// from the last one of its kind), value (XOR with the last one of its kind and index: a byte with
+/// the numbers of zero bytes at either end, then the bytes between). A typical reading takes 15
+/// bytes instead of 32. Each chunk can be read alone.
 #pragma once
 
 #include <array>
@@ -117,7 +117,7 @@ class ChunkDecoder {
   ChunkDecoder(std::vector<std::byte> bytes, std::uint64_t count);
   ChunkDecoder(const ChunkDecoder&) = delete;
   ChunkDecoder& operator=(const ChunkDecoder&) = delete;
-  /// @return false when all `count` records were read
+  /// @return false after all `count` records
   /// @throws HistoryError when the bytes are not an encoder's output
   bool next(Record& out);
 
@@ -128,12 +128,12 @@ class ChunkDecoder {
   std::uint64_t left_;
 };
 
-/// Plausibility of a time on the daemon's grid: not before system start, nor centuries later.
+/// True if a time on the daemon's grid is plausible: not before system start, nor centuries later.
 [[nodiscard]] constexpr bool is_grid_time(std::int64_t time_ns) noexcept {
   return time_ns >= 0 && time_ns <= (std::int64_t{1} << 61);
 }
 
-/// Appends a checksum: loading the estimator's state trusts the counts and indices in it, so bytes
+/// Appends a checksum: loading the estimator's state relies on its counts and indices, so bytes
 /// changed on disk must be refused.
 void add_seal(std::vector<std::byte>& bytes);
 /// Removes the checksum. @throws HistoryError when it does not match

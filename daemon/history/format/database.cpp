@@ -49,7 +49,7 @@ std::filesystem::path followed(const std::filesystem::path& file) {
   return real;
 }
 
-/// Refuses pipes and the like, on which SQLite's open() would block.
+/// Refuses pipes and similar files, on which SQLite's open() would block.
 /// @throws DatabaseError
 void refuse_what_waits(const std::filesystem::path& real) {
   for (const char* part : {"", "-journal", "-wal", "-shm"}) {
@@ -76,7 +76,8 @@ Database::Database(const std::filesystem::path& file, DatabaseMode mode) : file_
   const int flags = SQLITE_OPEN_NOMUTEX | SQLITE_OPEN_URI |
                     (read_only ? SQLITE_OPEN_READONLY : SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
   int code = sqlite3_open_v2(real.c_str(), &handle_, flags, nullptr);
-  // On a read-only mount, or without the right to write the folder, SQLite cannot make its files.
+  // On a read-only mount, or without write permission in the folder, SQLite cannot create its
+  // files.
   const auto is_for_lack_of_files = [this] {
     const int error = sqlite3_errcode(handle_);
     return error == SQLITE_CANTOPEN || error == SQLITE_READONLY;

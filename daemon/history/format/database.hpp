@@ -30,11 +30,11 @@ class DatabaseError : public HistoryError {
  public:
   DatabaseError(int code, const std::string& message) : HistoryError(message), code_(code) {}
   [[nodiscard]] int code() const noexcept { return code_; }
-  /// The file's content is wrong, as opposed to a disk error.
+  /// True if the file's content is wrong, as opposed to a disk error.
   [[nodiscard]] bool is_damage() const noexcept {
     return (code_ & 0xFF) == SQLITE_CORRUPT || (code_ & 0xFF) == SQLITE_NOTADB;
   }
-  /// Disk full or temporary write error; the connection remains usable.
+  /// True if the disk is full or writing failed temporarily; the connection remains usable.
   [[nodiscard]] bool is_for_now() const noexcept {
     return (code_ & 0xFF) == SQLITE_FULL || code_ == SQLITE_IOERR_WRITE ||
            code_ == SQLITE_IOERR_FSYNC;
@@ -66,13 +66,13 @@ class Database {
 
 [[nodiscard]] bool is_without_tables(Database& database);
 
-/// @throws HistoryError when the file is another program's, or of an unknown version
+/// @throws HistoryError when the file belongs to another program or has an unknown version
 void require_history(Database& database);
 
-/// Whether the table `event` has whole records, or only texts as in version 0.1.0.
+/// True if the table `event` has whole records, not only texts as in version 0.1.0.
 [[nodiscard]] bool has_event_records(Database& database);
 
-/// The same check before a daemon touches files; passes a missing, empty or damaged file.
+/// The same check before a daemon touches files; accepts a missing, empty or damaged file.
 void refuse_foreign_history(const std::filesystem::path& file);
 
 class Statement {
@@ -86,7 +86,7 @@ class Statement {
   Statement& bind(std::int64_t value);
   Statement& bind(std::string_view value);
   Statement& bind(std::span<const std::byte> value);
-  /// @return whether there is a row
+  /// @return true if there is a row
   bool step();
   /// For statements without rows: runs, then resets for the next values.
   void run();
@@ -125,7 +125,7 @@ struct ChunkContent {
   ChunkNumbers numbers;
   std::vector<std::byte> records;
 };
-/// Empty: no such row. @throws HistoryError when the checksum does not match
+/// The row's content; none: no such row. @throws HistoryError when the checksum does not match
 [[nodiscard]] std::optional<ChunkContent> read_chunk(Database& database, std::int64_t segment,
                                                      std::int64_t number);
 

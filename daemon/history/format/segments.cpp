@@ -34,7 +34,7 @@ std::map<std::int64_t, GridKey> usual_grids(const std::vector<SegmentInfo>& segm
   return usual;
 }
 
-/// Estimate from the same run, else the previous segment, else the next one.
+/// Wall time estimated from the same run, else the previous segment, else the next one.
 std::int64_t likely_wall_ns(const std::vector<SegmentInfo>& segments, std::size_t at) {
   const SegmentInfo& segment = segments[at];
   const auto is_good = [](const SegmentInfo& other) { return is_wall_time(other.wall_ns); };
@@ -76,7 +76,7 @@ void check_times(const SegmentInfo& segment) {
 }
 
 std::string HistoryPlaces::add(const SegmentInfo& segment) {
-  constexpr std::int64_t end_ns_max = std::int64_t{1} << 62;  // no sum of two overflows
+  constexpr std::int64_t end_ns_max = std::int64_t{1} << 62;  // the sum of two does not overflow
   const bool is_first = grid_to_history_ns_.empty();
   const auto known = grid_to_history_ns_.find(segment.run);
   const std::int64_t by_wall_ns = is_first ? 0 : segment.wall_ns - first_wall_ns_;

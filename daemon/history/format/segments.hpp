@@ -58,7 +58,7 @@ class RecordOrder {
   /// @param first_cycle  lowest valid cycle
   explicit RecordOrder(std::uint64_t first_cycle = 0) : cycle_(first_cycle) {}
 
-  /// @return whether `next` may follow the records so far; if not, it is ignored
+  /// @return true if `next` may follow the records so far; otherwise it is ignored
   [[nodiscard]] bool admits(const Record& next) noexcept {
     const bool is_offset = next.kind == RecordKind::offset;
     if (next.cycle < cycle_ || (next.cycle == cycle_ && has_offsets_ && !is_offset)) return false;
@@ -86,8 +86,8 @@ inline constexpr std::int64_t wall_ns_max = std::int64_t{1} << 62;  ///< in the 
 void check_times(const SegmentInfo& segment);
 
 /// Drops segments, with an entry in `damage`, that are on another grid than most of their run,
-/// begin before the previous one ends, or exceed the limits above. Replaces an impossible wall time
-/// by an estimate.
+/// begin before the end of the previous one, or exceed the limits above. Replaces an impossible
+/// wall time by an estimate.
 /// @param segments  by id, each passed by check_times()
 [[nodiscard]] std::vector<SegmentInfo> sound_segments(std::vector<SegmentInfo> segments,
                                                       std::vector<HistoryDamage>& damage);
@@ -98,7 +98,7 @@ class HistoryPlaces {
  public:
   /// @return why the segment cannot follow the previous ones; empty: it is placed
   std::string add(const SegmentInfo& segment);
-  /// From the grid of `run` to the history's time. @pre a segment of the run is placed
+  /// Offset from the grid of `run` to the history's time. @pre a segment of the run is placed
   [[nodiscard]] std::int64_t grid_to_history_ns(std::int64_t run) const {
     return grid_to_history_ns_.at(run);
   }

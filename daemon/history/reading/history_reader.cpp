@@ -46,7 +46,7 @@ std::string query_of_events(Database& database, const std::string& condition) {
          " ORDER BY run, number";
 }
 
-/// When each run recorded last, by the wall clock.
+/// Wall time of each run's last record.
 std::map<std::int64_t, double> run_ends_s(Database& database) {
   Statement rows(database, "SELECT run, max(last_wall_ns) FROM segment GROUP BY run");
   std::map<std::int64_t, double> ends_s;
@@ -54,7 +54,7 @@ std::map<std::int64_t, double> run_ends_s(Database& database) {
   return ends_s;
 }
 
-/// A run that was stopped ends with that event, any other one with what it recorded last.
+/// A run that was stopped ends with that event, any other with its last record.
 void note_absences(std::vector<RecordedEvent>& events, Database& database) {
   const std::map<std::int64_t, double> ends_s = run_ends_s(database);
   for (std::size_t i = 1; i < events.size(); ++i) {
@@ -175,7 +175,7 @@ void HistoryReader::Parts::read(const char* order, std::vector<SegmentInfo>& fou
   }
 }
 
-/// Limits the last cycle to the chunks: beyond them a replay would continue with old inputs.
+/// Limits the last cycle to the chunks, beyond which a replay would continue with old inputs.
 void HistoryReader::Parts::limit_to_chunks(SegmentInfo& segment) {
   const std::int64_t none = static_cast<std::int64_t>(segment.first_cycle) - 1;
   if (segment.last_cycle == none) return;
@@ -203,7 +203,7 @@ HistoryReader::HistoryReader(const std::filesystem::path& file) {
   try {
     parts_->read(" ORDER BY id", found);
   } catch (const DatabaseError& error) {
-    // A page of the table is damaged: rows behind it are read from the other end.
+    // A page of the table is damaged: the rows after it are read from the other end.
     parts_->damage.push_back({0, std::string("some segments cannot be read: ") + error.what()});
     try {
       parts_->read(" ORDER BY id DESC", found);

@@ -49,11 +49,11 @@ class RecordCursor {
   /// @throws HistoryError when a chunk is damaged or missing, or the segment was deleted
   bool next(Record& out);
   /// After an error: continues with the next existing chunk; the damaged one's records are lost.
-  /// @return false when there is none
+  /// @return false if there is none
   bool resume();
-  /// The segment has grown: next() continues beyond its previous last cycle.
+  /// Call when the segment has grown: next() continues beyond its previous last cycle.
   void extend(std::int64_t last_cycle);
-  /// Whether a chunk had an impossible wall time; the last valid difference is then kept.
+  /// True if a chunk had an impossible wall time; the last valid difference is then kept.
   [[nodiscard]] bool wall_time_was_impossible() const noexcept;
   /// Wall clock minus grid time, as of the record last returned [ns].
   [[nodiscard]] std::int64_t wall_minus_grid_ns() const noexcept;
@@ -66,11 +66,10 @@ class RecordCursor {
 
 class HistoryReader {
  public:
-  /// Opens the file read-only and lists the present segments. Drops an impossible segment (or one
-  /// that overlaps the previous one) and reports it in damage(). Replaces an impossible wall time,
-  /// from a wrong clock, by an estimate from other segments.
-  /// @throws HistoryError naming the file: missing, not a history, of an unknown version, or too
-  ///                      damaged to be read at all
+  /// Opens the file read-only and lists its segments. Drops an impossible segment (or one that
+  /// overlaps the previous one) and reports it in damage(). Replaces an impossible wall time, from
+  /// a wrong clock, by an estimate from other segments.
+  /// @throws HistoryError naming the file: missing, not a history, unknown version, or unreadable
   explicit HistoryReader(const std::filesystem::path& file);
   ~HistoryReader();
   HistoryReader(HistoryReader&&) noexcept;

@@ -30,7 +30,7 @@ std::string gap_line(const HistoryClock& clock, const SegmentInfo& before, const
   return text.data();
 }
 
-/// Whether the whole segment is outside [from, to), as far as seconds tell.
+/// True if the whole segment is outside [from, to), as far as seconds show.
 bool is_outside(const HistoryClock& clock, const SegmentInfo& segment,
                 const std::optional<HistoryTime>& from, const std::optional<HistoryTime>& to) {
   const auto end = static_cast<std::uint64_t>(segment.last_cycle + 1);
@@ -47,7 +47,7 @@ std::string comment_at(double time_s, const std::string& what) {
   return time.data() + printable_text(what) + "\n";  // a damaged file may contain any text
 }
 
-/// Selects rows for a wall-time comment: the first, one per hour, and after a step of the clock.
+/// Selects rows for a wall-time comment: the first, one per hour, and after a clock step.
 class WallComments {
  public:
   /// @return empty: no comment
@@ -105,7 +105,7 @@ class RunExport {
   }
 
  private:
-  /// By setup: axes probed in the exported segments.
+  /// Axes probed in the exported segments, by setup.
   [[nodiscard]] std::map<std::int64_t, std::vector<bool>> find_probed() const {
     std::map<std::int64_t, std::vector<bool>> probed;
     for (const SegmentInfo& segment : reader_.segments()) {

@@ -54,12 +54,12 @@ struct MeansBatch {
 /// sent and applied offset of each axis.
 class HistoryMeans {
  public:
-  /// @param from  if not in the file (any more): from the beginning
+  /// @param from  if not in the file (any more): begins at the start
   HistoryMeans(std::filesystem::path history, const HistoryPosition& from);
   ~HistoryMeans();
   HistoryMeans(HistoryMeans&&) noexcept;
 
-  /// Whether the file contains `from`.
+  /// True if the file contains `from`.
   [[nodiscard]] bool is_continued() const noexcept;
   /// Number of parts of the file that could not be read so far.
   [[nodiscard]] std::uint64_t damaged() const noexcept;
@@ -68,7 +68,7 @@ class HistoryMeans {
   /// recorded or `settled_s` have passed.
   /// @param wall_s  wall clock, since 1970 [s]
   /// @param rest    called often; may throw to abort
-  /// @return nullopt: nothing new yet
+  /// @return nullopt if there is nothing new yet
   /// @throws HistoryError when the file cannot be read at all
   [[nodiscard]] std::optional<MeansBatch> next(std::size_t rows_max, std::int64_t wall_s,
                                                const std::function<void()>& rest);

@@ -175,7 +175,7 @@ ReplaySummary replay_to_csv(const std::filesystem::path& history, std::ostream& 
 
 namespace {
 
-/// Calls `look`; an exception becomes damage of the segment.
+/// Calls `look` and turns an exception into damage of the segment.
 template <class Look>
 bool is_good(SegmentCheck& check, Look look) {
   try {

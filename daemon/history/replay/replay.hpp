@@ -42,7 +42,7 @@ using OffsetSink = std::function<void(const ReplayedOffsets&)>;
 /// Called from time to time with the fraction done, 0..1.
 using Progress = std::function<void(double)>;
 
-/// Replays every segment from its own start state, with exactly the cycles that were stepped. At
+/// Replays every segment from its own start state, with exactly the cycles that were stepped. After
 /// damage, continues with the next segment.
 /// @throws HistoryError when the file cannot be read at all
 ReplaySummary replay(const std::filesystem::path& history, const OffsetSink& sink,
@@ -76,9 +76,9 @@ enum class ExportContent {
 /// `[correction] measured`); `<axis>_offset_um`, `<axis>_applied_um` and `<axis>_measured_um` (as
 /// entered). Comment lines give the wall time of the first row, of one row per hour and after each
 /// gap or clock step; gaps between rows; begin and end of sensor faults; commands; changes of the
-/// model. The inputs come from stepping the estimator again. After damage they are means of the
-/// readings until the next segment. A damaged chunk costs its own rows, an unreadable segment is
-/// left out. Segments outside `from` and `to` are not read.
+/// model. The inputs come from stepping the estimator again; after damage they are means of the
+/// readings until the next segment. Rows of a damaged chunk and unreadable segments are left out.
+/// Segments outside `from` and `to` are not read.
 /// @throws HistoryError when the file cannot be read at all
 ExportSummary export_run(const std::filesystem::path& history,
                          const std::optional<HistoryTime>& from,

@@ -113,7 +113,7 @@ class RunBinding {
   std::vector<Problem> problems_;
 };
 
-/// Adapts a configuration to a run file: enabled, and with limits for its sample distances.
+/// Adapts a configuration to a run file: enabled, with limits that fit its sample distances.
 EstimatorConfig adapted(EstimatorConfig config, const RunBinding& binding, const RunFile& run,
                         std::vector<std::string>& notes) {
   config.compensation.enabled_at_first_start = true;

@@ -18,10 +18,10 @@ struct RunReplaySummary {
   std::vector<std::string> notes;  ///< assumptions and adaptations, for people
 };
 
-/// Time: steps are on a grid from the first row on. The period is the loop's or, for rows further
-/// apart, its largest multiple up to the shortest row distance and 1 s; the limiter slews by time,
-/// so that more steps change nothing. A row reaches the estimator at the first step at or after its
-/// time, with its own time as that of the readings, so that screening and smoothing see the true
+/// Time: steps are on a grid from the first row on. The period is the loop's or, for rows farther
+/// apart, its largest multiple up to the shortest row distance and 1 s; more steps would change
+/// nothing, since the limiter slews by time. A row reaches the estimator at the first step at or
+/// after its time, which is also that of its readings, so that screening and smoothing get the true
 /// sample times.
 ///
 /// Sensors: `<sensor>_degC`, else the input column of their block. A missing value ages the last

@@ -136,7 +136,7 @@ void SegmentExport::fill(std::vector<double>& row, std::uint64_t cycle) {
   for (std::size_t i = 0; i < places_.sensors.size(); ++i)
     if (places_.sensors[i] != none) row[places_.sensors[i]] = good_value(inputs_.readings[i]);
   write_faults();
-  // What an absent controller reported last is not what it does now.
+  // The last report of an absent controller is outdated.
   const bool is_read = inputs_.controller.online;
   for (std::size_t i = 0; i < places_.signals.size(); ++i)
     row[places_.signals[i]] = is_read ? inputs_.controller.signals[i] : not_a_number;
@@ -276,8 +276,7 @@ void SegmentExport::take_measured() {
                        .source = command.source});
 }
 
-/// NaN without read-back: the registers' content, which the record has then, can be an older
-/// offset.
+/// NaN without read-back: the recorded content of the registers may be an older offset.
 double SegmentExport::read_back_um(std::size_t axis) const {
   return config_.controller_reads_back ? inputs_.controller.applied_um[axis] : not_a_number;
 }
@@ -335,7 +334,7 @@ void SegmentExport::fill_inputs(std::vector<double>& row) {
   }
 }
 
-/// The fault after screening, if the estimator is stepped; else the driver's.
+/// The fault after screening if the estimator is stepped, else the driver's.
 Fault SegmentExport::fault_of(std::size_t sensor) const {
   return steps_ ? report_.sensors[sensor].fault : inputs_.readings[sensor].fault;
 }
@@ -344,11 +343,11 @@ void SegmentExport::write_faults() {
   for (std::size_t i = 0; i < faults_reported_.size(); ++i) {
     const Fault fault = fault_of(i);
     if (fault == faults_reported_[i]) continue;
-    // A settling value ends the reported fault only once it counts.
+    // A settling value ends the reported fault only when it counts.
     if (steps_ && report_.sensors[i].settles()) continue;
     const bool is_first_value = faults_reported_[i] == Fault::never_read && fault == Fault::none;
     faults_reported_[i] = fault;
-    if (is_first_value) continue;  // the first value is no recovery
+    if (is_first_value) continue;  // the first value is not a recovery
     happened_.push_back("sensor " + config_.sensors[i].name + ": " +
                         (fault == Fault::none ? "good again" : std::string(to_string(fault))));
   }

@@ -29,7 +29,7 @@ struct ExportPlaces {
 };
 
 /// Creates the columns of a configuration.
-/// @param probed  by axis: whether its displacement was measured anywhere in the file
+/// @param probed  by axis: true if its displacement was measured anywhere in the file
 [[nodiscard]] ExportPlaces export_places(const ReplaySetup& setup, ExportContent content,
                                          const std::vector<bool>& probed, RunColumns& columns);
 
@@ -59,7 +59,7 @@ class SegmentExport {
   SegmentExport(const HistoryReader& reader, const SegmentInfo& segment, const ReplaySetup& setup,
                 const ExportPlaces& places, std::vector<HistoryDamage>& damage);
 
-  /// Advances to the next cycle with recorded offsets. @return false when there is none
+  /// Advances to the next cycle with recorded offsets. @return false if there is none
   bool next(std::uint64_t& cycle);
   [[nodiscard]] std::int64_t wall_ns(std::uint64_t cycle) const;
 
@@ -70,7 +70,7 @@ class SegmentExport {
   [[nodiscard]] std::vector<std::string> happened();
   /// Probings between the last two calls of fill().
   [[nodiscard]] std::vector<ExportedProbing> probings();
-  /// The segment has grown: next() continues.
+  /// Call when the segment has grown: next() continues.
   void extend(std::int64_t last_cycle);
   /// Discards the cycle of the last next(), with the commands before it.
   void skip();

@@ -1,4 +1,4 @@
-/// Shared parts of replay and export: a segment's setup, its inputs while its records pass, its
+/// Common parts of replay and export: a segment's setup, its inputs as its records are read, its
 /// estimator stepped through them, and the history's time.
 #pragma once
 
@@ -33,7 +33,7 @@ struct InputsInForce {
   /// Applies a reading, link, applied or signal record.
   /// @throws HistoryError when its index is impossible
   void apply(const Record& record);
-  /// After lost records: all inputs are unknown until recorded again.
+  /// Call after lost records: all inputs are unknown until recorded again.
   void forget();
 };
 
@@ -97,14 +97,14 @@ class SegmentSteps {
   [[nodiscard]] const OffsetCommand& command() const noexcept { return command_; }
   [[nodiscard]] const Estimator& estimator() const noexcept { return estimator_; }
 
-  /// The next recorded offset of that cycle; null: no more.
+  /// The next recorded offset of that cycle; null: none left.
   [[nodiscard]] const Record* noted_offset() const noexcept {
     const bool is_one =
         stepped_ && has_record_ && record_.cycle == cycle_ && record_.kind == RecordKind::offset;
     return is_one ? &record_ : nullptr;
   }
   void next() { has_record_ = cursor_.next(record_); }
-  /// The segment has grown.
+  /// Call when the segment has grown.
   void extend(std::int64_t last_cycle) {
     segment_.last_cycle = last_cycle;
     cursor_.extend(last_cycle);

@@ -39,7 +39,7 @@ class Means {
   std::vector<std::uint32_t> count_;
 };
 
-/// NaN: nothing is recorded.
+/// Wall time of the history's beginning; NaN: nothing is recorded.
 double begins_s(const HistoryReader& reader) {
   constexpr double wander_s = 1.0;  // possible clock drift before the first commit
   double first_s = not_a_number;

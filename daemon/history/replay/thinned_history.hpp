@@ -45,9 +45,9 @@ struct ThinningLimits {
 };
 
 /// Divides [from_s, to_s), from the history's beginning on, into `points` equal intervals; a value
-/// is the mean of the records in its interval (readings without a fault, offsets as sent). Of more
-/// than `chunks_max` chunks, that many are read, evenly spread, which bounds the time; temperatures
-/// change little between them.
+/// is the mean of the records in its interval (readings without a fault, offsets as sent). At most
+/// `chunks_max` chunks are read, evenly spread, which bounds the time; temperatures change little
+/// between them.
 /// @param from_s, to_s  wall clock, seconds since 1970
 /// @pre to_s > from_s, 1 <= points <= points_max (checked: std::invalid_argument)
 /// @throws HistoryError when the file cannot be read at all

@@ -20,7 +20,7 @@ namespace {
 
 /// Deletion starts below the bound, so that the next commits do not exceed it.
 constexpr double delete_at = 0.9;
-/// Segments end at `segment_h` or slightly later. Longer ones have a damaged row, which must not
+/// Segments end at `segment_h` or slightly later. A longer one has a damaged row, which must not
 /// make the others old.
 constexpr double segment_lengths_max = 2.0;
 
@@ -125,7 +125,7 @@ HistoryStore::Files HistoryStore::look_at_files() const {
   return files;
 }
 
-/// The file that another program changed; empty: none.
+/// Name of the file that another program changed; empty: none.
 std::string HistoryStore::changed_file() const {
   const Files now = look_at_files();
   for (std::size_t i = 0; i < now.size(); ++i)
@@ -159,9 +159,9 @@ bool HistoryStore::open_if_closed(std::int64_t needed_token) {
   return needed_token == 0 || tokens_.count(needed_token) != 0;
 }
 
-/// Another program removed or replaced a file; SQLite would continue to write into unlinked ones.
-/// Moves committed data through the open connection into the database, if that is still in place.
-/// The database then needs no -wal and -shm, and older ones would damage it.
+/// Handles a file that another program removed or replaced; SQLite would continue to write into
+/// unlinked ones. Moves committed data through the open connection into the database, if that is
+/// still in place. It then needs no -wal and -shm, and older ones would damage it.
 void HistoryStore::rescue(const std::string& changed) {
   const Files now = look_at_files();
   const bool has_database = now[database_file].is_same_file(files_[database_file]);
@@ -180,7 +180,7 @@ void HistoryStore::rescue(const std::string& changed) {
     // The log is unreadable: only the database's content is left.
   }
   // This connection has the only copy of a removed log and stays open until the disk accepts all of
-  // it: a partial copy would damage the database.
+  // it, since a partial copy would damage the database.
   const DatabaseError failed(code, changed + " was removed, and the disk takes nothing (" +
                                        sqlite3_errstr(code) + "): tried again");
   if (failed.is_for_now() && has_database) throw failed;
@@ -233,7 +233,7 @@ void HistoryStore::prepare() {
   files_ = look_at_files();
 }
 
-/// A segment with missing rows in the file gets no further ones.
+/// Forgets segments with missing rows in the file, so that they get no more.
 void HistoryStore::forget_lost_tokens() {
   const std::int64_t chunks = database_->number("SELECT count(*) FROM chunk");
   if (chunks < chunks_before_) {
@@ -375,7 +375,7 @@ void HistoryStore::insert(const SegmentRow& row, Tokens& tokens) {
   seal.bind(segment_checksum(*database_, id)).bind(id).run();
 }
 
-/// Whether the row exists, from a commit reported as failed. Existing rows are never replaced.
+/// True if the row exists, from a commit reported as failed. Existing rows are never replaced.
 bool HistoryStore::is_known(std::int64_t segment, const ChunkRow& row) {
   Statement known(*database_, "SELECT records FROM chunk WHERE segment = ? AND number = ?");
   known.bind(segment).bind(row.number);
@@ -429,7 +429,7 @@ void HistoryStore::forget_old_events() {
   Statement statement(*database_,
                       "DELETE FROM event WHERE (run, number) IN (SELECT run, number FROM event"
                       " ORDER BY run DESC, number DESC LIMIT -1 OFFSET ?)");
-  // Deletes some more at once, so that not every commit has to.
+  // Deletes more at once, so that not every commit has to.
   statement.bind(kept - kept / 10).run();
 }
 

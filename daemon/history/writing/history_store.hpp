@@ -67,7 +67,7 @@ class PendingRows {
   [[nodiscard]] const std::vector<Row>& rows() const noexcept { return rows_; }
   [[nodiscard]] std::size_t bytes() const noexcept { return bytes_; }
   [[nodiscard]] std::uint64_t records() const noexcept { return records_; }
-  /// Whether the segment's own row is pending too.
+  /// True if the segment's own row is pending too.
   [[nodiscard]] bool begins(std::int64_t segment_token) const noexcept;
 
  private:
@@ -83,15 +83,15 @@ class HistoryStore {
       : config_(config), wall_clock_(std::move(wall_clock)) {}
 
   /// Watches the database, its -wal and its -shm together: if another program removed, replaced or
-  /// truncated one of them, moves committed data into the database and opens it anew with new -wal
-  /// and -shm; a missing database is created.
+  /// truncated one of them, moves committed data into the database and reopens it with new -wal and
+  /// -shm; a missing database is created.
   /// @param needed_token  a segment that must be in the file already; 0: none
-  /// @return false when that segment is not in the file: its rows cannot be stored
-  /// @throws DatabaseError; HistoryError when the file is another program's or of a newer version,
-  ///         or another process writes it
+  /// @return false if that segment is not in the file: its rows cannot be stored
+  /// @throws DatabaseError; HistoryError when the file belongs to another program or a newer
+  /// version, or another process writes it
   [[nodiscard]] bool open_if_closed(std::int64_t needed_token);
   void close() noexcept;
-  /// Call after every change of our own, also a failed one: records the files' identity. A file
+  /// Records the files' identity; call after every change of our own, even a failed one. A file
   /// replaced by another program is still detected.
   void note_files();
   /// Renames the file (and its -wal) to `<file>.damaged-<UTC>`.
@@ -99,7 +99,7 @@ class HistoryStore {
 
   /// Writes all rows in one transaction, and reads them back through a second connection, which
   /// opens the files by name, before they count as written.
-  /// @param prove  writes something even without rows, to test the disk
+  /// @param prove  also writes without rows, to test the disk
   void write(const PendingRows& pending, bool prove);
   /// Deletes the oldest whole segments until size and age are within their bounds. The age of a
   /// segment is the time recorded after it by the monotonic clock, independent of the wall clock.

@@ -24,11 +24,11 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr milliseconds drain_period{50};
-/// The project guarantees a commit every 10 s; leaves time for the commit itself.
+/// The documented guarantee is a commit every 10 s; the rest is for the commit itself.
 constexpr double commit_s_max = 9.5;
 constexpr std::size_t chunk_bytes_max = std::size_t{512} * 1024;
 constexpr double backoff_s_max = 60.0;
-/// More than a client that polls every second can miss.
+/// A client that polls every second cannot miss more.
 constexpr std::ptrdiff_t messages_max = 100;
 /// SQLite needs little; the default of 8 MB would be locked completely.
 constexpr std::size_t stack_bytes = std::size_t{512} * 1024;
@@ -59,7 +59,7 @@ struct OpenSegment {
   ChunkEncoder encoder;
 };
 
-/// Smaller steps matter to no report.
+/// Smaller clock steps do not matter in any report.
 constexpr std::int64_t clock_set_ns = 30'000'000'000;
 
 struct KnownSession {
@@ -220,7 +220,7 @@ void HistoryWriter::Parts::close_segment(std::int64_t last_whole_cycle) {
   segment.reset();
 }
 
-/// Makes a chunk of the records since the last one; without records too, since it marks cycles
+/// Makes a chunk of the records since the last one, even without records, since it marks cycles
 /// without changes as complete.
 void HistoryWriter::Parts::cut_chunk() {
   if (!segment) return;
@@ -271,7 +271,7 @@ bool HistoryWriter::Parts::write() {
     store.keep_within_bounds(segment ? segment->token : 0);
   } catch (const DatabaseError& error) {
     if (error.is_damage()) store.move_aside(error.what());
-    // Stays open on a full disk: opening again would need space.
+    // Stays open on a full disk, since reopening would need space.
     if (error.is_for_now())
       store.note_files();
     else
@@ -304,7 +304,7 @@ bool HistoryWriter::Parts::is_working() const {
   return statistics.working;
 }
 
-/// The rows are on disk and must not be written again, whatever fails afterwards.
+/// The rows are on disk and must not be written again, even if something fails afterwards.
 void HistoryWriter::Parts::written(std::uint64_t records) {
   pending.clear();
   const std::lock_guard lock(mutex);
@@ -348,7 +348,7 @@ void HistoryWriter::Parts::request_if_due() {
   const auto cycles = segment->through_cycle - static_cast<std::int64_t>(segment->first_cycle) + 1;
   const bool old = grid.period * cycles >= as_duration(config.segment_h * 3600.0);
   const bool large = static_cast<double>(segment->bytes) > config.size_MB_max * 1e6 / 8.0;
-  // A segment has the wall time of its begin: a clock that is set later needs another one.
+  // A segment has the wall time of its begin, so a clock set later needs a new one.
   const std::int64_t set_by_ns = wall_minus_monotonic_ns() - segment->wall_minus_monotonic_ns;
   const bool was_set = std::abs(set_by_ns) > clock_set_ns && is_wall_time(clocks.wall().count());
   if (old || large || was_set) request(SegmentReason::periodic);
@@ -398,7 +398,7 @@ void HistoryWriter::open() {
   try {
     static_cast<void>(parts_->store.open_if_closed(0));
   } catch (const DatabaseError& error) {
-    // The thread retries. After other HistoryErrors we must not write this file at all.
+    // The thread retries. After any other HistoryError this file must not be written.
     if (error.is_damage()) parts_->store.move_aside(error.what());
     parts_->store.close();
     parts_->failed(error.what());

@@ -41,45 +41,43 @@ struct HistoryStatistics {
 };
 
 /// Drains the ring on its own thread: fsync takes seconds on a worn SD card or a disk that spins
-/// up, and a stalled disk must neither stop main from feeding the watchdog nor from answering
-/// operators.
+/// up, and a stalled disk must not keep main from feeding the watchdog or answering operators.
 ///
 /// Size and age are bounded: the oldest whole segments are deleted first. The current segment is
-/// never deleted, so it is ended when it exceeds an eighth of the bound.
-/// Disk full or I/O error: records wait in memory (up to `memory_bytes_max`) and are retried with
-/// growing pauses; beyond that they are dropped and counted, and a new segment begins.
+/// never deleted, so it ends when it exceeds an eighth of the bound.
+/// After disk full or an I/O error, records wait in memory (up to `memory_bytes_max`) and are
+/// retried with growing pauses; beyond that they are dropped and counted, and a new segment begins.
 class HistoryWriter {
  public:
   static constexpr std::size_t memory_bytes_max = 4u << 20;
 
-  /// Opens nothing.
   HistoryWriter(const HistoryConfig& config, const Grid& grid, std::string program_version,
                 std::size_t ring_records = 65536, WriterClocks clocks = system_clocks());
   ~HistoryWriter();
   HistoryWriter(const HistoryWriter&) = delete;
   HistoryWriter& operator=(const HistoryWriter&) = delete;
 
-  /// Creates the recorder of a configuration, also after a reload. Any ordinary thread. The
-  /// recorder must not outlive the writer.
+  /// Creates the recorder of a configuration, also after a reload; it must not outlive the writer.
+  /// Any ordinary thread.
   [[nodiscard]] std::unique_ptr<CycleRecorder> make_recorder(const SegmentSetup& setup,
                                                              const Estimator& estimator);
   /// Adds an event to the next commit. Any ordinary thread.
   void note(Event event);
-  /// Opens the file and starts the thread. A damaged file is moved aside, with a
-  /// message; a failing disk is retried without limit.
-  /// @throws HistoryError when the file is of a newer version or another program, or in use
+  /// Opens the file and starts the thread. A damaged file is moved aside, with a message; a failing
+  /// disk is retried without limit.
+  /// @throws HistoryError when the file belongs to a newer version or another program, or is in use
   void start();
   /// For callers with their own clock and without the thread: start() without the thread, and the
-  /// work that the thread does every 50 ms.
+  /// thread's work every 50 ms.
   void open();
   void work();
   /// Writes pending rows and closes the file. Gives up on a failing disk after one attempt.
   void stop() noexcept;
   /// The same with a time-out.
-  /// @return false: still running, until the process ends
+  /// @return false if it still runs, until the process ends
   [[nodiscard]] bool stop_within(std::chrono::seconds at_most) noexcept;
   [[nodiscard]] HistoryStatistics statistics() const;
-  /// News about rows or files since the last call, one sentence each. Any ordinary thread.
+  /// Messages about rows or files since the last call, one sentence each. Any ordinary thread.
   [[nodiscard]] std::vector<std::string> take_messages();
 
  private:

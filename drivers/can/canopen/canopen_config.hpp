@@ -83,7 +83,7 @@ struct CanopenNodeConfig {
   double heartbeat_s{0.0};
   double heartbeat_timeout_s{0.0};  ///< lost after this long without one; 0: not watched
   double pdo_period_s{0.0};         ///< period of each TPDO; 0: unknown
-  /// TPDOs are sent on change: the last one holds while heartbeats come.
+  /// TPDOs are sent on change: the last one is valid while heartbeats arrive.
   bool pdo_on_change{false};
   EmergencyForm emergency{EmergencyForm::generic};
   std::vector<CanopenWrite> writes;

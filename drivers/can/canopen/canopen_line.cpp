@@ -133,7 +133,7 @@ void CanopenLine::send_cyclic(nanoseconds now) {
   }
 }
 
-/// Detects two nodes that report the same TPDO as their own: its values cannot be attributed.
+/// Detects two nodes that report the same TPDO as their own, so that its values are ambiguous.
 void CanopenLine::look_for_conflicts(nanoseconds now) {
   std::map<std::uint32_t, std::vector<std::size_t>> owners;
   for (std::size_t i = 0; i < nodes_.size(); ++i) {

@@ -21,7 +21,7 @@ constexpr std::uint16_t error_register_object = 0x1001;
 constexpr std::uint16_t heartbeat_object = 0x1017;
 constexpr std::uint16_t first_pdo_communication = 0x1800;
 constexpr std::uint16_t first_pdo_mapping = 0x1A00;
-constexpr std::uint16_t filler_indices = 0x20;  // data types stand for unused bits
+constexpr std::uint16_t filler_indices = 0x20;  // indices of data types mark unused bits
 constexpr std::uint32_t cob_id_invalid = 0x80000000;
 constexpr std::uint32_t cob_id_extended = 0x20000000;
 constexpr int mapped_max = 64;
@@ -130,7 +130,7 @@ void CanopenNode::begin_setup(nanoseconds now) {
     jobs_.push_back({Work::ask_cob_id, static_cast<std::size_t>(number), 0});
     jobs_.push_back({Work::ask_count, static_cast<std::size_t>(number), 0});
   }
-  // Errors may have been reset without our notice.
+  // Errors may have been reset unnoticed.
   if (supports_emergencies()) jobs_.push_back({Work::ask_errors, 0, 0});
   phase_ = Phase::setting_up;
   // Some nodes refuse settings while operational.
@@ -166,7 +166,7 @@ void CanopenNode::take_job(const SdoResult& result, nanoseconds now) {
     return setup_failed(to_string(result), Fault::no_answer, now);
   }
   if (result.outcome == SdoOutcome::aborted && jobs_.front().work == Work::write) {
-    refused_ = to_string(result);  // the node may have the value already, so it is read back next
+    refused_ = to_string(result);  // the node may already have the value, so it is read back next
     jobs_.pop_front();
     return next_job(now);
   }
@@ -419,7 +419,7 @@ void CanopenNode::lose_all(Fault fault, nanoseconds at) {
 
 void CanopenNode::poll(nanoseconds now) {
   if (client_.busy()) return;
-  std::optional<std::size_t> due;  // the longest overdue
+  std::optional<std::size_t> due;  // channel that is longest overdue
   for (std::size_t i = 0; i < channels_.size(); ++i) {
     if (channels_[i].way != CanopenWay::sdo || now < poll_at_[i]) continue;
     if (!due || poll_at_[i] < poll_at_[*due]) due = i;
@@ -547,7 +547,7 @@ void CanopenNode::advance(nanoseconds now) {
 }
 
 std::optional<CanFrame> CanopenNode::next_frame() {
-  // Commands first: a node becomes pre-operational before it is written to.
+  // Commands first: a node must be pre-operational before a write.
   if (!frames_.empty()) {
     const CanFrame frame = frames_.front();
     frames_.pop_front();

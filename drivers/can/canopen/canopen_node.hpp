@@ -25,9 +25,9 @@ inline constexpr std::uint8_t state_operational = 0x05;
 
 using std::chrono::nanoseconds;
 
-/// Detects a second sender: counts arrivals in windows of eight periods. Two senders give sixteen;
-/// more than twelve count as two senders until a window has few enough again. A sender that catches
-/// up after a pause stays below.
+/// Detects a second sender by counting arrivals in windows of eight periods. Two senders give
+/// sixteen; more than twelve count as two senders until a window has few enough again. A sender
+/// that catches up after a pause stays below.
 class RateWatch {
  public:
   static constexpr int periods = 8;
@@ -94,7 +94,7 @@ class CanopenNode {
   [[nodiscard]] std::span<const std::uint32_t> cob_ids_reported() const noexcept {
     return cob_ids_reported_;
   }
-  /// Another node reports this node's TPDO as its own; empty: none does.
+  /// Call when another node reports this node's TPDO as its own; empty: none does.
   void claim_conflict(const std::string& reason, nanoseconds now);
 
   [[nodiscard]] bool running() const noexcept { return phase_ == Phase::running && !lost_; }
@@ -112,7 +112,7 @@ class CanopenNode {
   struct Watched {
     std::uint32_t cob_id{0};
     RateWatch rate;
-    nanoseconds due_by{};  ///< later a missing TPDO is reported
+    nanoseconds due_by{};  ///< time after which a missing TPDO is reported
   };
 
   void begin_setup(nanoseconds now);
@@ -158,7 +158,7 @@ class CanopenNode {
   std::optional<std::size_t> polled_;  ///< channel that waits for its answer
   /// Value of that channel until its status arrives.
   std::optional<std::vector<std::uint8_t>> polled_value_;
-  CanopenMapping mapping_;  ///< being read
+  CanopenMapping mapping_;  ///< mapping that is being read
   int entries_{0};
   std::vector<std::uint32_t> cob_ids_reported_;
   nanoseconds retry_at_{};

@@ -194,7 +194,7 @@ void SdoClient::take(std::span<const std::uint8_t> data, nanoseconds now) {
     if (answered_ && names_object && ours) ++second_answers_;
     return;
   }
-  // Late answer to an earlier request: not about this one.
+  // A late answer to an earlier request.
   if (names_object && !ours && data.size() >= header_bytes) return;
   if (specifier == response_abort) {
     end(SdoOutcome::aborted, static_cast<std::uint32_t>(little_endian(data, 4, 4)));

@@ -146,7 +146,7 @@ void J1939Line::claim(std::uint8_t from) {
   frames_.push_back(frame);
 }
 
-/// Also permitted for a node without address.
+/// Permitted even for a node without address.
 void J1939Line::ask_for_names() {
   CanFrame frame;
   frame.id = identifier({pgn_request, own_address_.value_or(address_null), address_global, 6});
@@ -155,7 +155,7 @@ void J1939Line::ask_for_names() {
   frames_.push_back(frame);
 }
 
-/// Another node claims our address: the smaller NAME wins.
+/// Handles another node's claim of our address: the smaller NAME wins.
 void J1939Line::take_claim_of_ours(std::uint64_t name) {
   if (name >= config_.own_name) {
     claim(*own_address_);

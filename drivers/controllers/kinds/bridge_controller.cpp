@@ -8,7 +8,7 @@
 namespace thermocomp {
 namespace {
 
-/// Only for the gate's patience between two answers; the bridge sets the pace.
+/// Only sets the gate's patience; the bridge determines the real period.
 constexpr nanoseconds usual_period = std::chrono::milliseconds(50);
 
 }  // namespace

@@ -32,22 +32,23 @@ struct BridgeReport {
 /// Answer to a report.
 struct BridgeAnswer {
   std::uint32_t link_epoch{0};
-  bool anew{false};  ///< the link is new with this report: offsets start from its values
+  bool anew{false};  ///< this report begins a new link: offsets start from its values
   std::array<double, axes_max> offset_um{};
   std::array<bool, axes_max> valid{};  ///< false: the bridge keeps the offset of this axis
 };
 
-/// Each report is an exchange of the rule in controller_link.hpp: the applied offsets are read back
+/// Each report is an exchange by the rule in controller_link.hpp: the applied offsets are read back
 /// and published, and the answer carries the offsets to send. A new link begins with the first
-/// report, with one of another session, after a silence, and with the first report that takes
-/// offsets again; a new epoch of the same link when no offset sent explains an axis' applied one.
+/// report, with a report of another session, after a silence, and with the first report that takes
+/// offsets again. A new epoch of the same link begins when no offset sent explains an axis' applied
+/// one.
 ///
-/// Offsets of an answer count as written with the next report of the same session.
+/// Offsets of an answer count as written when the next report of the same session arrives.
 ///
 /// While the controller takes no offsets (off, not homed) it is online and its signals are valid,
 /// but no applied offset is known: the axes are not synchronised, and the answer carries no offset.
 ///
-/// No thread of its own: newest() and health() detect silence.
+/// Has no thread: newest() and health() detect silence.
 class BridgeController final : public ControllerLink {
  public:
   using Now = nanoseconds (*)() noexcept;
@@ -61,8 +62,8 @@ class BridgeController final : public ControllerLink {
   void offer(const OffsetCommand& command) noexcept override;
   [[nodiscard]] ControllerHealth health() const override;
 
-  /// For one ordinary thread, always the same. Not before start().
-  /// @return nullopt when another session has reported within silent_after_s (two bridges)
+  /// For one ordinary thread, always the same, after start().
+  /// @return nullopt if another session has reported within silent_after_s (two bridges)
   [[nodiscard]] std::optional<BridgeAnswer> report(const BridgeReport& report);
   /// Counts an invalid report; the health shows the reason.
   void refuse(const std::string& why);
@@ -83,7 +84,7 @@ class BridgeController final : public ControllerLink {
   ControllerState state_;
   std::uint64_t session_{0};
   bool taking_{false};
-  bool answered_{false};  ///< with offsets: the next report confirms them
+  bool answered_{false};  ///< the answer had offsets: the next report confirms them
   mutable std::mutex health_mutex_;
   ControllerHealth health_;
   WaitFreeSlot<ControllerState> states_;

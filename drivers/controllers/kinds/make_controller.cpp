@@ -44,13 +44,13 @@ void DryRunController::stop() noexcept {
 
 void DryRunController::newest(ControllerState& state) noexcept {
   read_state(state);
-  // Between two read-backs a controller shows the same values.
+  // Between two read-backs the values do not change.
   if (state.online && state.taken_at != read_at_) {
     read_at_ = state.taken_at;
     apply_offered(state.link_epoch);
   }
   state.applied_um = applied_um_;
-  state.written = state.online;  // a dry run shows the compensation as if written
+  state.written = state.online;  // a dry run counts offsets as written
 }
 
 void DryRunController::read_state(ControllerState& state) noexcept {

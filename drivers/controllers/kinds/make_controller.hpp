@@ -11,12 +11,12 @@
 namespace thermocomp {
 
 /// With a link: its state (online, epoch, times, signals) is passed on, and it is never offered a
-/// command, without which no link writes. The axes are shown like those of a controller that starts
-/// at 0 um and applies an offered offset by its next read-back; the offsets really applied are in
-/// the health (`shown_um`).
+/// command, without which no link writes. The axes appear as those of a controller that starts at 0
+/// um and applies an offered offset by its next read-back; the offsets really applied are in the
+/// health (`shown_um`).
 ///
-/// Without a link: the same without a controller, online from start() to stop(), always with epoch
-/// 1 and without signals. No thread of its own. An axis that is not valid keeps its offset.
+/// Without a link: the same, online from start() to stop(), always with epoch 1 and without
+/// signals. Has no thread. An axis that is not valid keeps its offset.
 class DryRunController final : public ControllerLink {
  public:
   /// @param read  link to the controller; nullptr: there is none
@@ -30,7 +30,8 @@ class DryRunController final : public ControllerLink {
   void offer(const OffsetCommand& command) noexcept override;
   [[nodiscard]] ControllerHealth health() const override;
 
-  /// nullptr: no controller. For other callers, such as a bridge; do not offer it commands.
+  /// Link that is only read, for other callers such as a bridge; do not offer it commands. nullptr:
+  /// no controller.
   [[nodiscard]] ControllerLink* read() const noexcept { return read_.get(); }
 
  private:

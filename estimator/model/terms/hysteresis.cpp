@@ -24,7 +24,7 @@ class OutputHysteresis final : public Term {
   Play joint_;
 };
 
-/// The same for the part of the structure moved by one temperature: T becomes play(T).
+/// Play of the part of the structure that one temperature moves: T becomes play(T).
 class TemperatureHysteresis final : public Term {
  public:
   explicit TemperatureHysteresis(const TermContext& context)

@@ -82,7 +82,7 @@ void LagBank::follow(nanoseconds now) noexcept {
       for (std::size_t i = 0; i < count; ++i) late[i] += share * (values_[i] - late[i]);
     }
   }
-  // A held state is evaluated again at its own time, with the slides elsewhere.
+  // A held state is evaluated again at its own time, with the slides at other positions.
   for (std::size_t j = 0; j < taus_s_.size(); ++j)
     if (!(taus_s_[j] > 0)) std::copy(values_.begin(), values_.end(), late_.data() + j * count);
   at_ = now;

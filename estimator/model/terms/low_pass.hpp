@@ -39,7 +39,7 @@ class LowPass {
   bool started_{false};
   nanoseconds at_{};
   double value_{0.0};
-  nanoseconds step_{};  ///< step length of share_: exp() only when it changes
+  nanoseconds step_{};  ///< step length of share_, so that exp() is called only when it changes
   double share_{0.0};
 };
 

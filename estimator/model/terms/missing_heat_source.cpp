@@ -4,8 +4,8 @@
 namespace thermocomp {
 namespace {
 
-/// d = c LP(u^power): heat that no sensor sees, tied to an operating signal u. Unit of the gain: um
-/// per unit of u to that power.
+/// d = c LP(u^power): heat that no sensor measures, tied to an operating signal u. Unit of the
+/// gain: um per unit of u to that power.
 class MissingHeatSource final : public Term {
  public:
   explicit MissingHeatSource(const TermContext& context)

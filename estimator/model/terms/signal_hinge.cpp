@@ -5,8 +5,8 @@
 namespace thermocomp {
 namespace {
 
-/// d = c max(u - above, 0) without lag: several form a piecewise linear curve, for effects of an
-/// operating signal that are neither linear nor quadratic.
+/// d = c max(u - above, 0) without lag. Several of them form a piecewise linear curve, for effects
+/// of an operating signal that are neither linear nor quadratic.
 class SignalHinge final : public Term {
  public:
   explicit SignalHinge(const TermContext& context)

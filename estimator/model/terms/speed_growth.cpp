@@ -3,7 +3,7 @@
 namespace thermocomp {
 namespace {
 
-/// d = c u^2 without lag: centrifugal growth and the bearing's seat.
+/// d = c u^2 without lag: centrifugal growth of the spindle and the bearing's seat.
 class SpeedGrowth final : public Term {
  public:
   explicit SpeedGrowth(const TermContext& context)

@@ -31,7 +31,7 @@ struct NamedFinding {
   std::string subject;
   std::vector<std::string> outputs;
   std::vector<Parameter> parameters;
-  std::optional<std::string> run;  ///< run argument of a fault that is in one run only
+  std::optional<std::string> run;  ///< run argument of a fault in one run only
   std::string evidence;
   std::vector<Alternative> alternatives;
   /// By output; empty if no test run has the output or no term represents the finding.
@@ -44,7 +44,7 @@ struct NamedFinding {
 
 constexpr std::size_t candidates_reported = 3;
 
-/// A hypothesis considered for the first finding, whether it became one or not.
+/// A hypothesis considered for the first finding, accepted or not.
 struct Candidate {
   std::string cause;
   std::string subject;
@@ -102,12 +102,11 @@ struct Diagnosis {
   ThermalModel extended;
   std::optional<RemainderBank> remainder;  ///< its terms are the last of the extended model
   std::vector<Candidate> weighed;          ///< likeliest first
-  /// Probability of each family, whether it is named or not, and of `none`; empty where nothing was
-  /// weighed so.
+  /// Probability of each family, including `none`; empty if no hypotheses were weighed.
   std::map<std::string, double> families{};
 };
 
-/// Whether the finding improves no output of the test runs; the extended model then omits it.
+/// True if the finding improves no output of the test runs; the extended model then omits it.
 [[nodiscard]] bool fails_on_test_runs(const NamedFinding& finding);
 
 /// Two digits, three if the first is 1: "53", "0.0040", "1810".

@@ -275,7 +275,7 @@ std::string gains_table(const Diagnosis& diagnosis) {
   return html_table(rows);
 }
 
-/// An advice, and the largest reduction of an output's error by it.
+/// An advice, with the largest error reduction that it gives an output.
 struct Advice {
   double gain_um{0.0};
   std::string text;

@@ -351,8 +351,8 @@ Eigen::VectorXd left_of(const MeasuredTests& tests, std::size_t f, const BankEqu
   return y;
 }
 
-/// The noise of a run's first row is an offset of all others, which a bank could fit: so the
-/// residual must fall about each run's mean too.
+/// The noise of a run's first row is an offset of all others, which a bank could fit, so the
+/// residual must also fall about each run's mean.
 /// @param static_fit  the fit to compare with; none: no prediction
 Judged judged(const MeasuredTests& tests, const BankEquations& bank,
               const BankEquations* static_fit) {

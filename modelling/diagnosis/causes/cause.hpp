@@ -1,6 +1,6 @@
-/// Causes of a wrong prediction. One function defines all of a cause, in the file of its family,
-/// which ends with the list of its causes. Hypotheses: a cause with a subject and the displacement
-/// it would explain.
+/// Causes of a wrong prediction. One function defines a cause, in the file of its family, which
+/// ends with the list of its causes. A hypothesis is a cause with a subject and the displacement
+/// that it would explain.
 #pragma once
 
 #include <algorithm>
@@ -40,7 +40,7 @@ struct Parameter {
 
 /// The gains of a finding in the form of the search.
 struct FoundGains {
-  const std::vector<std::string>& names;           ///< one per column of the hypothesis
+  const std::vector<std::string>& names;           ///< one name per column of the hypothesis
   const std::vector<std::string>& outputs;         ///< of the model
   const std::vector<Eigen::VectorXd>& gains;       ///< one per output; empty: no effect on it
   const std::vector<std::vector<Interval>>& ci95;  ///< the same
@@ -142,7 +142,7 @@ class Material {
   [[nodiscard]] double step_s() const noexcept { return step_s_; }
   /// Of the longest run.
   [[nodiscard]] double length_s() const noexcept { return length_s_; }
-  /// What an output does in the end for each kelvin of an input, terms included, alone and with all
+  /// Steady-state effect on an output per kelvin of an input, terms included, alone and with all
   /// places of its group; shape (outputs, inputs).
   /// @pre the model has no guideways
   [[nodiscard]] const Eigen::MatrixXd& settled_um_per_K() const noexcept { return settled_; }
@@ -221,7 +221,7 @@ struct CauseParameter {
   double low{-std::numeric_limits<double>::infinity()};
   double high{std::numeric_limits<double>::infinity()};
   std::string_view description;  ///< text in front of the value
-  bool of_a_jump{false};  ///< identified by a jump, which nothing else on a machine resembles
+  bool of_a_jump{false};         ///< identified by a jump, which has no other cause on a machine
 };
 
 /// Texts of the report.
@@ -231,14 +231,14 @@ struct CauseTexts {
   std::string_view to_do;
 };
 
-/// The experiment that separates a cause from another: the first in this list of the two causes'.
+/// The experiment that separates two causes: of their experiments, the first in this list.
 enum class Experiment {
-  of_a_network,    ///< steady state, the way there, the level
-  another_run,     ///< a fault of one run does not come back
+  of_a_network,    ///< steady state, transient, level
+  another_run,     ///< a fault of one run does not recur
   standstill,      ///< one speed, then none
   along_the_axis,  ///< both ends and the middle
-  twice_as_slow,   ///< a loop that does not close
-  up_and_down,     ///< what has memory
+  twice_as_slow,   ///< a hysteresis loop
+  up_and_down,     ///< effects with memory
   steady_levels,   ///< three temperatures held
   other_duty,      ///< anything else
 };
@@ -254,14 +254,14 @@ struct Correction {
 };
 
 struct Cause {
-  /// Must not change: it is in answers, and in model files if the estimator has this term.
+  /// Must not change: used in answers, and in model files if the estimator has this term.
   std::string name;
   std::string family;                        ///< structure, heat, datum or sensor
   std::vector<CauseParameter> parameters{};  ///< in the order of the answer
   CauseTexts texts{};
-  /// If the subject is a signal and a place of a thermal network; none: `texts`.
+  /// Replaces `texts` if the subject is a signal and a place of a thermal network.
   std::optional<CauseTexts> texts_in_network{};
-  /// If the subject is a signal without a unit; none: `texts`.
+  /// Replaces `texts` if the subject is a signal without a unit.
   std::optional<CauseTexts> texts_without_unit{};
   Experiment experiment{Experiment::other_duty};
   /// Hypotheses of its effect on the displacement; empty if it cannot act on the subject. Null: a
@@ -278,7 +278,7 @@ struct Cause {
   std::vector<NetworkHypothesis> (*in_network)(const NetworkMaterial& material,
                                                const NetworkSubject& subject){nullptr};
   /// Writes a finding into the machine file. Null: the file has no key for this cause.
-  /// @return whether the file has the subject
+  /// @return true if the file has the subject
   bool (*into_machine)(MachineFile& machine, const std::string& subject,
                        const std::vector<Parameter>& parameters){nullptr};
 };

@@ -59,8 +59,8 @@ Cause time_shift() {
 
 constexpr std::size_t periods_max = 400;
 
-/// At least five whole periods in the longest run; fine enough that a neighbour of the true period
-/// is at most a fifth of a turn off at the run's end.
+/// Periods of which the longest run contains at least five, so close that a neighbour of the true
+/// period is at most a fifth of a turn off at the run's end.
 std::vector<double> periods_of(const Material& material) {
   const double length_s = material.length_s();
   const double longest_s = length_s / 5.0;
@@ -126,7 +126,7 @@ Column sine_in(const Column& time_s, const Column& residual,
   return shared_value(parameters, "amplitude_um") * (angle + std::atan2(of[1], of[0])).sin();
 }
 
-/// A sine unrelated to any input, its phase another one in every run: a cooler's or a room's cycle.
+/// Sine unrelated to any input, with another phase in every run: cycle of a cooler or a room.
 Cause periodic_disturbance() {
   Cause cause{"periodic_disturbance", "datum"};
   cause.parameters = {

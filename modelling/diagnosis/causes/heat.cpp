@@ -14,7 +14,7 @@ constexpr CauseParameter power{"power", "1", 1.0, 2.0, "power of the signal"};
 /// physical_campaign.py and seed 910000, level 3, of simulated_campaign.py.
 constexpr double log_prior_of_room = -1.0;
 
-/// Two forms: the heat only, and the heat with the room, whose temperature warms the same body.
+/// Two forms: heat only, and heat with the room, whose temperature warms the same body.
 std::vector<Hypothesis> missing_heat_source_hypotheses(const Material& material,
                                                        const Subject& subject) {
   if (subject.kind != SubjectKind::signal) return {};

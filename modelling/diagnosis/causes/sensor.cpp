@@ -22,7 +22,7 @@ struct ReadingFault {
                  const std::vector<double>& onsets_s);
 };
 
-/// The effect is minus the model's answer to the error of the reading.
+/// The effect is minus the model's response to the error of the reading.
 /// @pre the subject is an input in one run
 Hypothesis of_reading_fault(const Material& material, const Subject& subject,
                             const ReadingFault& fault) {
@@ -151,7 +151,7 @@ Cause sensor_drift() {
   return cause;
 }
 
-/// Range of 1 / gain - 1, the lost over the remaining share of the motion.
+/// Range of 1 / gain - 1, the lost share of the motion over the remaining one.
 constexpr double lost_min = 0.02;
 constexpr double lost_max = 20.0;
 
@@ -224,7 +224,7 @@ Hypothesis exchanged(const Material& material, std::size_t input, std::size_t ot
   return swap;
 }
 
-/// Pairs with each input that is later in the alphabet.
+/// Pairs the subject with each input later in the alphabet.
 std::vector<Hypothesis> sensor_swap_hypotheses(const Material& material, const Subject& subject) {
   if (subject.kind != SubjectKind::input) return {};
   const auto& inputs = material.data().model.inputs;
@@ -235,7 +235,7 @@ std::vector<Hypothesis> sensor_swap_hypotheses(const Material& material, const S
   return all;
 }
 
-/// Two channels are exchanged: the coefficient of each meets the temperature of the other.
+/// Exchanged channels: the coefficient of each is applied to the temperature of the other.
 Cause sensor_swap() {
   Cause cause{"sensor_swap", "sensor"};
   cause.texts = {"Two channels are exchanged", "these two channels are exchanged",

@@ -35,7 +35,7 @@ constexpr CauseParameter lag_tau{"tau_s", "s", 60.0, 4 * 3600.0, "time constant"
 /// Upper bound on the late share of a place's effect; above 1 since a fit has errors.
 constexpr double share_max = 1.1;
 
-/// Bounds of the gain, from the steady-state effect of the input or of its whole group.
+/// Bounds of the gain, from the steady-state effect of the input or its whole group.
 std::function<Interval(std::size_t output)> lag_shares_of(const Material& material,
                                                           std::size_t input) {
   return [&material, input](std::size_t output) {
@@ -62,7 +62,7 @@ std::vector<Hypothesis> thermal_lag_hypotheses(const Material& material, const S
   return {std::move(lag)};
 }
 
-/// g (LP(T) - T), 0 < g / K <= 1: a share of the structure follows late.
+/// g (LP(T) - T), 0 < g / K <= 1: a share of the structure lags.
 Cause thermal_lag() {
   Cause cause{"thermal_lag", "structure"};
   cause.parameters = {lag_tau, {.name = "gain_um_per_K", .unit = "um/K", .description = "effect"}};

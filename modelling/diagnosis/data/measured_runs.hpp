@@ -49,8 +49,8 @@ struct Block {
   Eigen::Index end{0};
 };
 
-/// One run: its rows in which no input of the model is missing, from the file's first such row to
-/// the end of the selection. Missing values of other columns are held at the last one.
+/// One run: its rows with all inputs of the model, from the first such row of the file to the end
+/// of the selection. Missing values of other columns hold the last one.
 struct MeasuredRun {
   std::string name;       ///< RunFile::argument
   std::size_t number{0};  ///< among MeasuredData::runs

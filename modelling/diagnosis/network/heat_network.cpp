@@ -88,8 +88,8 @@ PartKind kind_of(BodyPartKind kind) {
   return PartKind::capacity;
 }
 
-/// The films, joints and capacities that the body's file tells apart; the coolant's whole film
-/// where it tells nothing.
+/// Adds the films, joints and capacities that the body's file distinguishes; the coolant's whole
+/// film if it distinguishes none.
 void add_body_parts(const ReducedBody& body, ThermalPlant& plant) {
   for (const BodyPart& part : body.parts) {
     if (part.kind == BodyPartKind::coolant_film && !plant.coolant_signal) continue;
@@ -125,7 +125,7 @@ void add_body(const PlantConfig& config, ThermalPlant& plant) {
     plant.source_names.push_back(source.name);
   }
   add_body_parts(body, plant);
-  // Heat into the point of a sensor enters the states by that sensor's own row: the fields are
+  // Heat at a sensor's point enters the states by that sensor's row, since the fields are
   // orthonormal in the heat capacity.
   for (const BodyRow& sensor : body.sensors)
     plant.places.push_back({sensor.name, vector_of(sensor.row)});
@@ -153,7 +153,7 @@ void add_thermocouples(const PlantConfig& config, ThermalPlant& plant) {
   }
 }
 
-/// Sources and sensors alike, and rates, which are sorted, as a file's digits have them.
+/// True for equal sources and sensors, and equal rates (sorted) within the digits of a file.
 bool same_structure(const ReducedBody& a, const ReducedBody& b) {
   constexpr double digits = 1e-4;
   const auto same_names = [](const auto& rows, const auto& others) {

@@ -1,4 +1,4 @@
-/// How heat flows through a machine, as a state space whose parts can be changed one by one.
+/// Heat flow through a machine as a state space with parts that can be changed one by one.
 ///
 ///   C dx/dt = -(K + K_coolant while it flows) x + q_room T_room + q_coolant T_coolant
 ///             + sum over the sources of heat_W (|signal| / at)^exponent b
@@ -24,7 +24,7 @@ struct NetworkSource {
   double heat_W{0.0};
   double at{1.0};
   double exponent{1.0};
-  Eigen::VectorXd inflow;  ///< b: what a W brings into each state
+  Eigen::VectorXd inflow;  ///< b: flow into each state per W
 };
 
 struct NetworkSensor {
@@ -36,8 +36,8 @@ struct NetworkSensor {
 struct HeatNetwork {
   Eigen::MatrixXd capacity;             ///< C [J/K], symmetric, positive definite
   Eigen::MatrixXd conductance;          ///< K [W/K], symmetric
-  Eigen::MatrixXd coolant_conductance;  ///< besides, while the coolant flows
-  Eigen::VectorXd room_inflow;          ///< W a degC of the room's air
+  Eigen::MatrixXd coolant_conductance;  ///< added while the coolant flows
+  Eigen::VectorXd room_inflow;          ///< W per degC of the room's air
   Eigen::VectorXd coolant_inflow;
   std::vector<NetworkSource> sources;
   std::vector<NetworkSensor> sensors;
@@ -48,27 +48,27 @@ enum class PartKind { room_film, coolant_film, joint, capacity };
 /// A part of the network whose strength may be wrong: its share of the matrices.
 struct NetworkPart {
   PartKind kind{PartKind::joint};
-  std::string subject;          ///< as it is named in an answer
+  std::string subject;          ///< name in an answer
   Eigen::MatrixXd matrix;       ///< in K, K_coolant or C
   Eigen::VectorXd inflow;       ///< of a film: in q_room or q_coolant; else empty
-  std::string key;              ///< of the machine file
-  std::optional<double> value;  ///< under that key, where it is one number
+  std::string key;              ///< key in the machine file
+  std::optional<double> value;  ///< value of that key, if it is one number
 };
 
-/// Where heat may enter that the model does not have.
+/// A place for a heat source that the model lacks.
 struct NetworkPlace {
   std::string name;
   Eigen::VectorXd inflow;
 };
 
-/// What a machine file says of heat.
+/// The thermal part of a machine file.
 struct ThermalPlant {
   HeatNetwork network;
   std::vector<NetworkPart> parts;
   std::vector<NetworkPlace> places;
-  std::vector<std::string> source_names;  ///< SIGNAL|NODE or the body's source, one a source
+  std::vector<std::string> source_names;  ///< one SIGNAL|NODE, or source of the body, per source
   std::string room_column;
-  std::optional<std::string> coolant_column;  ///< none: from the room, by the next three
+  std::optional<std::string> coolant_column;  ///< none: computed from the room by the next three
   double coolant_degC{20.0};
   double coolant_room_share{0.0};
   double room_mean_degC{21.0};
@@ -76,9 +76,9 @@ struct ThermalPlant {
 };
 
 /// @param path  a machine file of the simulator: its [plant] with lumps or a body, thermocouples
-/// @param body  taken in place of the file's body, whose structure it must be
-/// @throws ConfigurationError: what the simulator refuses; no thermocouple in the room or on the
-///         machine; a part that no heat can leave
+/// @param body  replaces the file's body, whose structure it must have
+/// @throws ConfigurationError: as in the simulator; no thermocouple in the room or on the machine;
+/// a part without heat loss
 [[nodiscard]] ThermalPlant load_thermal_plant(const std::filesystem::path& path,
                                               const ReducedBody* body = nullptr);
 

@@ -13,7 +13,7 @@ bool has_value(const toml::table& table, const char* key, const std::string& val
   return table[key].value<std::string>() == value;
 }
 
-/// The first of the root's tables of a kind that a condition holds for.
+/// The first table of a kind in the root that meets the condition.
 toml::table* entry(toml::table& root, const char* kind,
                    const std::function<bool(const toml::table&)>& is) {
   toml::array* const all = root[kind].as_array();

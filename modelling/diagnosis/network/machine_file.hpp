@@ -1,4 +1,4 @@
-/// A machine file of the simulator whose values are changed.
+/// Editor of a simulator's machine file.
 #pragma once
 
 #include <filesystem>
@@ -7,14 +7,14 @@
 
 namespace thermocomp::diagnosis {
 
-/// SIGNAL|NODE, NODE|NODE, NODE|room: what stands before and behind the bar.
+/// SIGNAL|NODE, NODE|NODE, NODE|room: the parts before and after the bar.
 struct TwoNames {
   std::string first;
-  std::string second;  ///< empty where there is no bar
+  std::string second;  ///< empty: no bar
 };
 [[nodiscard]] TwoNames two_names(const std::string& subject);
 
-/// Each change says whether the file has what is to be changed.
+/// Each change returns whether the file has its target.
 class MachineFile {
  public:
   /// @throws toml::parse_error
@@ -23,18 +23,18 @@ class MachineFile {
   MachineFile(const MachineFile&) = delete;
   MachineFile& operator=(const MachineFile&) = delete;
 
-  /// Whether it is a body, whose matrices stand elsewhere.
+  /// True for a body, whose matrices are in another file.
   [[nodiscard]] bool is_body() const;
   bool multiply_in_node(const std::string& node, const char* key, double factor);
-  /// @param nodes  in the order of the alphabet
+  /// @param nodes  in alphabetical order
   bool multiply_in_link(const TwoNames& nodes, const char* key, double factor);
   /// @param source  a signal and a node
   bool multiply_in_source(const TwoNames& source, const char* key, double factor);
   bool add_to_thermocouple(const std::string& name, const char* key, double more);
-  /// A signal that nothing else has needed is added, constantly 0.
+  /// Adds a source. A signal that is new in the file is added with the constant value 0.
   /// @param source  a signal and a node
   void add_source(const TwoNames& source, double heat_W, double at, double exponent);
-  /// Without the comments that it had.
+  /// The file's text without its comments.
   [[nodiscard]] std::string text() const;
 
  private:

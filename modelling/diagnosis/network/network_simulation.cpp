@@ -16,14 +16,15 @@ namespace {
 using Matrix = Eigen::MatrixXd;
 using Vector = Eigen::VectorXd;
 
-/// The first readings are means of so many rows: one reading may be off by a step of its converter.
+/// Number of rows averaged for the first readings: one reading may be off by a step of its
+/// converter.
 constexpr Eigen::Index start_rows = 5;
 constexpr double start_s = 300.0;
-/// Two sensors in one place must not contradict each other without end.
+/// Compliance that lets two sensors at one place differ.
 constexpr double sensor_give = 1e-6;
 constexpr double slowest_per_s = 1e-9;
 
-/// Every row up to the selection's end, missing values held.
+/// The column up to the selection's end, with missing values held.
 Column held(const RunFile& file, const std::string& column) {
   const std::vector<double>& values = file.column(column);
   double last = first_value(values).value_or(not_a_number);
@@ -57,7 +58,7 @@ Matrix drives(const HeatNetwork& network, const ThermalRuns& runs, const Thermal
   return all;
 }
 
-/// Mean of a sensor's first readings; NaN where it has none.
+/// Mean of a sensor's first readings; NaN without readings.
 double start_degC(const ThermalRun& run, std::size_t sensor) {
   double sum = 0.0;
   double count = 0.0;
@@ -100,7 +101,7 @@ Vector start_state(const HeatNetwork& network, const ThermalRun& run) {
   return balance + answer * give.ldlt().solve(readings - rows * balance);
 }
 
-/// First-order lag behind values that run straight between the rows.
+/// First-order lag behind values that are linear between the rows.
 void lag(const Column& time_s, double lag_s, Column& values) {
   if (!(lag_s > 0.0)) return;
   double state = values[0];
@@ -114,7 +115,7 @@ void lag(const Column& time_s, double lag_s, Column& values) {
   }
 }
 
-/// What room, coolant and sources bring into each state, one a column.
+/// Flow of room, coolant and sources into each state, by column.
 Matrix inflows(const HeatNetwork& network, bool flows) {
   Matrix inflow =
       Matrix::Zero(network.capacity.rows(), 2 + static_cast<Eigen::Index>(network.sources.size()));
@@ -133,7 +134,7 @@ struct NetworkSimulation::Modes {
   Vector rate_per_s;
   Matrix to_modes;
   Matrix from_modes;
-  Matrix into_modes;  ///< of heat
+  Matrix into_modes;  ///< from heat to the modes
 
   Modes(const Matrix& capacity, const Matrix& conductance) {
     const Eigen::LLT<Matrix> root(capacity);
@@ -250,7 +251,7 @@ Matrix NetworkSimulation::modal_states(const ThermalRuns& runs, const ThermalRun
   return states;
 }
 
-/// A row's own; the last row's state is in the modes of the step that led to it.
+/// Modes of the row; the last row's state uses the modes of the step that led to it.
 const NetworkSimulation::Modes& NetworkSimulation::modes_of(const ThermalRun& run,
                                                             Eigen::Index row) const {
   const Eigen::Index of = std::min(row, std::max<Eigen::Index>(0, run.rows() - 2));

@@ -1,4 +1,4 @@
-/// Temperatures that a thermal network gives to the sensors over a measured run.
+/// Sensor temperatures that a thermal network predicts for a measured run.
 #pragma once
 
 #include <memory>
@@ -11,8 +11,8 @@
 
 namespace thermocomp::diagnosis {
 
-/// What drives the network over one run, and what was read. Missing values of signals, room and
-/// coolant are held at the last one.
+/// Inputs of the network and readings over one run. Missing values of signals, room and coolant
+/// hold the last one.
 struct ThermalRun {
   std::string name;  ///< the argument as given
   Column time_s;
@@ -34,18 +34,18 @@ struct ThermalRuns {
 [[nodiscard]] ThermalRuns thermal_runs(const ThermalPlant& plant, const std::vector<RunFile>& files,
                                        const std::vector<std::string>& signals);
 
-/// Operating signals (no positions) that every one of the files has.
+/// Operating signals (no positions) in every file.
 [[nodiscard]] std::vector<std::string> shared_signals(const std::vector<RunFile>& files);
 
-/// A network made ready to run: its modes are found once.
+/// Simulation of a network, whose modes are computed once.
 class NetworkSimulation {
  public:
-  /// @param like  a network that may have the same matrices, whose modes are then taken over
+  /// @param like  a network whose modes are reused if its matrices are the same
   explicit NetworkSimulation(const HeatNetwork& network, const NetworkSimulation* like = nullptr);
 
-  /// Readings of the sensors, shape (sensors)(rows). Between two rows signals, room and coolant
-  /// are the mean of both; the solution within a step is exact. The start is the field that agrees
-  /// with the first readings and is otherwise in balance with room and constant sources:
+  /// Readings of the sensors, shape (sensors)(rows). Between two rows signals, room and coolant are
+  /// the mean of both; the solution within a step is exact. The initial field agrees with the first
+  /// readings and is otherwise in balance with room and constant sources:
   ///
   ///   x_0 = argmin x'Kx / 2 - q'x  with  row_s . x = reading_s of every sensor
   [[nodiscard]] std::vector<Column> readings_degC(const ThermalRuns& runs, std::size_t run) const;

@@ -56,7 +56,7 @@ void ThermalBody::show(const ThermalRuns& runs, const HeatNetwork& before,
       const auto row = static_cast<Eigen::Index>(moment);
       const double time_s = run.time_s[row] - run.time_s[run.begin];
       parts_->add(run.name + ", as in the file", time_s, filed.col(row) - filed.col(run.begin));
-      if (found == filed) continue;  // nothing was found
+      if (found == filed) continue;  // no finding
       parts_->add(run.name + ", as found", time_s, found.col(row) - found.col(run.begin));
       parts_->add(run.name + ", what the findings change", time_s, found.col(row) - filed.col(row));
     }

@@ -1,5 +1,5 @@
-/// The body of a machine in three dimensions, as the thermal diagnosis has it. Needs the finite
-/// elements (CHOLMOD and Gmsh): where the build has none, so has `diagnose` no `--structure`.
+/// Three-dimensional body of a machine in a thermal diagnosis. Needs the finite elements (CHOLMOD
+/// and Gmsh); a build without them has no `diagnose --structure`.
 #pragma once
 
 #include <filesystem>
@@ -12,11 +12,11 @@
 
 namespace thermocomp::diagnosis {
 
-/// The states of a reduced body are amplitudes of temperature fields, which only the structure has:
-/// it is reduced anew, and its fields and stiffness make a picture of every state.
+/// The states of a reduced body are amplitudes of temperature fields, which only the structure
+/// defines: it is reduced again, and its fields and stiffness give a picture of every state.
 class ThermalBody {
  public:
-  /// @throws ConfigurationError  what `thermocomp structure` refuses
+  /// @throws ConfigurationError as `thermocomp structure`
   ThermalBody(const std::filesystem::path& structure, const structure::Progress& progress);
   ~ThermalBody();
   ThermalBody(const ThermalBody&) = delete;
@@ -24,8 +24,8 @@ class ThermalBody {
 
   /// With its parts.
   [[nodiscard]] const ReducedBody& body() const;
-  /// Adds moments of each run: the rise since the run's start as the machine file has it, and where
-  /// something was found the rise with it and what it changes.
+  /// Adds moments of each run: the rise since the run's start by the machine file and, with
+  /// findings, the rise with them and the difference.
   /// @param before, after  of this body
   void show(const ThermalRuns& runs, const HeatNetwork& before, const HeatNetwork& after);
   /// A page for a browser.

@@ -53,8 +53,8 @@ double rms_beside(const Column& values, const Panel& columns) {
   return std::sqrt(left_by(values, columns).squaredNorm() / static_cast<double>(values.size()));
 }
 
-/// Whether the coefficients were fitted to these rows, with free offsets of the runs or without,
-/// and so may have absorbed a cause: then another fit of the same columns gains nothing. After a
+/// True if the coefficients were fitted to these rows, with or without free offsets of the runs,
+/// and so may have absorbed a cause: another fit of the same columns then gains nothing. After a
 /// ridge regression on standardised inputs, the product of each input's displacement c with the
 /// residual is proportional to the variance of c.
 bool fitted_to(const Column& remainder, const Panel& free, const Panel& coefficients) {
@@ -348,9 +348,9 @@ void Fits::judge_left_out(const Hypothesis& hypothesis, std::size_t output, cons
   const Eigen::Index width = hypothesis.width();
   const Column before = left_out.beside_accepted(left_out.values());
   const Panel own = left_out.beside_accepted(centred);
-  // Few parameters determine a hypothesis without own gains, or of one run: its rows are not left
-  // out. Otherwise the smaller residual counts of gains fitted to the other rows and of those under
-  // the likeliest background, which slow disturbances do not bias.
+  // Hypotheses without own gains, or of one run, have few parameters: no rows are left out.
+  // Otherwise the smaller residual counts, of gains fitted to the other rows and of those under the
+  // likeliest background, which slow disturbances do not bias.
   const bool as_fitted = hypothesis.run || hypothesis.form != Form::own_gains;
   const Block rows = hypothesis.run ? runs[*hypothesis.run] : Block{0, before.size()};
   std::vector<double> left;
@@ -396,7 +396,7 @@ double Fits::rms_left(std::size_t output, bool corrected) const {
 namespace {
 
 constexpr double normal_95 = 1.96;
-/// The form of a column is approximate, so the error of a shape parameter is this many times its
+/// The form of a column is approximate, so the error of a shape parameter is this multiple of its
 /// standard deviation. Jumps need no factor.
 constexpr double wider_on_machines = 4.5;
 /// For the same reason the error of a gain is a multiple of its standard deviation plus a share of
@@ -479,7 +479,7 @@ bool set_spread(const Fits& fits, Finding& finding) {
     const double limit = best.score - 0.5 * std::pow(normal_95 * wider(hypothesis, of.name), 2);
     for (std::size_t i = 0; i < trials.size(); ++i) {
       if (trials[i].score < limit) continue;
-      // Up to the middle between it and the next value, which may be outside.
+      // Up to half the distance to the next value, which may be outside.
       Interval& shape = finding.shape_ci[parameter];
       shape = hull(shape, 0.5 * (values[i] + values[i == 0 ? 0 : i - 1]),
                    0.5 * (values[i] + values[std::min(i + 1, values.size() - 1)]));

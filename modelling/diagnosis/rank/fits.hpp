@@ -37,8 +37,8 @@ struct Finding {
   std::vector<Explanation> weighed{};  ///< all hypotheses of its round, likeliest first
 };
 
-/// Residual of each reading of the model from its prediction by the other temperatures and the
-/// signals, which must also show the fault of a reading.
+/// Residual of each reading of the model from its prediction by the other temperatures and signals,
+/// in which the fault of a reading must also appear.
 class Readings {
  public:
   /// @param data  must outlive it

@@ -96,7 +96,7 @@ class OutputFit {
                                       double effect_square) const;
   /// ln of the mean likelihood over all backgrounds without an effect.
   [[nodiscard]] double log_likelihood_of_none() const { return none_; }
-  /// Variance of the white part under a background with an effect that explains so much.
+  /// Variance of the white part under a background with an effect that explains these squares.
   [[nodiscard]] double variance(Eigen::Index under, double explained) const;
   /// Estimate of b under the likeliest background.
   [[nodiscard]] Eigen::VectorXd common_factors() const;

@@ -30,7 +30,7 @@ struct Presence {
 constexpr Presence of_first{-2.69, 0.54, 0.49, 9.10};
 /// In later rounds, and with coefficients fitted to the rows, the model's misfit resembles an
 /// effect more often. Set for the same rate of false findings on untouched machines as in the first
-/// round. Not for datum causes: a fit does not leave a line, a jump or a shift.
+/// round. Not for datum causes, since a fit does not produce a line, a jump or a shift.
 constexpr Presence of_later{-5.70, 0.54, 0.49, 9.10};
 constexpr Presence of_fitted{-7.70, 0.54, 0.49, 9.10};
 constexpr double left_out_min = -0.5;
@@ -77,7 +77,7 @@ double utility(const Explanation& explanation) {
 
 namespace {
 
-/// Whether a special case of this hypothesis is about as likely, or explains as much.
+/// True if a special case of this hypothesis is about as likely, or explains as much.
 bool adds_nothing(const Explanation& explanation, const std::vector<Explanation>& all) {
   const Hypothesis& of = *explanation.hypothesis;
   if (of.simpler_cause.empty()) return false;
@@ -357,7 +357,7 @@ class Search {
       if (all.empty() || !same_name(*all.back().hypothesis, each))
         all.push_back(std::move(next));
       else if (utility(next) > utility(all.back()) + as_much)
-        all.back() = std::move(next);  // the form with one gain more is likelier
+        all.back() = std::move(next);  // the form with one more gain is likelier
     }
     if (all.empty()) return false;
     const auto likelier = [](const Explanation& a, const Explanation& b) {

@@ -46,8 +46,8 @@ struct Choice {
   std::vector<std::string> other_subjects{};  ///< about as likely as its own
 };
 
-/// The likeliest cause at one place, summed over places that cannot be distinguished from it. If
-/// its probability is below 0.5, the likeliest cause summed over all of its places.
+/// The likeliest cause at one place, summed over places that are indistinguishable from it. If its
+/// probability is below 0.5, the likeliest cause summed over all of its places.
 /// @param explanations  at least one
 [[nodiscard]] Choice likeliest(const std::vector<Explanation>& explanations,
                                const PlaceGroups& groups);

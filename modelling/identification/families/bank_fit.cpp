@@ -38,7 +38,7 @@ constexpr double l1_tolerance = 1e-6;
 constexpr Eigen::Index joins_a_column_max = 10;
 
 /// True if the signal has two levels, such as on and off, which show no curvature of the response.
-/// A measured level may scatter by a tenth of the distance between the two.
+/// A measured level may scatter by a tenth of their distance.
 bool has_two_levels(const MeasuredTests& tests, Eigen::Index signal) {
   double low = std::numeric_limits<double>::infinity();
   double high = -low;

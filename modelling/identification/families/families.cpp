@@ -18,7 +18,7 @@ namespace {
 constexpr std::size_t kept_for_lags = 200;
 constexpr Eigen::Index stretches_of_only_run = 6;
 /// With fewer runs, the error on a run left out is mostly due to states that the others lack, and
-/// says little about a family.
+/// hardly depends on the family.
 constexpr std::size_t runs_that_choose = 4;
 constexpr std::size_t stretches_that_choose = 8;
 constexpr double correlation_of_one = 0.98;
@@ -244,7 +244,7 @@ double total_squares(const FamilyResult& result) {
   return std::accumulate(result.scores.begin(), result.scores.end(), 0.0);
 }
 
-/// Where the family's total error is not below that of no model; empty: nowhere.
+/// Judgement in which the family's total error is not below that of no model; empty: none.
 std::string worse_than_none(const std::vector<Judgement>& judgements, std::size_t family) {
   for (const auto& [tests, results] : judgements)
     if (!(total_squares(results[family]) < total_squares(results[0])))

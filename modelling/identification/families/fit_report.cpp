@@ -278,8 +278,8 @@ std::string about(double value) {
   return printed(std::abs(value) < 99.5 ? "%.2g" : "%.0f", value);
 }
 
-/// Expected error on another day. A single run contains no other day; two runs are each judged by a
-/// model of the other alone, which may be far worse than a model of both.
+/// Expected error on another day. A single run contains no other day; each of two runs is judged by
+/// a model of the other alone, which may be far worse than a model of both.
 std::string claim_text(std::size_t runs, const std::string& name, const MadeFrom::Output& output) {
   const char* how = runs == 1   ? "on another day (each half of this run by a model of the other)"
                     : runs == 2 ? "on a third run (each run by a model of the other alone)"

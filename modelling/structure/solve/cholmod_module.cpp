@@ -11,10 +11,10 @@
 namespace thermocomp::structure {
 namespace {
 
-/// CHOLMOD uses four threads and OpenBLAS one per processor. On a busy computer their waiting for
-/// each other takes several times as long as the work. OpenMP therefore adapts its threads, and
-/// OpenBLAS uses one if the load exceeds the processors. Both are looked up at run time, since the
-/// system chooses CHOLMOD's libraries.
+/// CHOLMOD uses four threads and OpenBLAS one per processor. On a busy computer their mutual
+/// waiting takes several times as long as the work. So OpenMP adapts its threads, and OpenBLAS uses
+/// one if the load exceeds the processors. Both are looked up at run time, since the system chooses
+/// CHOLMOD's libraries.
 void leave_processors_to_others() {
   using SetNumber = void (*)(int);
   const auto set = [](const char* name, int number) {

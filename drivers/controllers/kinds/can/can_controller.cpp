@@ -287,10 +287,10 @@ void CanController::receive() {
   if (gate_.explains(state_.applied_um))
     publish(true, monotonic_now());
   else
-    synchronise();  // re-homed or overridden: earlier commands are no longer sent
+    synchronise();  // re-homed or overridden: earlier commands are no longer valid
 }
 
-/// Confirms the write once all frames handed over are on the bus.
+/// Confirms the write once all queued frames are on the bus.
 void CanController::note_written(nanoseconds now) {
   if (handed_ == written_ || socket_.sent_out() < handed_) return;
   written_ = handed_;
@@ -363,8 +363,8 @@ void CanController::await_what_is_older(nanoseconds than) noexcept {
   }
 }
 
-/// Enters or leaves synchronisation by the age of the received frames. A bus-off counts even if it
-/// is already over: the frames queued at that time are lost.
+/// Enters or leaves synchronisation by the age of the received frames. A bus-off counts even after
+/// its end: the frames queued at that time are lost.
 void CanController::supervise(nanoseconds now) {
   const bool was_off = socket_.errors().bus_off != bus_offs_;
   bus_offs_ = socket_.errors().bus_off;
@@ -385,7 +385,7 @@ void CanController::supervise(nanoseconds now) {
   }
 }
 
-/// The error of the interface takes precedence over missing frames.
+/// The interface's error takes precedence over missing frames.
 void CanController::report_error() {
   const std::scoped_lock lock(health_mutex_);
   health_.last_error = socket_.error();
@@ -418,8 +418,8 @@ void CanController::synchronise() {
   health_.connected = true;
 }
 
-/// Value sent for an axis that is not driven. A plausible read-back is the offset sent last, 0, or
-/// a value between; any other must not be sent back, and then neither is known.
+/// Sets the value sent for an axis that is not driven. A plausible read-back is the offset sent
+/// last, 0, or a value between; any other must not be sent back, and then the value is unknown.
 void CanController::hold_applied(bool link_is_new) {
   for (std::size_t axis = 0; axis < config_.axes.size(); ++axis) {
     for (std::size_t node = 0; node < config_.axes[axis].offsets(); ++node) {
@@ -436,7 +436,7 @@ void CanController::hold_applied(bool link_is_new) {
   }
 }
 
-/// The held content may have changed, so it gets another number.
+/// Renumbers the sets, since the held content may have changed.
 void CanController::number_sets() {
   if (!numbered_) {
     const auto periods =
@@ -465,7 +465,7 @@ void CanController::send_command(nanoseconds now) {
   if (commands_.fresh()) gate_.offered(commands_.front().command, commands_.front().computed_at);
   const SendVerdict verdict = gate_.verdict(now);
   if (verdict == SendVerdict::resynchronise) return lose(true);
-  // Without frames to receive, nothing else renews the published time.
+  // Without received frames, nothing else renews the published time.
   if (incoming_.empty() && gate_.in_sync()) publish(true, now);
   if (verdict == SendVerdict::nothing_to_send) return;
   for (std::size_t axis = 0; axis < config_.axes.size(); ++axis) {
@@ -476,7 +476,7 @@ void CanController::send_command(nanoseconds now) {
   }
   ++heartbeat_;
   const bool waits = handed_ > socket_.sent_out() && !gate_.written(now);
-  // Frames of an emptied queue will never be sent; do not wait for them.
+  // Frames of an emptied queue are never sent: not awaited.
   if (waits) handed_ = written_ = socket_.sent_out();
   const bool sent = std::all_of(outgoing_.begin(), outgoing_.end(),
                                 [this](Outgoing& frame) { return compose_and_send(frame); });
@@ -493,7 +493,7 @@ void CanController::send_command(nanoseconds now) {
 }
 
 /// True if the frame carries only sets that must not be followed: a controller that uses the valid
-/// bits of the previous period would take over the held values.
+/// bits of the previous period would otherwise take the held values.
 bool CanController::may_be_left_out(const Outgoing& outgoing) const noexcept {
   if (outgoing.has_valid_bits || outgoing.has_heartbeat) return false;
   return std::none_of(outgoing.axes.begin(), outgoing.axes.end(), [this](std::size_t axis) {
@@ -508,7 +508,7 @@ bool CanController::compose_and_send(Outgoing& outgoing) {
     const std::span<const double> held = held_um(axis);
     const bool known =
         std::none_of(held.begin(), held.end(), [](double each) { return std::isnan(each); });
-    if (!known && !outgoing.has_valid_bits) return true;  // held back, see the class
+    if (!known && !outgoing.has_valid_bits) return true;  // not sent, see the class
     const std::vector<double> offset_um =
         known ? std::vector<double>(held.begin(), held.end()) : std::vector(held.size(), 0.0);
     if (const auto& travel = config_.axes[axis].travel)

@@ -15,22 +15,22 @@
 namespace thermocomp {
 
 /// Sends its frames each period while there is a command of this epoch. Synchronised once every
-/// configured frame has been received since the link was (re)established; not synchronised as soon
-/// as one of them is missing for silent_after_s, the interface is down or bus-off, or a frame could
-/// not be sent. The published time is that of the oldest of these frames. Frames count as written
-/// once the interface has sent them, which never happens without an acknowledgement.
+/// configured frame has been received since the link was (re)established; no longer when one of
+/// them is missing for silent_after_s, the interface is down or bus-off, or a frame could not be
+/// sent. The published time is that of the oldest of these frames. Frames count as written once the
+/// interface has sent them, which requires an acknowledgement.
 ///
-/// An axis whose command is not valid keeps the value sent last (at first, and on a new link if it
-/// can result from that value: the applied offset); its valid bit is 0. A frame with an axis for
-/// which neither is known is not sent, unless the valid bits are in the same frame. Valid bits and
-/// heartbeat are raw numbers without scale and offset; the heartbeat wraps around.
+/// An axis whose command is not valid keeps the value sent last; at first, and on a new link if it
+/// can result from that value, the applied offset. Its valid bit is 0. A frame with an axis for
+/// which neither is known is sent only if it also contains the valid bits. Valid bits and heartbeat
+/// are raw numbers without scale and offset; the heartbeat wraps around.
 ///
 /// For an axis whose controller interpolates along its travel, the offsets of all nodes are sent as
-/// one numbered set (CanTravel) while all of them are valid; else frames with nothing but such sets
-/// are not sent. Each number stands for one content. A read-back set counts when all its frames
-/// carry the same number, and is as old as the oldest of them. Nothing is sent until frames from
-/// before the start of this link have expired; numbering then continues half-way round from the
-/// number in effect, or from the clock without read-back, so that remains of an earlier set in a
+/// one numbered set (CanTravel) while all of them are valid; otherwise frames that contain only
+/// such sets are not sent. A number identifies one content. A read-back set counts when all its
+/// frames carry the same number; its age is that of the oldest. Nothing is sent until frames from
+/// before the start of this link have expired; numbering then continues half a cycle after the
+/// number in effect (without read-back: from the clock), so that remains of an earlier set in a
 /// queue or in the controller have another number.
 class CanController final : public ControllerLink {
  public:
@@ -52,7 +52,7 @@ class CanController final : public ControllerLink {
     bool has_valid_bits{false};
     bool has_heartbeat{false};
   };
-  /// Received data that must be renewed after each (re)start of the link and then regularly.
+  /// Received data that must be renewed after each (re)start of the link and regularly after that.
   struct Awaited {
     nanoseconds received_at{};
     bool seen{false};  ///< since the link was (re)established
@@ -62,7 +62,7 @@ class CanController final : public ControllerLink {
     CanId id;
     std::vector<std::pair<CanSignal, double*>> values{};
   };
-  /// The set that the controller shows for an axis.
+  /// The read-back set of an axis.
   struct ShownSet : Awaited {
     std::size_t axis{0};
     CanSetReader reader;
@@ -102,16 +102,16 @@ class CanController final : public ControllerLink {
   ControllerState state_;           ///< of the thread
   std::vector<Incoming> incoming_;
   std::vector<ShownSet> shown_sets_;
-  std::vector<std::uint64_t> set_numbers_;  ///< one per axis: of the set sent last
+  std::vector<std::uint64_t> set_numbers_;  ///< one per axis: number of the set sent last
   bool numbered_{false};                    ///< numbering has begun
-  nanoseconds no_sending_before_{};         ///< nothing is sent before
+  nanoseconds no_sending_before_{};         ///< earliest time of sending
   CanSocket socket_;
   WriteGate gate_;
   std::uint64_t heartbeat_{0};
   std::uint64_t bus_offs_{0};  ///< count of the socket at the last check
   std::uint64_t handed_{0};    ///< frames given to the interface, for comparison with sent_out()
   std::uint64_t written_{0};   ///< handed_ at the newest confirmed write
-  bool silent_{false};         ///< lost because of missing frames, and not back
+  bool silent_{false};         ///< lost because of missing frames, which have not returned
   nanoseconds next_send_{};
   std::array<double, axes_max> held_um_{};  ///< sent for an axis that is not valid
   WaitFreeSlot<ControllerState> states_;

@@ -22,7 +22,7 @@ void check_travel(const CanTravel& travel);
 /// Number of set numbers before they wrap around. @pre the set has a number
 [[nodiscard]] std::uint64_t set_numbers(const CanSet& set) noexcept;
 
-/// Writes the set's number and those of its values that are in this frame, and no other bits.
+/// Writes the set's number and its values in this frame, and no other bits.
 /// @param values  one per value of the set
 /// @pre the frame has room for them
 void put_set(const CanSet& set, std::span<const double> values, std::uint64_t number,
@@ -37,17 +37,17 @@ class CanSetReader {
   enum class Taken {
     nothing,    ///< the frame is not part of the set
     too_short,  ///< too short for its content; ignored
-    part,       ///< the newest frames are of different sets, or some are missing
-    whole       ///< all frames carry the same number; values() are of this set
+    part,       ///< the newest frames belong to different sets, or some are missing
+    whole       ///< all frames carry the same number; values() belong to this set
   };
 
   /// @pre check_travel() passes
   explicit CanSetReader(CanSet set);
 
   Taken take(const CanFrame& frame);
-  /// Drops frames received earlier. values() stay.
+  /// Drops frames received earlier. values() do not change.
   void forget_before(nanoseconds at) noexcept;
-  void forget() noexcept;  ///< all frames; values() stay
+  void forget() noexcept;  ///< drops all frames; values() do not change
 
   /// Values of the newest complete set; NaN before the first.
   [[nodiscard]] std::span<const double> values() const noexcept { return values_; }

@@ -5,7 +5,7 @@
 namespace thermocomp {
 namespace {
 
-/// Time for the present exchange and the last write in stop().
+/// Time for the present exchange and the last write during stop().
 constexpr std::chrono::milliseconds stop_patience{600};
 
 }  // namespace

@@ -114,7 +114,7 @@ nanoseconds ModbusDialogue::next_action_at() const noexcept {
 void ModbusDialogue::act() {
   const nanoseconds began = connection_.now();
   const nanoseconds period = from_seconds(config_.period_s);
-  if (gate_.in_sync() && link_number() != link_) lose(false);  // another user reopened the line
+  if (gate_.in_sync() && link_number() != link_) lose(false);  // another user has reopened the line
   if (!gate_.in_sync()) {
     if (!synchronise()) {
       retry_at_ = connection_.now() + from_seconds(config_.line.reconnect_s);
@@ -122,7 +122,7 @@ void ModbusDialogue::act() {
     }
     next_exchange_at_ = connection_.now();
   }
-  // The time of a reconnection is not part of the controller's response time.
+  // Reconnecting is not part of the controller's response time.
   const nanoseconds exchange_began = connection_.now();
   exchange();
   const nanoseconds now = connection_.now();
@@ -132,7 +132,7 @@ void ModbusDialogue::act() {
     ++health_.write.late;
   }
   retry_at_ = write_failed_ ? std::max(began + period, now) : now;
-  // A slow line sets the pace; missed periods are skipped.
+  // A slow line determines the period; missed periods are skipped.
   next_exchange_at_ = std::max(next_exchange_at_ + gate_.next_pause(), now);
 }
 
@@ -141,15 +141,15 @@ void ModbusDialogue::end() {
   if (gate_.verdict(connection_.now()) == SendVerdict::send) write_command();
 }
 
-/// Without read-back a restart of the controller would go unnoticed, so a connection that the peer
-/// closes unexpectedly counts as a new link too.
+/// Without read-back a restart of the controller would go unnoticed, so an unexpected close by the
+/// peer counts as a new link too.
 std::uint64_t ModbusDialogue::link_number() const noexcept {
   const bool reads_back = std::none_of(written_.begin(), written_.end(),
                                        [](const auto& written) { return written.has_value(); });
   return reads_back ? connection_.links() : connection_.breaks();
 }
 
-/// Connects if necessary, reads everything, and only then takes the new epoch.
+/// Connects if necessary, reads everything, and only then begins the new epoch.
 bool ModbusDialogue::synchronise() {
   if (!connection_.connected() && !connection_.connect()) {
     const std::scoped_lock lock(health_mutex_);
@@ -204,7 +204,7 @@ bool ModbusDialogue::read_written() {
       words.resize(request.count);
       const Exchange exchange = with_retries(
           [&] { return connection_.read(config_.unit, request.table, request.address, words); });
-      // A device may lack these registers, with an exception or without an answer.
+      // A device may lack these registers: it answers with an exception or not at all.
       const bool goes_without = refused_ && exchange.fault() == Fault::device_error;
       if (!exchange.ok() && !goes_without && ++written_asked_ < asked_max) {
         return note_unread(request, exchange);
@@ -217,7 +217,7 @@ bool ModbusDialogue::read_written() {
   return true;
 }
 
-/// An unanswered write may have been taken: the registers as last read are not in effect any more.
+/// An unanswered write may have been taken: the registers last read may no longer be in effect.
 void ModbusDialogue::forget_written() noexcept {
   for (std::size_t axis = 0; axis < written_.size(); ++axis)
     if (written_[axis])
@@ -232,8 +232,8 @@ void ModbusDialogue::show_written(std::size_t axis, std::span<const std::uint16_
             state_.applied_um.begin() + static_cast<std::ptrdiff_t>(first_[axis]));
 }
 
-/// Behind an end of the link that answers for it, a controller restarts without a new link; its
-/// registers then hold none of the offsets written.
+/// Behind a gateway that answers for it, a controller restarts without a new link; its registers
+/// then hold none of the offsets written.
 bool ModbusDialogue::has_restarted() {
   for (std::size_t axis = 0; axis < written_.size(); ++axis) {
     const std::optional<WrittenOffsets>& written = written_[axis];
@@ -248,7 +248,7 @@ bool ModbusDialogue::has_restarted() {
   return false;
 }
 
-/// Before the next write, since a controller's program may change a register at its next scan.
+/// Done before the next write, since a controller's program may change a register at its next scan.
 /// @return false: the link is lost
 bool ModbusDialogue::compare_written() {
   if (!write_taken_) return true;
@@ -266,15 +266,15 @@ bool ModbusDialogue::compare_written() {
     show_written(axis, words);
     held = held && written->count();
   }
-  // The registers' content at the start of the link was not a written offset.
+  // At the start of the link the registers did not contain a written offset.
   if (!held) lose(false);
   return held;
 }
 
-/// One period: reads, and writes only if the read-back is explained by the offsets written. So no
-/// command computed before a re-homing was seen is written after it (a command carries the look it
-/// was computed from), and a slow controller still gets the newest command. A write without answer
-/// is not repeated before another read either: the controller can restart during the time-out. A
+/// One period: reads, and writes only if the offsets written explain the read-back. So no command
+/// computed before a re-homing was seen is written after it (a command carries the look it was
+/// computed from), and a slow controller still gets the newest command. A write without answer is
+/// not repeated before another read, since the controller can restart during the time-out. A
 /// refused write waits for the next period.
 void ModbusDialogue::exchange() {
   write_failed_ = false;
@@ -308,7 +308,7 @@ bool ModbusDialogue::look() {
   return true;
 }
 
-/// An amplifier whose voltage is not a number may have been moved meanwhile.
+/// An amplifier whose voltage is unknown may have been moved meanwhile.
 bool ModbusDialogue::shows_piezos() const noexcept {
   for (std::size_t axis = 0; axis < piezos_.size(); ++axis)
     if (piezos_[axis] && config_.axes[axis].reads_back() && !std::isfinite(shown_V_[axis]))
@@ -375,7 +375,7 @@ bool ModbusDialogue::write_command() {
   for (std::optional<WrittenOffsets>& written : written_)
     if (written) written->taken();
   gate_.sent(now);
-  if (requests.empty()) return true;  // no axis is driven, and nothing else is to be written
+  if (requests.empty()) return true;  // no axis is driven, and nothing else must be written
   const auto untaken = std::find_if(written_.begin(), written_.end(), [](const auto& written) {
     return written && !written->untaken().empty();
   });
@@ -409,7 +409,7 @@ bool ModbusDialogue::write(const WriteField& request) {
   ++health_.write_errors;
   WriteHealth& last = health_.write;
   ++(refused_ ? last.refused : last.unanswered);
-  const bool is_s7 = s7_of(config_.line) != nullptr;  // then only the text has the place
+  const bool is_s7 = s7_of(config_.line) != nullptr;  // only then the text names the place
   last.function = is_s7 ? 0 : config_.write_function;
   last.address = is_s7 ? 0 : request.address;
   last.exception = is_s7 ? exchange.exception_code & 0x7F : exchange.exception_code;
@@ -495,7 +495,7 @@ void ModbusDialogue::show_travels() noexcept {
   }
 }
 
-/// At a new epoch the drives start from the amplifiers' voltages, where these are read.
+/// At a new epoch the drives start from the amplifiers' voltages, if these are read.
 void ModbusDialogue::restart_piezos() {
   for (std::size_t axis = 0; axis < piezos_.size(); ++axis) {
     if (!piezos_[axis]) continue;
@@ -536,7 +536,7 @@ void ModbusDialogue::publish(bool online) {
   states_.publish();
 }
 
-/// The controller answers reads but does not take writes: it stays online.
+/// A controller that answers reads but refuses writes stays online.
 void ModbusDialogue::lose_by_write() {
   write_failed_ = true;
   write_taken_ = false;

@@ -20,21 +20,21 @@
 namespace thermocomp {
 
 /// Each period: reads everything back and publishes it, then writes the newest command (offsets,
-/// then valid bits, then heartbeat, neighbours in one request). If no offset sent lately explains
-/// the applied offset of an axis, a new epoch of the same link begins and nothing is written
-/// (WriteGate). A time-out or a lost connection begins another link; an exception or a pause of the
-/// cycle does not. A controller that answers reads and refuses or ignores writes stays online and
-/// is retried a period later; ControllerState::written shows it. A piezo jumps to each new offset
-/// by way of 0 V: its drive and the estimator's comparison check its position.
+/// then valid bits, then heartbeat; adjacent registers in one request). If no offset sent lately
+/// explains the applied offset of an axis, a new epoch of the same link begins and nothing is
+/// written (WriteGate). A time-out or a lost connection begins a new link; an exception or a pause
+/// of the cycle does not. A controller that answers reads and refuses or ignores writes stays
+/// online and is retried a period later; ControllerState::written shows it. A piezo goes to each
+/// new offset via 0 V: its drive and the estimator's comparison check its position.
 ///
 /// For an axis whose controller interpolates along its travel, the offsets of all nodes are written
-/// as one numbered set (ModbusTravel) while all of them are valid. Numbering continues from the
-/// number in `end` whenever everything is read anew, so that an incomplete set of an earlier writer
-/// is never taken for a complete one.
+/// as one numbered set (ModbusTravel) while all of them are valid. Whenever everything is read
+/// anew, numbering continues from the number in `end`, so that an incomplete set of an earlier
+/// writer never appears complete.
 ///
 /// For an axis without read-back, a new link reads the written registers instead (WrittenOffsets):
-/// applied_um is their content when they were read last, NaN if they cannot be read. While they
-/// keep another value than those written, no write counts as confirmed.
+/// applied_um is their content at the last read, NaN if they cannot be read. While they hold
+/// another value than those written, no write counts as confirmed.
 ///
 /// The register of an axis whose command is not valid is not written; its valid bit is 0. The
 /// heartbeat is incremented with every command written and wraps around. Valid bits and heartbeat
@@ -47,9 +47,9 @@ class ModbusDialogue final : public LineUser {
 
   [[nodiscard]] const ModbusLine& line() const noexcept override { return config_.line; }
   [[nodiscard]] nanoseconds next_action_at() const noexcept override;
-  /// Exchange of one period; first connects and reads everything back if necessary.
+  /// One period's exchange; first connects and reads everything back if necessary.
   void act() override;
-  /// From any thread: the present exchange is not retried.
+  /// Ends retries of the present exchange; from any thread.
   void end_soon() noexcept { ending_.store(true); }
   [[nodiscard]] bool ending() const noexcept { return ending_.load(); }
   /// Writes the last command if that is permitted.
@@ -110,7 +110,7 @@ class ModbusDialogue final : public LineUser {
   ModbusConnection& connection_;
   WriteGate gate_;
   std::vector<std::optional<PiezoDrive>> piezos_;       ///< one per axis
-  std::vector<std::optional<WrittenOffsets>> written_;  ///< one per axis; none: it is read back
+  std::vector<std::optional<WrittenOffsets>> written_;  ///< one per axis; none: has a read-back
   int written_asked_{0};                                ///< consecutive failed attempts
   nanoseconds compare_at_{};                            ///< next compare_written() of all
   std::array<double, axes_max> shown_V_{};       ///< voltages of the amplifiers, one per axis

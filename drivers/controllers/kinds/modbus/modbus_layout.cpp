@@ -219,7 +219,7 @@ void WrittenOffsets::left_out() {
 bool WrittenOffsets::is_to_be_compared(bool is_due) const noexcept {
   if (words_.empty() || held_ == Held::no) return false;
   if (held_ == Held::yes) return is_due;
-  // Registers that hold nothing also show zeros.
+  // Registers that hold nothing are also read as zeros.
   return std::any_of(words_.begin(), words_.end(), [](std::uint16_t word) { return word != 0; });
 }
 

@@ -1,4 +1,4 @@
-/// Register layout of a controller: read plan, set of a travel, and the offset registers of an axis
+/// Register layout of a controller: read plan, set of a travel, and offset registers of an axis
 /// without read-back. Pure.
 #pragma once
 
@@ -30,7 +30,7 @@ struct ReadPlan {
   std::vector<ValuePlace> places;  ///< one per value, in the order given
 };
 
-/// Few requests that cover all values: neighbours of one table are joined over at most
+/// Plans few requests for all values: neighbours in one table are joined over at most
 /// gap_registers_max unused words; a request has at most registers_per_request_max registers or
 /// 2000 bits.
 [[nodiscard]] ReadPlan plan_reads(std::span<const ModbusValue> values,
@@ -51,11 +51,11 @@ struct WriteField {
 [[nodiscard]] std::vector<WriteField> join_writes(std::vector<WriteField> fields,
                                                   std::size_t registers_max);
 
-/// Uses the configured write function.
+/// Writes with the configured function.
 Exchange write_field(ModbusConnection& connection, const ModbusControllerConfig& config,
                      const WriteField& request);
 
-/// True if the controller itself refused, not a gateway in front of it.
+/// True if the controller itself refused, not a gateway before it.
 [[nodiscard]] bool is_refused(const Exchange& exchange) noexcept;
 /// "DB100, bytes 0..9"
 [[nodiscard]] std::string s7_place(const S7Block& s7, std::size_t address, std::size_t count);
@@ -85,15 +85,16 @@ void check_layout(const ModbusControllerConfig& config);
 [[nodiscard]] double shown_resolution_um(const ModbusTravel& travel, std::size_t node);
 
 /// Written registers need not keep their values: a device may answer 0 or anything. They are
-/// compared once with the values written, and not used if they differ. If they held them, they are
-/// compared now and then: if they differ twice in succession, the controller does not take writes.
+/// compared once with the values written, and not used if they differ. If they are equal, they are
+/// compared from time to time: two differences in succession mean that the controller does not take
+/// writes.
 class WrittenOffsets {
  public:
   explicit WrittenOffsets(const ModbusAxis& axis);
 
   /// Registers of the offset, or of the set of a travel, in one request.
   [[nodiscard]] const ReadRequest& request() const noexcept { return request_; }
-  /// True if the registers may hold the values written.
+  /// False if the registers are known not to hold the values written.
   [[nodiscard]] bool count() const noexcept { return held_ != Held::no; }
   /// @param words  as read; empty: refused
   /// @return one per node of the axis, as sent: [um], of a piezo [V]; NaN: unknown
@@ -101,18 +102,18 @@ class WrittenOffsets {
 
   void wrote(const WriteField& field);
   void taken();     ///< the words of wrote() were answered
-  void left_out();  ///< not written: the axis is not driven
+  void left_out();  ///< the words were not written: the axis is not driven
   /// True if a read now would show whether the registers hold the values written.
-  /// @param is_due  the last read is some time ago
+  /// @param is_due  true if the last read is some time ago
   [[nodiscard]] bool is_to_be_compared(bool is_due) const noexcept;
   void compare(std::span<const std::uint16_t> words);
   /// True if an offset is written, and the registers are known to hold it.
   [[nodiscard]] bool holds_known_offset() const noexcept {
     return held_ == Held::yes && !taken_.empty();
   }
-  /// Whether the registers hold the newest offsets written or the newest one answered.
+  /// True if the registers hold the newest offsets written or the newest ones answered.
   [[nodiscard]] bool is_one_written(std::span<const std::uint16_t> words) const noexcept;
-  /// "-17.30 was written, -5.46 is read"; empty: writes are taken, as far as known.
+  /// "-17.30 was written, -5.46 is read"; empty: writes are taken, or it is unknown.
   [[nodiscard]] const std::string& untaken() const noexcept { return untaken_; }
 
  private:
@@ -122,7 +123,7 @@ class WrittenOffsets {
   ReadRequest request_;
   Held held_{Held::not_known};
   std::vector<std::uint16_t> words_;         ///< written last
-  std::vector<std::uint16_t> words_before_;  ///< the newest others, which may still be shown
+  std::vector<std::uint16_t> words_before_;  ///< the newest others, which a read may still return
   std::vector<std::uint16_t> taken_;         ///< the newest that was answered
   bool differed_{false};                     ///< at the last comparison
   std::string untaken_;

@@ -40,7 +40,7 @@ double displacement_at(const PiezoConfig& config, double volt) noexcept {
 PiezoDrive::PiezoDrive(const PiezoConfig& config) : config_((config.validate(), config)) {}
 
 void PiezoDrive::restart_at(double read_V) noexcept {
-  // From a drive in use, only a voltage that it has reached from 0 V itself and was not leaving.
+  // A voltage of a drive in use counts only if it was reached from 0 V and was not being left.
   const bool from_zero = !std::isfinite(volt_) || (known_ && obeyed_ && !zeroing_);
   known_ = zeroing_ = false;
   volt_ = asked_um_ = followed_um_ = not_a_number;
@@ -58,8 +58,8 @@ void PiezoDrive::show(nanoseconds now, double read_V) noexcept {
   // Before the first voltage the setpoint is 0 V.
   const double meant_V = std::isfinite(volt_) ? volt_ : 0.0;
   const bool as_meant = std::abs(read_V - meant_V) <= config_.tolerance_V;
-  // An amplifier that did not obey obeys again when it shows its setpoint; then that was not
-  // reached from 0 V, unless it is 0 V.
+  // An amplifier obeys again when it shows its setpoint; unless that is 0 V, it was not reached
+  // from 0 V.
   const bool again = as_meant && !obeyed_ && meant_V > config_.tolerance_V;
   if ((!as_meant && !on_its_way) || again) known_ = false;
   obeyed_ = as_meant || (obeyed_ && on_its_way && std::isfinite(read_V));
@@ -84,7 +84,7 @@ double PiezoDrive::next(nanoseconds now, double offset_um) noexcept {
   }
   if (zeroing_) {
     if (seconds(now - zero_since_) < config_.settle_s) return volt_;
-    // The offset may have changed since the way to 0 V began.
+    // The offset may have changed during the way to 0 V.
     zeroing_ = false;
     known_ = true;
     followed_um_ = asked_um_;

@@ -20,10 +20,10 @@ class PiezoDrive {
  public:
   explicit PiezoDrive(const PiezoConfig& config);
 
-  /// After a lost link: the voltage in effect is unknown.
+  /// Call after a lost link: the voltage in effect is unknown.
   void restart() noexcept { known_ = false; }
-  /// The same with the voltage read back: it is kept, and approached anew only if this drive knows
-  /// that it was not reached from 0 V. 0 V is the rest of an amplifier without setpoint.
+  /// Call with a voltage read back after that: it is kept, and approached anew only if this drive
+  /// knows that it was not reached from 0 V. An amplifier without setpoint rests at 0 V.
   void restart_at(double read_V) noexcept;
   /// @param now  must not run backwards. @return volts within the curve; NaN: nothing to write yet
   [[nodiscard]] double step(nanoseconds now, double offset_um) noexcept;
@@ -31,10 +31,10 @@ class PiezoDrive {
   /// Takes the amplifier's voltage. If it is neither the one written nor on the way to it, the
   /// offset is approached anew once it is steady.
   void show(nanoseconds now, double read_V) noexcept;
-  /// True if the voltage was the setpoint, or on its way there since it last was.
+  /// True if the voltage is the setpoint, or has been on its way there since it last was.
   [[nodiscard]] bool obeyed() const noexcept { return obeyed_; }
   /// Offset of the present voltage: while the amplifier obeys, the commanded one, even if it is not
-  /// followed yet; else that of the curve, and 0 at rest. NaN: not read.
+  /// reached yet; else that of the curve, and 0 at rest. NaN: not read.
   [[nodiscard]] double applied_um() const noexcept { return applied_um_; }
 
  private:
