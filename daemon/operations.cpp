@@ -169,7 +169,7 @@ RpcPending Operations::reload(const std::optional<std::filesystem::path>& candid
   };
 }
 
-void Operations::hang_up() {
+void Operations::reload_by_signal() {
   reload_again_ = reload_.has_value();
   if (reload_again_) return;
   try {
@@ -226,7 +226,7 @@ void Operations::finish_loading() {
 void Operations::end_reload() {
   reload_.reset();
   parts_.service.ready(parts_.status_line());
-  if (std::exchange(reload_again_, false)) hang_up();
+  if (std::exchange(reload_again_, false)) reload_by_signal();
 }
 
 void Operations::poll() {

@@ -56,7 +56,7 @@ class Operations {
   [[nodiscard]] RpcPending reload(
       const std::optional<std::filesystem::path>& candidate = std::nullopt);
   /// Reload by SIGHUP. Any number of signals during a reload cause one further reload.
-  void hang_up();
+  void reload_by_signal();
 
   void poll();
   [[nodiscard]] bool is_busy() const noexcept { return cycle_.is_busy(); }

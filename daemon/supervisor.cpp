@@ -136,7 +136,7 @@ bool Supervisor::take_signals() {
     spdlog::info("stopping: {}", why);
     parts_.journal.daemon("stopping", why);
   }
-  if (asked.reload && asked.stop == 0) parts_.operations.hang_up();
+  if (asked.reload && asked.stop == 0) parts_.operations.reload_by_signal();
   return asked.stop != 0;
 }
 
@@ -164,7 +164,8 @@ void Supervisor::note_report() {
   const Report& report = parts_.cycle.report();
   const bool all_driven = std::all_of(report.axes.begin(), report.axes.end(),
                                       [](const AxisReport& axis) { return axis.driven; });
-  const bool moved = moves(parts_.config.model) || parts_.config.estimator.correction.learns_bias();
+  const bool moved =
+      has_gain(parts_.config.model) || parts_.config.estimator.correction.learns_bias();
   if (report.mode != Mode::compensating || !all_driven || !moved) idle_until_ = Clock::now();
   if (trend_.is_due(report.now))
     trend_.note(report.now, parts_.config.model.temperature_columns(), report.inputs);

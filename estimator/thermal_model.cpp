@@ -89,7 +89,7 @@ std::string half_of(const DiameterSpec& diameter) {
   return std::string(diameter.sign < 0 ? "-half of " : "half of ") + diameter.output;
 }
 
-ThermalModel of_axes(ThermalModel model) {
+ThermalModel in_axis_units(ThermalModel model) {
   for (const DiameterSpec& diameter : model.diameters) {
     const double half = 0.5 * diameter.sign;
     const auto scale = [half](std::vector<double>& values) {
@@ -124,7 +124,7 @@ ThermalModel of_axes(ThermalModel model) {
   return model;
 }
 
-bool are_alike(const ThermalModel& a, const ThermalModel& b) {
+bool predict_the_same(const ThermalModel& a, const ThermalModel& b) {
   return a.inputs == b.inputs && a.outputs == b.outputs && a.reference_degC == b.reference_degC &&
          a.matrix_um_per_K == b.matrix_um_per_K && a.guideways == b.guideways &&
          a.terms == b.terms && a.diameters == b.diameters && a.made_from == b.made_from;
@@ -146,7 +146,7 @@ bool has_other_than_zero(const std::map<std::string, std::vector<std::vector<dou
 
 }  // namespace
 
-bool moves(const ThermalModel& model, const std::string& output) {
+bool has_gain(const ThermalModel& model, const std::string& output) {
   for (std::size_t i = 0; i < std::min(model.outputs.size(), model.matrix_um_per_K.size()); ++i)
     if (model.outputs[i] == output && has_other_than_zero(model.matrix_um_per_K[i])) return true;
   for (const GuidewaySpec& guideway : model.guideways)
@@ -161,9 +161,9 @@ bool moves(const ThermalModel& model, const std::string& output) {
   return false;
 }
 
-bool moves(const ThermalModel& model) {
+bool has_gain(const ThermalModel& model) {
   return std::any_of(model.outputs.begin(), model.outputs.end(),
-                     [&](const std::string& output) { return moves(model, output); });
+                     [&](const std::string& output) { return has_gain(model, output); });
 }
 
 bool is_compared(const ThermalModel& model) {

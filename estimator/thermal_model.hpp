@@ -171,12 +171,12 @@ struct ThermalModel {
 [[nodiscard]] bool is_compared(const ThermalModel& model);
 
 /// Whether both predict the same displacement and have the same domain.
-[[nodiscard]] bool are_alike(const ThermalModel& a, const ThermalModel& b);
+[[nodiscard]] bool predict_the_same(const ThermalModel& a, const ThermalModel& b);
 
 /// Some coefficient is not zero; `thermocomp init` writes zeros.
-[[nodiscard]] bool moves(const ThermalModel& model);
+[[nodiscard]] bool has_gain(const ThermalModel& model);
 /// Some coefficient of this output is not zero.
-[[nodiscard]] bool moves(const ThermalModel& model, const std::string& output);
+[[nodiscard]] bool has_gain(const ThermalModel& model, const std::string& output);
 
 /// nullptr: the output is no diameter.
 [[nodiscard]] const DiameterSpec* diameter_of(const ThermalModel& model,
@@ -185,7 +185,7 @@ struct ThermalModel {
 [[nodiscard]] std::string half_of(const DiameterSpec& diameter);
 /// The model with each diameter replaced by the displacement of its axis: half of it with its sign,
 /// in matrix, guideways, terms and remainders.
-[[nodiscard]] ThermalModel of_axes(ThermalModel model);
+[[nodiscard]] ThermalModel in_axis_units(ThermalModel model);
 
 /// A parameter of a kind of term.
 struct TermParameter {

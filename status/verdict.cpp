@@ -280,7 +280,7 @@ class Causes {
 
 /// The axis farthest from its target: "z has 35.1 um still to go to -48.6 um". Empty if every axis
 /// is nearer than a lost input may leave it. An axis at its bound is a trouble.
-std::string way_text(const std::vector<AxisStatus>& axes) {
+std::string distance_to_target_text(const std::vector<AxisStatus>& axes) {
   const AxisStatus* farthest = nullptr;
   const auto way = [](const AxisStatus& axis) { return std::abs(axis.target - axis.offset); };
   for (const AxisStatus& axis : axes)
@@ -328,7 +328,7 @@ Verdict verdict(const Status& status) {
             status.mode_since_s};
   }
   if (is_compensating(status))
-    return {true, true, "yes", "", status.compensating_s, way_text(status.axes)};
+    return {true, true, "yes", "", status.compensating_s, distance_to_target_text(status.axes)};
   if (status.mode == Mode::compensating) {
     const auto idle = axes_not_driven(status);
     return {false, false, "no",

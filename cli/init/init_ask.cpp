@@ -55,7 +55,7 @@ std::vector<std::string> proposed_names(const InitDraft& draft, const InitModule
 
 /// Offers another word order if all channels give a temperature only with that one.
 void offer_word_order(const InitDraft& draft, const InitModule& form, InitModule& asked,
-                      Questions& questions, const InitEyes& eyes) {
+                      Questions& questions, const MachineQueries& eyes) {
   if (!form.preset.empty() || asked.channels.size() == form.channels.size() ||
       form.registers.encoding.ends_with("16"))
     return;
@@ -74,14 +74,14 @@ void offer_word_order(const InitDraft& draft, const InitModule& form, InitModule
 }
 
 /// @throws Failure with the presets as its text, so that the question is repeated
-[[noreturn]] void show_presets(const std::string& word, const InitEyes& eyes) {
+[[noreturn]] void show_presets(const std::string& word, const MachineQueries& eyes) {
   std::string text;
   for (const std::string& line : eyes.preset_lines(word)) text += "\n    " + line;
   throw Failure(text.empty() ? word + ": no preset has this word" : "presets:" + text);
 }
 
 void ask_for_module(InitDraft& draft, std::size_t bus, int unit, Questions& questions,
-                    const InitEyes& eyes) {
+                    const MachineQueries& eyes) {
   const std::string where = "unit " + std::to_string(unit) + " on " + bus_text(draft.buses.at(bus));
   InitModule module;
   module.bus = bus;
@@ -125,7 +125,7 @@ void ask_for_module(InitDraft& draft, std::size_t bus, int unit, Questions& ques
   draft.modules.push_back(module);
 }
 
-void ask_for_modules(InitDraft& draft, Questions& questions, const InitEyes& eyes) {
+void ask_for_modules(InitDraft& draft, Questions& questions, const MachineQueries& eyes) {
   for (std::size_t bus = 0; bus < draft.buses.size();) {
     const std::string name = bus_text(draft.buses[bus]);
     std::vector<int> units;
@@ -278,7 +278,7 @@ void refuse_unnamed_channels(const InitModule& module) {
 }
 
 void ask_for_rest(InitDraft& draft, bool has_controller, Questions& questions,
-                  const InitEyes& eyes) {
+                  const MachineQueries& eyes) {
   if (draft.buses.empty()) ask_for_buses(draft, questions);
   if (draft.modules.empty()) ask_for_modules(draft, questions, eyes);
   if (!has_controller) ask_for_controller(draft, questions);

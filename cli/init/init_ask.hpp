@@ -45,7 +45,7 @@ class Questions {
 
 /// Queries to the machine during the interview. find_units and try_module are empty if no bus is to
 /// be scanned.
-struct InitEyes {
+struct MachineQueries {
   std::function<std::vector<int>(const InitBus&)> find_units;
   /// One line for each preset that contains the word.
   std::function<std::vector<std::string>(const std::string&)> preset_lines;
@@ -59,7 +59,7 @@ void refuse_unnamed_channels(const InitModule& module);
 
 /// Asks for everything that the draft lacks; body of an interview.
 void ask_for_rest(InitDraft& draft, bool has_controller, Questions& questions,
-                  const InitEyes& eyes);
+                  const MachineQueries& eyes);
 
 [[nodiscard]] std::vector<std::string> missing_signals(const InitDraft& draft);
 

@@ -247,7 +247,7 @@ int run_init(const InitOptions& options) {
   }
   const bool are_asked_for = given.modules.empty();
   if (!are_asked_for) settle_modules(given);  // from options: cannot be asked again
-  InitEyes eyes = eyes_of(folder);
+  MachineQueries eyes = eyes_of(folder);
   if (options.no_scan) eyes.find_units = nullptr;
   if (options.no_scan) eyes.try_module = nullptr;
   questions.interview([&] {

@@ -223,8 +223,8 @@ std::vector<std::string> try_module(const InitDraft& draft, InitModule& module,
   return lines;
 }
 
-InitEyes eyes_of(const fs::path& folder) {
-  InitEyes eyes;
+MachineQueries eyes_of(const fs::path& folder) {
+  MachineQueries eyes;
   // Cached, so that an interview that goes back does not search again.
   eyes.find_units = [known =
                          std::map<std::string, std::vector<int>>{}](const InitBus& bus) mutable {

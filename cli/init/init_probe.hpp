@@ -27,6 +27,6 @@ void check_draft(const InitDraft& draft, const std::filesystem::path& folder);
 std::vector<std::string> try_module(const InitDraft& draft, InitModule& module,
                                     const std::filesystem::path& folder);
 
-[[nodiscard]] InitEyes eyes_of(const std::filesystem::path& folder);
+[[nodiscard]] MachineQueries eyes_of(const std::filesystem::path& folder);
 
 }  // namespace thermocomp::cli

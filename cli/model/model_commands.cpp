@@ -116,7 +116,7 @@ int run_correction(const CourseOptions& options) {
   RunLoader loader(options.columns);
   for (const std::string& record : options.records) {
     for (RunFile& part : between_references(load_record(record, loader))) {
-      for (const Blunders& each : leave_out_blunders(part, model.outputs))
+      for (const Outliers& each : leave_out_outliers(part, model.outputs))
         std::fprintf(stderr, "%s: %s\n", part.name.c_str(), each.text().c_str());
       runs.push_back(std::move(part));
     }

@@ -480,7 +480,7 @@ MachineWeek machine_week(const std::filesystem::path& history, const WallSpan& s
             merged(spans_of(
                 reader.segments(), setups,
                 [](const ReplaySetup& setup) {
-                  return !moves(setup.model) && !setup.estimator.correction.learns_bias();
+                  return !has_gain(setup.model) && !setup.estimator.correction.learns_bias();
                 },
                 span)));
   week.outages = outages_of(events, span);
@@ -514,7 +514,7 @@ MachineWeek machine_week(const std::filesystem::path& history, const WallSpan& s
   }
   // The score of a model other than the present one, as before a promotion, is outdated.
   const ReplaySetup* last = setups.at(span.to_s);
-  if (scored != nullptr && last != nullptr && !are_alike(scored->model, last->model))
+  if (scored != nullptr && last != nullptr && !predict_the_same(scored->model, last->model))
     week.candidate.reset();
   return week;
 }

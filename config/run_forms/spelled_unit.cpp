@@ -175,9 +175,9 @@ bool split_brackets(std::string_view header, SpelledName& name) {
   return false;
 }
 
-/// "T1°C", "z/µm": characters that occur in units only.
+/// "T1°C", "z/µm", "t1_degF": characters that occur in units only, and our suffix of another unit.
 bool split_letters(std::string_view header, SpelledName& name) {
-  for (const std::string_view unit : {"°C", "ºC", "℃", "°F", "ºF", "µm", "μm"}) {
+  for (const std::string_view unit : {"°C", "ºC", "℃", "°F", "ºF", "_degF", "µm", "μm"}) {
     if (!header.ends_with(unit)) continue;
     std::string_view base = header.substr(0, header.size() - unit.size());
     while (!base.empty() && (base.back() == '/' || base.back() == '_')) base.remove_suffix(1);

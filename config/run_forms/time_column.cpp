@@ -216,7 +216,7 @@ void find_fraction(const TextTable& table, TimeColumns& time) {
 }
 
 /// Finds a column of only AM and PM that belongs to a clock.
-void find_half(const TextTable& table, TimeColumns& time) {
+void find_am_pm(const TextTable& table, TimeColumns& time) {
   constexpr std::string_view halves = "|am|pm|";
   if (table.rows() == 0) return;
   const auto stamp = parse_time_stamp(table.columns[time.columns.back()].fields[0]);
@@ -587,7 +587,7 @@ std::optional<TimeColumns> find_time(TextTable& table) {
   std::ranges::for_each(time->columns, mark);
   if (time->columns.empty() || time->columns.size() > 2) return time;
   find_fraction(table, *time);
-  find_half(table, *time);
+  find_am_pm(table, *time);
   if (time->fraction) mark(*time->fraction);
   if (time->half) mark(*time->half);
   return time;

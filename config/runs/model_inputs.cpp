@@ -122,6 +122,11 @@ constexpr double usual_deviations = 12.0;
 constexpr double share_of_way = 0.25;
 /// At an end, only its size distinguishes an outlier from the machine's first step.
 constexpr double share_of_way_at_end = 0.5;
+/// Few values are far apart in time: a genuine one may be as far from its neighbours as the column
+/// ranges, and the first of a warm-up farther, since the others have settled.
+constexpr std::size_t few_values = 60;
+constexpr double share_of_way_of_few = 1.0;
+constexpr double share_of_way_at_end_of_few = 10.0;
 constexpr double share_max = 0.1;  ///< of the values; more are the column's own course
 constexpr std::size_t stuck_rows_min = 10;
 constexpr std::size_t stuck_longer_min = 3;  ///< times the second longest stretch of one value
@@ -149,8 +154,8 @@ double way_of(const Values& values, const Values& leaps) {
   return expected[expected.size() - 1 - rim] - expected[rim];
 }
 
-Blunders blunders_of(const RunFile& run, const std::string& column) {
-  Blunders found;
+Outliers blunders_of(const RunFile& run, const std::string& column) {
+  Outliers found;
   found.column = column;
   Values values;
   Values times_s;
@@ -165,8 +170,10 @@ Blunders blunders_of(const RunFile& run, const std::string& column) {
     const Values leaps = leaps_of(values);
     const double usual_um = usual_deviations * robust_deviation(leaps);
     const double way_um = way_of(values, leaps);
-    const double limit_um = std::max(usual_um, share_of_way * way_um);
-    const double limit_at_end_um = std::max(usual_um, share_of_way_at_end * way_um);
+    const bool few = values.size() < few_values;
+    const double limit_um = std::max(usual_um, (few ? share_of_way_of_few : share_of_way) * way_um);
+    const double limit_at_end_um =
+        std::max(usual_um, (few ? share_of_way_at_end_of_few : share_of_way_at_end) * way_um);
     if (found.times_s.empty()) found.limit_um = limit_um;
     std::vector<std::size_t> off;
     for (std::size_t i = 0; i < leaps.size(); ++i) {
@@ -183,14 +190,14 @@ Blunders blunders_of(const RunFile& run, const std::string& column) {
     }
   }
   const auto count = static_cast<double>(found.times_s.size());
-  if (count > share_max * (count + static_cast<double>(values.size()))) return Blunders{};
+  if (count > share_max * (count + static_cast<double>(values.size()))) return Outliers{};
   std::sort(found.times_s.begin(), found.times_s.end());
   return found;
 }
 
 /// The longest stretch of one value, if it ends with a jump larger than any usual change.
-Blunders stuck_of(const RunFile& run, const std::string& column) {
-  Blunders found;
+Outliers stuck_of(const RunFile& run, const std::string& column) {
+  Outliers found;
   found.column = column;
   found.stuck = true;
   const Values& values = run.column(column);
@@ -217,7 +224,7 @@ Blunders stuck_of(const RunFile& run, const std::string& column) {
 
 }  // namespace
 
-std::string Blunders::text() const {
+std::string Outliers::text() const {
   const std::string unit(unit_of(column).symbol);
   if (stuck)
     return column + ": " + std::to_string(times_s.size()) + " values are left out, the same from " +
@@ -234,16 +241,16 @@ std::string Blunders::text() const {
   return text + (times_s.size() > times_named_max ? ", ... s" : " s");
 }
 
-std::vector<Blunders> leave_out_blunders(RunFile& run, const std::vector<std::string>& columns) {
-  std::vector<Blunders> all;
+std::vector<Outliers> leave_out_outliers(RunFile& run, const std::vector<std::string>& columns) {
+  std::vector<Outliers> all;
   for (const std::string& column : columns) {
     if (!run.find(column)) continue;
-    Blunders found = blunders_of(run, column);
+    Outliers found = blunders_of(run, column);
     if (!found.times_s.empty()) all.push_back(std::move(found));
-    Blunders stuck = stuck_of(run, column);
+    Outliers stuck = stuck_of(run, column);
     if (!stuck.times_s.empty()) all.push_back(std::move(stuck));
   }
-  for (const Blunders& each : all) {
+  for (const Outliers& each : all) {
     std::vector<double>& values = run.values[*run.find(each.column)];
     for (std::size_t row = 0; row < values.size(); ++row)
       if (std::binary_search(each.times_s.begin(), each.times_s.end(), run.time_s()[row]))

@@ -28,7 +28,7 @@ void refuse_overlap(std::span<const RunFile> runs);
 void refuse_overlap(std::span<const RunFile> train, std::span<const RunFile> test);
 
 /// Outliers of one column of a run.
-struct Blunders {
+struct Outliers {
   std::string column;
   std::vector<double> times_s;
   double size_um{0.0};   ///< the largest deviation, with its sign
@@ -41,12 +41,13 @@ struct Blunders {
 
 /// Sets outliers to missing. An outlier deviates from the median of its neighbours (four on each
 /// side; at an end from a robust line through its neighbours) by more than twelve robust standard
-/// deviations and a quarter (at an end half) of the column's range. A step is not an outlier, since
-/// the values after it agree. A column is stuck where it keeps one value for ten rows or more,
-/// three times as many as anywhere else, and then jumps by more than a quarter of its range and
-/// twelve robust standard deviations of its changes between rows.
+/// deviations and a quarter (at an end half) of the column's range; of fewer than 60 values, by its
+/// range (at an end ten times it). A step is not an outlier, since the values after it agree. A
+/// column is stuck where it keeps one value for ten rows or more, three times as many as anywhere
+/// else, and then jumps by more than a quarter of its range and twelve robust standard deviations
+/// of its changes between rows.
 /// @param columns  of displacement or tilt
-std::vector<Blunders> leave_out_blunders(RunFile& run, const std::vector<std::string>& columns);
+std::vector<Outliers> leave_out_outliers(RunFile& run, const std::vector<std::string>& columns);
 
 /// The columns point into the run file.
 struct ModelInputs {

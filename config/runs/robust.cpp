@@ -74,6 +74,21 @@ std::pair<double, double> range_of_reading(const std::vector<double>& values_deg
   return {changing[low] - beyond_K, changing[high] + beyond_K};
 }
 
+std::vector<std::size_t> stray_rows(const std::vector<double>& values) {
+  constexpr double times_usual = 5.0;
+  constexpr std::size_t usual_rows = 200;  // per stray row
+  std::vector<double> sizes;
+  for (const double each : values)
+    if (std::isfinite(each)) sizes.push_back(std::abs(each));
+  if (sizes.size() < usual_rows) return {};
+  const auto usual = sizes.end() - 1 - static_cast<std::ptrdiff_t>(sizes.size() / usual_rows);
+  std::nth_element(sizes.begin(), usual, sizes.end());
+  std::vector<std::size_t> rows;
+  for (std::size_t row = 0; row < values.size() && *usual > 0.0; ++row)
+    if (std::abs(values[row]) > times_usual * *usual) rows.push_back(row);
+  return rows;
+}
+
 std::pair<StillRows, std::size_t> longest_still(const std::vector<double>& values) {
   StillRows longest;
   std::size_t second = 1;

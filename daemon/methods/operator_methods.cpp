@@ -207,7 +207,7 @@ RpcPending note_measured(const DaemonActions& actions, const json& params) {
   const double left_um = displacement_um + effect_um;
   const double expected_um = remains ? left_um : displacement_um;
   // A model of zeros expects nothing; without a correction nothing is learned from the value.
-  if (moves(view.config.model) || view.config.estimator.correction.form != CorrectionForm::off) {
+  if (has_gain(view.config.model) || view.config.estimator.correction.form != CorrectionForm::off) {
     require_possible(view, command, expected_um);
     ask_back(view, command, expected_um, params);
   }

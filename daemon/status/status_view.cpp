@@ -329,15 +329,15 @@ std::map<std::string, double> by_axis(const StatusView& view, double AxisReport:
 }
 
 bool moves(const DaemonConfig& config) {
-  return moves(config.model) || config.estimator.correction.learns_bias();
+  return has_gain(config.model) || config.estimator.correction.learns_bias();
 }
 
 std::vector<std::string> still_axes(const DaemonConfig& config) {
   std::vector<std::string> names;
-  if (!moves(config.model) || config.estimator.correction.learns_bias()) return names;
+  if (!has_gain(config.model) || config.estimator.correction.learns_bias()) return names;
   for (const AxisSpan& span : axis_spans(config.estimator.axes)) {
     const AxisConfig& axis = config.estimator.axes[span.first];
-    if (!moves(config.model, axis.output)) names.push_back(axis_name(axis));
+    if (!has_gain(config.model, axis.output)) names.push_back(axis_name(axis));
   }
   return names;
 }

@@ -65,7 +65,7 @@ nanoseconds WriteGate::next_pause() noexcept {
   return period_ / first_looks;
 }
 
-bool WriteGate::explains(const std::array<double, axes_max>& applied_um) noexcept {
+bool WriteGate::check_read_back(const std::array<double, axes_max>& applied_um) noexcept {
   bool explained = true;
   ++look_;
   unseen_.fill(false);
@@ -99,7 +99,7 @@ bool WriteGate::explains(const std::array<double, axes_max>& applied_um) noexcep
 }
 
 /// True if the axis has moved since its first command was computed.
-bool WriteGate::starts_elsewhere(std::size_t axis) const noexcept {
+bool WriteGate::moved_since_command(std::size_t axis) const noexcept {
   return command_.valid[axis] && sent_[axis].count == 0 && command_.look < unchanged_since_[axis];
 }
 
@@ -115,7 +115,7 @@ SendVerdict WriteGate::verdict(nanoseconds now) const noexcept {
     if (unseen_[axis] && command_.valid[axis]) return SendVerdict::nothing_to_send;
   if (last_sent_ && now - *last_sent_ > patience()) return SendVerdict::resynchronise;
   for (std::size_t axis = 0; axis < axes_max; ++axis)
-    if (starts_elsewhere(axis)) return SendVerdict::resynchronise;
+    if (moved_since_command(axis)) return SendVerdict::resynchronise;
   return SendVerdict::send;
 }
 

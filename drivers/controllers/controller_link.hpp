@@ -116,7 +116,7 @@ class WriteGate {
   [[nodiscard]] bool link_is_new() const noexcept { return link_is_new_; }
   /// The newest epoch; 0: never synchronised.
   [[nodiscard]] std::uint32_t epoch() const noexcept { return epoch_; }
-  /// Number of the last read-back: counts synchronised() and explains().
+  /// Number of the last read-back: counts synchronised() and check_read_back().
   [[nodiscard]] std::uint64_t look() const noexcept { return look_; }
 
   /// Takes the command that the cycle offers, possibly the same again.
@@ -134,8 +134,9 @@ class WriteGate {
     return confirmed_at_ && now - *confirmed_at_ <= patience();
   }
   /// Notes the duration of the link's last exchange, so that patience() fits a slow controller.
-  void turned(nanoseconds took) noexcept { turn_ = took; }
-  /// Longest time between two writes: five periods, a second, or twice the last turned().
+  void note_exchange_time(nanoseconds took) noexcept { turn_ = took; }
+  /// Longest time between two writes: five periods, a second, or twice the last
+  /// note_exchange_time().
   [[nodiscard]] nanoseconds patience() const noexcept { return std::max(patience_min_, 2 * turn_); }
 
   /// Pause before the link's next exchange; call once per exchange. A period, but at first a
@@ -147,10 +148,10 @@ class WriteGate {
   /// have moved: nothing is sent while such an axis is driven.
   /// @return false if no offset sent explains that of a driven axis (re-homed, overridden): an
   /// offset already computed would be a jump, so synchronised() must precede the next send
-  [[nodiscard]] bool explains(const std::array<double, axes_max>& applied_um) noexcept;
+  [[nodiscard]] bool check_read_back(const std::array<double, axes_max>& applied_um) noexcept;
 
  private:
-  [[nodiscard]] bool starts_elsewhere(std::size_t axis) const noexcept;
+  [[nodiscard]] bool moved_since_command(std::size_t axis) const noexcept;
 
   nanoseconds period_;
   nanoseconds patience_min_;

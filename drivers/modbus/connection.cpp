@@ -275,7 +275,7 @@ void ModbusConnection::Implementation::await_answer(nanoseconds deadline, Exchan
     }
     if (found != ModbusFrames::Found::nothing) {
       exchange.outcome = ExchangeOutcome::bad_frame;
-      exchange.detail = frames_.came();
+      exchange.detail = frames_.unexpected_text();
       return;
     }
     if (is_over) return judge_silence(exchange);
@@ -305,13 +305,14 @@ void ModbusConnection::Implementation::await_answer(nanoseconds deadline, Exchan
 void ModbusConnection::Implementation::judge_silence(Exchange& exchange) const {
   const std::string within =
       " within timeout_ms = " + std::to_string(std::chrono::round<milliseconds>(timeout_).count());
-  const std::string came = frames_.came();
+  const std::string unexpected = frames_.unexpected_text();
   // In TCP, bytes after the start of a frame cannot be distinguished from its rest.
-  const bool is_silent = came.empty() || (frames_.came_late() && (rtu_ || !frames_.has_part()));
+  const bool is_silent =
+      unexpected.empty() || (frames_.is_late_or_echo() && (rtu_ || !frames_.has_part()));
   exchange.outcome = is_silent ? ExchangeOutcome::timeout : ExchangeOutcome::bad_frame;
-  exchange.detail = came.empty()                       ? "no answer" + within
-                    : frames_.has_part() && !is_silent ? came + within
-                                                       : came + ", no answer" + within;
+  exchange.detail = unexpected.empty()                 ? "no answer" + within
+                    : frames_.has_part() && !is_silent ? unexpected + within
+                                                       : unexpected + ", no answer" + within;
 }
 
 Exchange ModbusConnection::Implementation::try_once(int unit, const Pdu& request,

@@ -224,7 +224,7 @@ ModbusFrames::Found ModbusFrames::judge_tcp() {
   return Found::other;
 }
 
-std::string ModbusFrames::came() const {
+std::string ModbusFrames::unexpected_text() const {
   if (!other_.empty()) return other_;
   if (has_part()) {
     const auto part = received().subspan(begin_);

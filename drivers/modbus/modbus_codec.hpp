@@ -58,7 +58,7 @@ class ModbusFrames {
   enum class Found {
     nothing,  ///< not yet
     answer,   ///< answer() of the unit, to the function
-    other,    ///< another frame, see came()
+    other,    ///< another frame, see unexpected_text()
     no_frame  ///< as `other`, and the start of the next frame is unknown
   };
   [[nodiscard]] Found look();
@@ -70,9 +70,11 @@ class ModbusFrames {
   [[nodiscard]] bool is_full() const noexcept;
 
   /// Description of bytes received instead of the answer; empty: none.
-  [[nodiscard]] std::string came() const;
+  [[nodiscard]] std::string unexpected_text() const;
   /// True if they were an answer to an earlier request, or the echo of this one.
-  [[nodiscard]] bool came_late() const noexcept { return late_ || (echoed_ && other_.empty()); }
+  [[nodiscard]] bool is_late_or_echo() const noexcept {
+    return late_ || (echoed_ && other_.empty());
+  }
 
  private:
   [[nodiscard]] std::span<const std::uint8_t> received() const noexcept {

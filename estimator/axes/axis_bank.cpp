@@ -64,10 +64,10 @@ bool AxisBank::synced() const noexcept {
   return any_known;
 }
 
-std::uint32_t AxisBank::forgotten() const noexcept {
+std::uint32_t AxisBank::last_offset_unknown() const noexcept {
   std::uint32_t bits = 0;
   for (std::size_t i = 0; i < axes_.size(); ++i)
-    if (axes_[i].forgotten()) bits |= 1u << i;
+    if (axes_[i].last_offset_unknown()) bits |= 1u << i;
   return bits;
 }
 
@@ -349,7 +349,7 @@ void AxisChannel::start_on_link(const AxisInput& input, bool fresh) noexcept {
 /// True if the read-back stayed the same while an offset far from all those sent lately was sent:
 /// no delay within mismatch_after_s explains that.
 bool AxisChannel::stands_still(double applied_um) const noexcept {
-  const Standing found = state_.pairs.standing(limiter_.offset_um(), applied_um);
+  const ConstantReadBack found = state_.pairs.standing(limiter_.offset_um(), applied_um);
   return check_.is_far(found.low_um) || check_.is_far(found.high_um);
 }
 

@@ -159,7 +159,7 @@ class AxisChannel {
     return start_.unknown ? StartEvidence::unknown : start_.by;
   }
   /// True if the last sent offset is unknown, with or without a link.
-  [[nodiscard]] bool forgotten() const noexcept {
+  [[nodiscard]] bool last_offset_unknown() const noexcept {
     return !reads_back_ && start_.by == StartEvidence::unknown;
   }
   /// Largest distance of the offset from the one on disk; NaN: not limited.
@@ -311,7 +311,7 @@ class AxisBank {
   /// True if all axes are synchronised and the last sent offset of at least one is known.
   [[nodiscard]] bool synced() const noexcept;
   /// One bit per axis: 1 if the last sent offset is unknown.
-  [[nodiscard]] std::uint32_t forgotten() const noexcept;
+  [[nodiscard]] std::uint32_t last_offset_unknown() const noexcept;
   /// True if the offset may be sent: all nodes of the axis' travel are driven.
   [[nodiscard]] bool driven(std::size_t axis) const noexcept { return driven(span_of_[axis]); }
   [[nodiscard]] const AxisSpan& span(std::size_t axis) const noexcept { return span_of_[axis]; }

@@ -142,8 +142,8 @@ double SentAndRead::spread_um(std::size_t pairs, double sent_um) const noexcept 
   return high - low;
 }
 
-Standing SentAndRead::standing(double sent_um, double read_um) const noexcept {
-  Standing found{0, sent_um, sent_um};
+ConstantReadBack SentAndRead::standing(double sent_um, double read_um) const noexcept {
+  ConstantReadBack found{0, sent_um, sent_um};
   for (; found.pairs < kept(); ++found.pairs) {
     const std::size_t i = index_of(found.pairs);
     if (!(std::abs(read_um_[i] - read_um) < apart_um)) break;
@@ -155,7 +155,7 @@ Standing SentAndRead::standing(double sent_um, double read_um) const noexcept {
 
 /// True for all pairs, or for those since the read-back was an offset sent.
 bool SentAndRead::stands_still(double sent_um, double read_um) const noexcept {
-  const Standing found = standing(sent_um, read_um);
+  const ConstantReadBack found = standing(sent_um, read_um);
   const bool was_sent = read_um >= found.low_um - noise_um && read_um <= found.high_um + noise_um;
   return (was_sent || found.pairs == kept()) && found.high_um - found.low_um > 3.0 * noise_um;
 }

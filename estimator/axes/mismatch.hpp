@@ -43,7 +43,7 @@ struct Mismatch {
 [[nodiscard]] std::string likely_text(const Mismatch& mismatch);
 
 /// Read-back that stays the same while the offset sent changes.
-struct Standing {
+struct ConstantReadBack {
   std::size_t pairs{0};
   double low_um{not_a_number};  ///< offsets sent meanwhile
   double high_um{not_a_number};
@@ -64,7 +64,7 @@ class SentAndRead {
   /// since its last agreement.
   [[nodiscard]] Mismatch judge(double sent_um, double read_um) const noexcept;
   /// The newest pairs with this read-back, and the range of their offsets sent, `sent_um` included.
-  [[nodiscard]] Standing standing(double sent_um, double read_um) const noexcept;
+  [[nodiscard]] ConstantReadBack standing(double sent_um, double read_um) const noexcept;
   /// Offset sent at the last read-back; without one `otherwise_um`.
   [[nodiscard]] double last_sent_um(double otherwise_um) const noexcept {
     return count_ == 0 ? otherwise_um : sent_um_[index_of(0)];

@@ -187,7 +187,7 @@ void DisplacementModel::slope(std::size_t output, std::span<const double> rise_K
   equation.add_guideway_slopes(output, signals, slope_um_per_K);
   const TermInput input{{}, rise_K, signals};
   for (const auto& term : equation.terms) term->add_slope(input, output, slope_um_per_K);
-  for (const auto& term : equation.terms) term->add_slope_on_the_way(output, slope_um_per_K);
+  for (const auto& term : equation.terms) term->add_transient_slope(output, slope_um_per_K);
   for (const auto& term : equation.terms) term->correct_slope(slope_um_per_K);
 }
 
@@ -234,6 +234,11 @@ constexpr nanoseconds between_looks = std::chrono::seconds(1);
 /// together with the fourth root of the runs, to all 86 splits of measured machines
 /// (docs/measurements.md).
 constexpr double unseen_share = 0.25;
+
+/// A signal, or its low pass, further beyond its recorded values is outside, as a share of their
+/// range: squares and hinges of signals extrapolate badly, and among many features one counts
+/// little in the distance.
+constexpr double beyond_the_range = 0.1;
 
 bool is_input(const MadeFrom& made_from, std::size_t column) {
   return is_temperature_name(made_from.columns[column]);
@@ -284,6 +289,8 @@ struct ModelDomain::Metric {
   struct Column {
     std::size_t index;
     bool temperature;
+    double low;  ///< recorded
+    double high;
   };
   std::vector<Column> columns;
   std::vector<double> taus_s;
@@ -315,6 +322,25 @@ struct ModelDomain::Metric {
     }
   }
 
+  /// How far a signal's late values are beyond its recorded ones, as a share of their range.
+  [[nodiscard]] double beyond(std::size_t column) const noexcept {
+    const Column& of = columns[column];
+    if (of.temperature || !(of.high > of.low)) return 0.0;
+    double most = 0.0;
+    for (std::size_t j = 0; j < taus_s.size(); ++j) {
+      const double value = state.late[j * columns.size() + column];
+      most = std::max(most, std::max(of.low - value, value - of.high) / (of.high - of.low));
+    }
+    return most;
+  }
+
+  [[nodiscard]] double distance() const noexcept {
+    double most = 0.0;
+    for (std::size_t i = 0; i < columns.size(); ++i) most = std::max(most, beyond(i));
+    const double measured = measure();
+    return most > beyond_the_range ? std::max(measured, distance_max * (1.0 + most)) : measured;
+  }
+
   [[nodiscard]] double measure() const noexcept {
     double sum = 0.0;
     const double* row = lower.data();
@@ -333,12 +359,16 @@ ModelDomain::ModelDomain(const ThermalModel& model) : metric_(std::make_unique<M
   const MadeFrom& made_from = *model.made_from;
   const auto temperatures = model.temperature_columns();
   const auto signals = model.signal_columns();
+  require(made_from.low.size() == made_from.columns.size() &&
+              made_from.high.size() == made_from.columns.size(),
+          "made_from.low", static_cast<double>(made_from.low.size()),
+          "must have one value per column, as high");
   for (std::size_t i = 0; i < made_from.columns.size(); ++i) {
     const bool temperature = is_input(made_from, i);
     metric_->columns.push_back(
         {index_of(temperature ? temperatures : signals, made_from.columns[i], "made_from.columns",
                   "must be a column that the model reads"),
-         temperature});
+         temperature, made_from.low[i], made_from.high[i]});
   }
   const std::size_t count = domain_features(made_from);
   require(made_from.mean.size() == count, "made_from.mean",
@@ -373,16 +403,16 @@ void ModelDomain::step(nanoseconds now, std::span<const double> temps_degC,
   Metric& metric = *metric_;
   if (metric.state.started && now - metric.state.looked_at < between_looks) return;
   for (std::size_t i = 0; i < metric.columns.size(); ++i) {
-    const auto [index, temperature] = metric.columns[i];
+    const auto& [index, temperature, low, high] = metric.columns[i];
     metric.values[i] = temperature ? temps_degC[index] - reference_degC[index] : signals[index];
   }
   metric.follow(std::chrono::duration<double>(now - metric.state.looked_at).count());
   std::size_t at = 0;
-  for (const auto& [index, temperature] : metric.columns)
-    if (temperature) metric.feature[at++] = temps_degC[index];
+  for (const Metric::Column& column : metric.columns)
+    if (column.temperature) metric.feature[at++] = temps_degC[column.index];
   std::copy(metric.state.late.begin(), metric.state.late.end(),
             metric.feature.begin() + static_cast<std::ptrdiff_t>(at));
-  metric.state.distance = metric.measure();
+  metric.state.distance = metric.distance();
   metric.state.started = true;
   metric.state.looked_at = now;
 }
@@ -397,6 +427,11 @@ bool ModelDomain::outside() const noexcept {
 
 std::size_t ModelDomain::furthest_column() const {
   const Metric& metric = *metric_;
+  std::vector<double> beyond(metric.columns.size());
+  for (std::size_t i = 0; i < beyond.size(); ++i) beyond[i] = metric.beyond(i);
+  const auto furthest = std::max_element(beyond.begin(), beyond.end());
+  if (furthest != beyond.end() && *furthest > beyond_the_range)
+    return static_cast<std::size_t>(furthest - beyond.begin());
   const auto count = static_cast<Eigen::Index>(metric.feature.size());
   Eigen::VectorXd off(count);
   Eigen::MatrixXd inverse = Eigen::MatrixXd::Zero(count, count);  // L^-1

@@ -91,7 +91,7 @@ std::vector<std::size_t> outputs_of_axes(const EstimatorConfig& config, const Th
 
 Stages::Stages(const EstimatorConfig& estimator_config, const ThermalModel& thermal_model)
     : config(checked(estimator_config, thermal_model)),
-      model(of_axes(thermal_model)),
+      model(in_axis_units(thermal_model)),
       axis_output(outputs_of_axes(config, model)),
       signals(config, model),
       sensing(config, model),
@@ -216,7 +216,7 @@ void Estimator::step(nanoseconds now, std::span<const Reading> readings,
   const ReferenceState reference = stages.reference.step(now, temps, signals);
   // A suspicion alone never ends the compensation.
   if (temps.weighed_down &&
-      !stages.prediction.would_serve(stages.sensing.lost(), reference, signals))
+      !stages.prediction.is_accurate_enough(stages.sensing.lost(), reference, signals))
     temps = stages.sensing.use_all(now);
   const Displacement displacement =
       stages.prediction.step(now, temps, reference, signals, stages.sensing.lost(), stages.learned);
@@ -435,7 +435,7 @@ void Estimator::plan_adoption(const Estimator& previous) {
   plan.axes = plan_names(entry_names(ours.config.axes), entry_names(theirs.config.axes));
   plan.terms = ours.prediction.plan_terms(theirs.prediction);
   plan.same_domain = ours.prediction.same_domain(theirs.prediction);
-  plan.same_model = are_alike(ours.model, theirs.model);
+  plan.same_model = predict_the_same(ours.model, theirs.model);
 }
 
 void Estimator::adopt(const Estimator& previous) noexcept {
@@ -509,7 +509,7 @@ std::vector<std::string> Estimator::restore(const PersistentState& state) {
 }
 
 std::uint32_t Estimator::forgotten_axes() const noexcept {
-  return stages_->axes.forgotten();
+  return stages_->axes.last_offset_unknown();
 }
 
 const EstimatorConfig& Estimator::config() const noexcept {

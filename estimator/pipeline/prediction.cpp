@@ -93,7 +93,7 @@ ReferenceState Reference::step(nanoseconds now, const Temperatures& temps,
   for (std::size_t i = 0; i < temps_degC_.size(); ++i) {
     const nanoseconds sampled_at = sampled_at_[i];
     if (sampled_at != never && temps.refuted_at[i] >= sampled_at &&
-        temps.refuted_at[i] - sampled_at <= young) {
+        temps.refuted_at[i] - sampled_at <= provisional_time) {
       temps_degC_[i] = not_a_number;
       state.changed = true;
     }
@@ -185,8 +185,9 @@ bool Certainty::step(const LostBlocks& lost, const DisplacementModel& model,
   return !state_.uncertain;
 }
 
-bool Certainty::would_serve(const LostBlocks& lost, const DisplacementModel& model,
-                            const ReferenceState& reference, const Signals& signals) noexcept {
+bool Certainty::is_accurate_enough(const LostBlocks& lost, const DisplacementModel& model,
+                                   const ReferenceState& reference,
+                                   const Signals& signals) noexcept {
   if (!lost.complete()) return false;
   if (lost.lost_count() == 0 || !signals.complete || !reference.known) return true;
   note_rise(lost, reference);
@@ -265,13 +266,13 @@ void Prediction::predict(nanoseconds now, const Temperatures& temps,
   }
   model_.step(now, temps.estimated_degC, reference.temps_degC, signals.of_model, state_.model_um);
   if (domain_) domain_->step(now, temps.estimated_degC, reference.temps_degC, signals.of_model);
-  if (!curves_.empty()) look_along_travels(now, temps, reference, signals);
+  if (!curves_.empty()) evaluate_at_nodes(now, temps, reference, signals);
 }
 
 /// Evaluated at the same time again, so that no lag advances.
-void Prediction::look_along_travels(nanoseconds now, const Temperatures& temps,
-                                    const ReferenceState& reference,
-                                    const Signals& signals) noexcept {
+void Prediction::evaluate_at_nodes(nanoseconds now, const Temperatures& temps,
+                                   const ReferenceState& reference,
+                                   const Signals& signals) noexcept {
   elsewhere_->copy_states(model_);
   curves_.step(
       [&](std::span<const double> at, std::span<double> out_um) {

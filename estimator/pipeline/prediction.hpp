@@ -95,12 +95,12 @@ struct ReferenceState {
 /// such numbers, which mean a machine at rest; a sampled reference defines zero displacement in the
 /// present state, so its signals are those of that moment.
 ///
-/// A first good value is provisional for `young`: if a jump of its sensor begins in that time and
-/// is confirmed, the value was wrong and the column's reference is taken anew. (Waiting for a
-/// steady machine instead would leave one that is started warm without compensation.)
+/// A first good value is provisional for `provisional_time`: if a jump of its sensor begins in that
+/// time and is confirmed, the value was wrong and the column's reference is taken anew. (Waiting
+/// for a steady machine instead would leave one that is started warm without compensation.)
 class Reference {
  public:
-  static constexpr nanoseconds young = std::chrono::minutes(10);
+  static constexpr nanoseconds provisional_time = std::chrono::minutes(10);
 
   explicit Reference(const ThermalModel& model);
 
@@ -170,8 +170,9 @@ class Certainty {
   [[nodiscard]] bool step(const LostBlocks& lost, const DisplacementModel& model,
                           const ReferenceState& reference, const Signals& signals) noexcept;
   /// Result of step() with a margin, for use before a sensor is excluded.
-  [[nodiscard]] bool would_serve(const LostBlocks& lost, const DisplacementModel& model,
-                                 const ReferenceState& reference, const Signals& signals) noexcept;
+  [[nodiscard]] bool is_accurate_enough(const LostBlocks& lost, const DisplacementModel& model,
+                                        const ReferenceState& reference,
+                                        const Signals& signals) noexcept;
   [[nodiscard]] double offset_sd_um(std::size_t axis) const noexcept {
     return state_.offset_sd_um[axis];
   }
@@ -224,9 +225,9 @@ class Prediction {
                                   const ReferenceState& reference, const Signals& signals,
                                   const LostBlocks& lost, Probings& learned) noexcept;
   /// True if the estimates are accurate enough without the suspected sensors.
-  [[nodiscard]] bool would_serve(const LostBlocks& lost, const ReferenceState& reference,
-                                 const Signals& signals) noexcept {
-    return certainty_.would_serve(lost, model_, reference, signals);
+  [[nodiscard]] bool is_accurate_enough(const LostBlocks& lost, const ReferenceState& reference,
+                                        const Signals& signals) noexcept {
+    return certainty_.is_accurate_enough(lost, model_, reference, signals);
   }
   /// A new reference: lags restart.
   void restart() noexcept;
@@ -283,8 +284,8 @@ class Prediction {
  private:
   void predict(nanoseconds now, const Temperatures& temps, const ReferenceState& reference,
                const Signals& signals) noexcept;
-  void look_along_travels(nanoseconds now, const Temperatures& temps,
-                          const ReferenceState& reference, const Signals& signals) noexcept;
+  void evaluate_at_nodes(nanoseconds now, const Temperatures& temps,
+                         const ReferenceState& reference, const Signals& signals) noexcept;
   [[nodiscard]] bool outside() const noexcept { return domain_ && domain_->outside(); }
   [[nodiscard]] double used_share() const noexcept {
     return policy_ == OutsidePolicy::shrink && domain_ ? domain_->used_share() : 1.0;

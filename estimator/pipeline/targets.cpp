@@ -10,7 +10,8 @@
 namespace thermocomp {
 
 ModeDecision::ModeDecision(const CompensationConfig& config)
-    : gives_up_(config.on_loss == LossPolicy::ramp_to_zero), hold_(to_nanoseconds(config.hold_s)) {
+    : ramps_on_loss_(config.on_loss == LossPolicy::ramp_to_zero),
+      hold_(to_nanoseconds(config.hold_s)) {
   state_.enabled = config.enabled_at_first_start;
 }
 
@@ -34,7 +35,7 @@ Mode ModeDecision::step(const ModeInput& input) noexcept {
 
 Mode ModeDecision::decide(const ModeInput& input, bool works) const noexcept {
   if (!state_.enabled || input.controller_disables) return Mode::disabled;
-  const bool given_up = !works && gives_up_ && input.time.now - state_.lost_since > hold_;
+  const bool given_up = !works && ramps_on_loss_ && input.time.now - state_.lost_since > hold_;
   if (state_.stopping || given_up) return Mode::ramping_to_zero;
   if (works) return Mode::compensating;
   return state_.ever_worked ? Mode::holding : Mode::starting;

@@ -73,7 +73,7 @@ class ModeDecision {
  private:
   [[nodiscard]] Mode decide(const ModeInput& input, bool works) const noexcept;
 
-  const bool gives_up_;  ///< on_loss = "ramp_to_zero"
+  const bool ramps_on_loss_;  ///< on_loss = "ramp_to_zero"
   const nanoseconds hold_;
   State state_;
   bool only_unwritten_{false};

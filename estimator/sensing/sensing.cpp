@@ -52,11 +52,11 @@ void Sensing::weigh_waiting() noexcept {
     expected_degC_[i] = lost_.estimated(i) ? lost_.temps_degC()[i] : not_a_number;
     expected_sd_K_[i] = lost_.sd_K(i);
   }
-  blocks_.surround(expected_degC_, expected_sd_K_);
+  blocks_.expect(expected_degC_, expected_sd_K_);
 }
 
 void Sensing::accept(std::size_t sensor) noexcept {
-  if (blocks_.accept(sensor) && suspicion_) suspicion_->begin_anew(sensor);
+  if (blocks_.accept(sensor) && suspicion_) suspicion_->clear_history(sensor);
 }
 
 /// @return one per sensor: 1 excludes it; empty: none
@@ -242,13 +242,13 @@ void BlockBank::note_refuted(const Sensor& sensor) noexcept {
       refuted_at_[i] = sensor.screening.jumped_at();
 }
 
-void BlockBank::surround(std::span<const double> expected_degC,
-                         std::span<const double> sd_K) noexcept {
-  for (Sensor& sensor : sensors_) sensor.screening.surround({});
+void BlockBank::expect(std::span<const double> expected_degC,
+                       std::span<const double> sd_K) noexcept {
+  for (Sensor& sensor : sensors_) sensor.screening.expect({});
   for (const auto& module : modules_)
     if (is_not_ready(module))
       for (const std::size_t sensor : module)
-        sensors_[sensor].screening.surround({not_a_number, 0.0, true});
+        sensors_[sensor].screening.expect({not_a_number, 0.0, true});
   std::fill(witnesses_.begin(), witnesses_.end(), std::size_t{0});
   for (std::size_t i = 0; i < blocks_.size(); ++i)
     for (const std::size_t sensor : blocks_[i].sensors)
@@ -263,7 +263,7 @@ void BlockBank::surround(std::span<const double> expected_degC,
         const Screening& reference = sensors_[static_cast<std::size_t>(sensor.reference)].screening;
         expected += reference.usable(now_) ? reference.good_degC() : not_a_number;
       }
-      sensor.screening.surround({expected, sd_K[i], false});
+      sensor.screening.expect({expected, sd_K[i], false});
     }
   }
 }

@@ -33,7 +33,7 @@ class BlockBank {
   [[nodiscard]] std::size_t jumped() const noexcept { return jumped_; }
   /// Before read(), while values wait: the expectation from the other blocks.
   /// @param expected_degC, sd_K  of a column; NaN: no expectation
-  void surround(std::span<const double> expected_degC, std::span<const double> sd_K) noexcept;
+  void expect(std::span<const double> expected_degC, std::span<const double> sd_K) noexcept;
   /// Before the first step: the sensor's value before an unconfirmed jump of the previous run.
   void restore_jump(const std::string& name, double from_degC);
   /// Confirms the sensor's newest value. @return true if one was waiting

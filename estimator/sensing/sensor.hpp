@@ -76,7 +76,7 @@ class Screening {
     double expected_sd_K{0.0};
     bool module_not_ready{false};
   };
-  void surround(const Surroundings& surroundings) noexcept { surroundings_ = surroundings; }
+  void expect(const Surroundings& surroundings) noexcept { surroundings_ = surroundings; }
   /// Before the first reading: the last confirmed value, of unknown age.
   void restore_jump(double from_degC) noexcept;
   /// Confirms the newest value in spite of all checks. @return true if one was waiting

@@ -201,13 +201,14 @@ void Suspicion::look_for_jumps(nanoseconds now) noexcept {
     // A step within one of the lines gives a wrong size.
     if (!suspect.found || !(misfit_K_[suspect.sensor] <= misfit_share * std::abs(suspect.size_K)))
       continue;
-    if (held_K(suspect, answer) / suspect.size_K >= held_share)
+    if (lasting_change_K(suspect, answer) / suspect.size_K >= held_share)
       begin(suspect, now - static_cast<int>(line_ticks) * tick_period);
   }
 }
 
 /// Change of the level minus that of the neighbours; near 0 after a spike.
-double Suspicion::held_K(const Suspect& suspect, const NeighbourCheck::Answer& answer) noexcept {
+double Suspicion::lasting_change_K(const Suspect& suspect,
+                                   const NeighbourCheck::Answer& answer) noexcept {
   for (std::size_t i = 0; i < names_.size(); ++i)
     changes_K_[i] = level_K(i, 0) - level_K(i, line_ticks);
   join_changes();

@@ -61,7 +61,7 @@ class Suspicion {
   /// Uses suspected sensors, because the offsets would be too uncertain without them.
   void use_all() noexcept;
   /// Clears the sensor's history, which no longer applies to its readings.
-  void begin_anew(std::size_t sensor) noexcept {
+  void clear_history(std::size_t sensor) noexcept {
     state_.suspected[sensor] != 0 ? end(sensor) : forget(sensor);
   }
   /// A new reference: machine and sensors are right as they are now.
@@ -125,8 +125,8 @@ class Suspicion {
     double sd_K{0.0};
   };
   [[nodiscard]] Suspect suspect_of(const NeighbourCheck::Wrong& wrong) const noexcept;
-  [[nodiscard]] double held_K(const Suspect& suspect,
-                              const NeighbourCheck::Answer& answer) noexcept;
+  [[nodiscard]] double lasting_change_K(const Suspect& suspect,
+                                        const NeighbourCheck::Answer& answer) noexcept;
   void begin(const Suspect& suspect, nanoseconds since) noexcept;
   void end(std::size_t sensor) noexcept;
   void forget(std::size_t sensor) noexcept;

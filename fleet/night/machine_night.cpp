@@ -291,7 +291,7 @@ int write_run(pqxx::connection& store, const MachineNight& night, const fs::path
   return probed;
 }
 
-NightOutcome work_off(pqxx::connection& store, const MachineNight& night) {
+NightOutcome evaluate_night(pqxx::connection& store, const MachineNight& night) {
   const auto began = std::chrono::steady_clock::now();
   const WorkFolder folder;
   {

@@ -49,7 +49,7 @@ struct NightOutcome {
   std::string text;  ///< one line
 };
 /// Compares the night and stores the result. @throws std::exception: nothing was stored
-NightOutcome work_off(pqxx::connection& store, const MachineNight& night);
+NightOutcome evaluate_night(pqxx::connection& store, const MachineNight& night);
 /// Stores the failure with its reason; the next run retries.
 void note_failure(pqxx::connection& store, const MachineNight& night, const std::string& why);
 

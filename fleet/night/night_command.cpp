@@ -46,7 +46,7 @@ void work_off_some(const std::string& conninfo, const Nights& nights, std::size_
     NightOutcome outcome;
     bool has_failed = false;
     try {
-      outcome = work_off(store, night);
+      outcome = evaluate_night(store, night);
     } catch (const std::exception& error) {
       has_failed = true;
       outcome.text = std::string("failed: ") + error.what();

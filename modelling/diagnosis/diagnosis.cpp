@@ -12,6 +12,7 @@
 
 #include "config/model/model_file.hpp"
 #include "config/runs/model_inputs.hpp"
+#include "config/text/problems.hpp"
 #include "modelling/command_line.hpp"
 #include "modelling/diagnosis/answer/diagnosis_report.hpp"
 #include "modelling/diagnosis/answer/findings.hpp"
@@ -178,8 +179,61 @@ Headroom headroom(double noise, double unexplained, double predictable) {
 
 }  // namespace
 
+namespace {
+
+/// The measured displacement as a multiple of the predicted one, if it follows it but for a factor
+/// that no thermal effect explains: another sign or unit.
+std::vector<std::string> scale_warnings(const MeasuredData& data) {
+  constexpr double follows_min = 0.9;  // share of the measured variance
+  constexpr Interval usual{0.6, 1.6};
+  std::vector<std::string> warnings;
+  for (std::size_t output = 0; output < data.model.outputs.size(); ++output) {
+    double products = 0.0;
+    double of_model = 0.0;
+    double of_measured = 0.0;
+    for (const MeasuredRun& run : data.runs) {
+      const auto present = run.measured_um[output].array().isFinite();
+      const auto count = static_cast<double>(std::max<Eigen::Index>(present.count(), 1));
+      Column measured = present.select(run.measured_um[output].array(), 0.0);
+      Column model = present.select(run.model_um[output].array(), 0.0);
+      measured = present.select(measured.array() - measured.sum() / count, 0.0);
+      model = present.select(model.array() - model.sum() / count, 0.0);
+      products += measured.dot(model);
+      of_model += model.squaredNorm();
+      of_measured += measured.squaredNorm();
+    }
+    if (!(products * products > follows_min * of_model * of_measured)) continue;
+    const double factor = products / of_model;
+    if (factor >= usual.low && factor <= usual.high) continue;
+    warnings.push_back(data.model.outputs[output] + ": measured is " + figure(factor) +
+                       " times predicted, and else follows it. Check sign and unit of the "
+                       "displacement (2: a diameter; 25.4: thou; 1000: mm) before all else");
+  }
+  return warnings;
+}
+
+/// @throws ConfigurationError if no output has enough measured values
+void require_values(const ThermalModel& model, const std::vector<RunFile>& train) {
+  std::size_t most = 0;
+  for (const std::string& output : model.outputs) {
+    std::size_t values = 0;
+    for (const RunFile& run : train)
+      if (const auto column = run.find(output))
+        for (std::size_t row = run.selected_begin; row < run.selected_end; ++row)
+          if (std::isfinite(run.values[*column][row])) ++values;
+    most = std::max(most, values);
+  }
+  if (most < values_min)
+    throw ConfigurationError({Problem{"", 0, "--train", std::to_string(most) + " values",
+                                      "must have at least " + std::to_string(values_min) +
+                                          " measured values of an output of the model"}});
+}
+
+}  // namespace
+
 Diagnosis diagnose(const ThermalModel& model, std::vector<RunFile> train, std::vector<RunFile> test,
                    ReportData* report, const std::function<void()>& progress) {
+  require_values(model, train);
   const SharedColumns columns = shared_columns(model, train, test);
   const MeasuredData train_data = measured_data(model, train, columns);
   const MeasuredData test_data = measured_data(model, test, columns);
@@ -190,6 +244,7 @@ Diagnosis diagnose(const ThermalModel& model, std::vector<RunFile> train, std::v
 
   Diagnosis diagnosis;
   diagnosis.verdict = verdict_of(result);
+  diagnosis.warnings = scale_warnings(train_data);
   diagnosis.families = result.families;
   diagnosis.weighed = candidates_of(result.weighed, train_data, test_data);
   Extended extended = extend(diagnosis, result, train_data, test_data);
@@ -199,14 +254,20 @@ Diagnosis diagnose(const ThermalModel& model, std::vector<RunFile> train, std::v
   const std::vector<Residuals> train_base = residuals(train_data);
   const std::vector<Residuals> base = residuals(test_data);
   const std::vector<Residuals> after = residuals(extended, test_data);
+  const std::vector<Residuals> train_after = residuals(extended, train_data);
   for (std::size_t output = 0; output < model.outputs.size(); ++output) {
-    const double unexplained = result.unexplained_share[output];
+    const double unexplained =
+        all_fail_on_test_runs(diagnosis) ? 1.0 : result.unexplained_share[output];
     OutputFigures& figures = diagnosis.outputs[model.outputs[output]];
     figures = output_figures(train_base[output], base[output], after[output], unexplained);
-    figures.headroom = headroom(result.noise_share[output], unexplained, predictable[output]);
+    // What the extended model removes was no noise, however fast it changed.
+    const double left =
+        std::pow(root_mean_square(train_after[output]) / root_mean_square(train_base[output]), 2);
+    const double noise = std::min(result.noise_share[output], std::isfinite(left) ? left : 1.0);
+    figures.headroom = headroom(noise, unexplained, predictable[output]);
   }
   if (report != nullptr) {
-    add_runs(*report, diagnosis, train_data, train_base, residuals(extended, train_data), false);
+    add_runs(*report, diagnosis, train_data, train_base, train_after, false);
     add_runs(*report, diagnosis, test_data, base, after, true);
   }
   return diagnosis;
@@ -272,7 +333,7 @@ Diagnosis diagnosis_of(const Options& options, ReportData* report) {
   const ThermalModel model = load_model(options.model);
   for (std::vector<RunFile>* runs : {&train, &test})
     for (RunFile& run : *runs)
-      for (const Blunders& each : leave_out_blunders(run, model.outputs))
+      for (const Outliers& each : leave_out_outliers(run, model.outputs))
         std::fprintf(stderr, "%s: %s\n", run.name.c_str(), each.text().c_str());
   return diagnose(model, std::move(train), std::move(test), report, progress);
 }

@@ -214,11 +214,14 @@ void leave_out_foreign(const ThermalModel& like, const std::vector<RunFile>& run
 
 /// Warns of readings that `inspect` doubts. They are used nevertheless: only the user can decide.
 void note_doubtful_readings(const std::vector<RunFile>& runs, MeasuredTests& tests) {
-  for (const inspection::Finding& each : inspection::inspect(runs, doubted_from).findings)
-    if (std::find(tests.places.begin(), tests.places.end(), each.column) != tests.places.end())
-      tests.notes.push_back(runs[each.run].name + ": " + each.text + " (thermocomp inspect, " +
-                            std::to_string(std::lround(100.0 * each.probability)) +
-                            " %); it is used unchanged");
+  for (const inspection::Finding& each : inspection::inspect(runs, doubted_from).findings) {
+    if (std::find(tests.places.begin(), tests.places.end(), each.column) == tests.places.end())
+      continue;
+    // Of spikes, the far ones are left out.
+    tests.notes.push_back(runs[each.run].name + ": " + each.text + " (thermocomp inspect, " +
+                          std::to_string(std::lround(100.0 * each.probability)) + " %)" +
+                          (each.kind == "spikes" ? "" : "; it is used unchanged"));
+  }
 }
 
 int run(const Options& options) {
@@ -242,6 +245,11 @@ int run(const Options& options) {
     test_options.folds_of_one_run = std::max(test_options.folds_of_one_run, blocks_of_one_run);
   }
   MeasuredTests tests = measured_tests(runs, test_options);
+  if (!few && 2 * tests.places.size() + tests.signals.size() > domain_features_max)
+    throw std::runtime_error(
+        std::to_string(tests.places.size()) + " temperatures are too many for a model: at most " +
+        std::to_string((domain_features_max - tests.signals.size()) / 2) +
+        ". Next: thermocomp group shows which warm alike; name one of each group in --places");
   note_doubtful_readings(runs, tests);
   for (const std::string& note : tests.notes) std::fprintf(stderr, "%s\n", note.c_str());
   if (!options.prior.empty()) return run_prior(options, runs, tests, fit_options);

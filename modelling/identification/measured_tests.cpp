@@ -26,7 +26,7 @@ constexpr double still_K = 1e-6;
 /// Smaller variations, as a share of a signal's magnitude, are rounding of its text.
 constexpr double rounding_share = 1e-9;
 /// Smaller reversals, as a share of a signal's range, are ignored.
-constexpr double way_share = 0.1;
+constexpr double reversal_share = 0.1;
 /// A signal with a larger step between two rows, as a share of its range, is not gradual.
 constexpr double gradual_share = 0.25;
 
@@ -94,6 +94,20 @@ void leave_out_spikes(RunFile& run, std::vector<std::string>& notes) {
                       (spikes == 1 ? " reading is" : " readings are") + " left out: more than " +
                       number_text(limit_K) +
                       " K from the neighbouring rows, or far from all others");
+  }
+}
+
+/// Replaces stray values of signals, such as a controller's error codes, by NaN.
+void leave_out_stray_values(RunFile& run, std::vector<std::string>& notes) {
+  for (std::size_t i = 0; i < run.columns.size(); ++i) {
+    if (!is_operating(run.columns[i]) || run.columns[i] == "time_s") continue;
+    const std::vector<std::size_t> rows = stray_rows(run.values[i]);
+    for (const std::size_t row : rows)
+      run.values[i][row] = std::numeric_limits<double>::quiet_NaN();
+    if (!rows.empty())
+      notes.push_back(run.name + ": " + run.columns[i] + ": " + std::to_string(rows.size()) +
+                      (rows.size() == 1 ? " row is" : " rows are") +
+                      " left out: beyond five times all other values");
   }
 }
 
@@ -340,12 +354,12 @@ bool is_constant(const MeasuredTests& tests, std::size_t signal) {
 }
 
 /// Course of a signal over the selected rows of all runs.
-struct Ways {
+struct Reversals {
   int count{0};              ///< number of rises and falls
   double largest_step{0.0};  ///< between two rows, as a share of its range
 };
 
-Ways ways_of(const MeasuredTests& tests, std::size_t signal) {
+Reversals reversals_of(const MeasuredTests& tests, std::size_t signal) {
   const auto column = static_cast<Eigen::Index>(signal);
   const auto selected = [column](const TestRun& run) {
     return run.signals.col(column).tail(run.time_s.size() - run.begin);
@@ -356,30 +370,31 @@ Ways ways_of(const MeasuredTests& tests, std::size_t signal) {
     least = std::min(least, selected(run).minCoeff());
     most = std::max(most, selected(run).maxCoeff());
   }
-  const double turn = way_share * (most - least);
-  Ways ways;
+  const double turn = reversal_share * (most - least);
+  Reversals reversals;
   for (const TestRun& run : tests.between) {
     int way = 0;  // up: 1, down: -1
     double last = selected(run)[0];
     double low = last;
     double high = last;
     for (const double value : selected(run)) {
-      ways.largest_step = std::max(ways.largest_step, std::abs(value - last) / (most - least));
+      reversals.largest_step =
+          std::max(reversals.largest_step, std::abs(value - last) / (most - least));
       last = value;
       low = std::min(low, value);
       high = std::max(high, value);
       if (way != 1 && value > low + turn) {
         way = 1;
         high = value;
-        ++ways.count;
+        ++reversals.count;
       } else if (way != -1 && value < high - turn) {
         way = -1;
         low = value;
-        ++ways.count;
+        ++reversals.count;
       }
     }
   }
-  return ways;
+  return reversals;
 }
 
 /// Fills `unmoved` and `gradual` from all rows of the courses, which the low passes see. The effect
@@ -390,10 +405,10 @@ void find_unmoved(MeasuredTests& tests) {
       tests.unmoved.push_back(tests.signals[i]);
       continue;
     }
-    const Ways ways = ways_of(tests, i);
-    if (ways.count > 1) continue;
+    const Reversals reversals = reversals_of(tests, i);
+    if (reversals.count > 1) continue;
     tests.unmoved.push_back(tests.signals[i]);
-    if (ways.largest_step < gradual_share) tests.gradual.push_back(tests.signals[i]);
+    if (reversals.largest_step < gradual_share) tests.gradual.push_back(tests.signals[i]);
   }
 }
 
@@ -466,7 +481,8 @@ MeasuredTests measured_tests(const std::vector<RunFile>& given, const TestOption
   std::vector<RunFile> runs = given;
   for (RunFile& run : runs) {
     leave_out_spikes(run, tests.notes);
-    for (const Blunders& each : leave_out_blunders(run, options.outputs))
+    leave_out_stray_values(run, tests.notes);
+    for (const Outliers& each : leave_out_outliers(run, options.outputs))
       tests.notes.push_back(run.name + ": " + each.text());
     gather_probings(run, options.outputs, tests.notes);
   }

@@ -134,7 +134,7 @@ std::optional<Judged> judge(const Recording& recording, const Inputs& inputs,
 }
 
 /// Usual level of the column: median over windows of the largest |z|, relative to normal noise.
-double wildness(const std::vector<Expectation::Evidence>& steps) {
+double noise_factor(const std::vector<Expectation::Evidence>& steps) {
   std::vector<double> largest;
   const std::size_t length = std::max<std::size_t>(8, steps.size() / windows);
   for (std::size_t begin = 0; begin + length <= steps.size(); begin += length) {
@@ -319,7 +319,7 @@ class ChangeSearch {
 
   void look_for_step(const Judged& judged, const Target& target, std::size_t run) {
     const auto steps = judged.expectation.steps(run);
-    const double wild = wildness(steps);
+    const double factor = noise_factor(steps);
     const double least =
         target.output
             ? std::min(step_um_min, step_share_min * spread(judged.expectation.remainder()))
@@ -338,7 +338,7 @@ class ChangeSearch {
           !is_sudden(judged, target, run, row, steps[i].size))
         continue;
       offer(target, target.output ? "displacement_step" : "sensor_step", run,
-            time_at(judged, run, row), steps[i].size, std::abs(steps[i].z) / wild);
+            time_at(judged, run, row), steps[i].size, std::abs(steps[i].z) / factor);
       return;
     }
   }
@@ -387,8 +387,8 @@ class ChangeSearch {
       }
     }
     // Loosening lowers a gain; a gain that also rises elsewhere in the run is wander.
-    const double wild = std::max(1.0, z_of_others / usual_level);
-    if (z_best > 0) offer(target, "sensor_loose", run, best.at_s, best.size, z_best / wild);
+    const double factor = std::max(1.0, z_of_others / usual_level);
+    if (z_best > 0) offer(target, "sensor_loose", run, best.at_s, best.size, z_best / factor);
   }
 
   void take_out(const Finding& finding) {
@@ -406,14 +406,14 @@ class ChangeSearch {
       if (finding.kind == "sensor_drift")
         values(row, column) -= finding.size * after_s / duration_s;
       else if (finding.kind == "sensor_loose")
-        loosen_back(row, column, finding);
+        restore_loose(row, column, finding);
       else
         values(row, column) -= finding.size;
     }
   }
 
   /// Restores a loose reading from its gain, since it is a poor regressor for its neighbours.
-  void loosen_back(Index row, Index column, const Finding& finding) {
+  void restore_loose(Index row, Index column, const Finding& finding) {
     const double gain = std::max(0.1, finding.size);
     const Index first = recording_.begins[finding.run];
     Index at = row;

@@ -98,7 +98,7 @@ RunFile without_blunders(RunFile run, std::size_t index, Suspicions& found) {
   check_spikes(run, index, found);
   std::vector<std::string> outputs = run.columns;
   std::erase_if(outputs, [](const std::string& name) { return !is_output(name); });
-  leave_out_blunders(run, outputs);
+  leave_out_outliers(run, outputs);
   return run;
 }
 

@@ -68,6 +68,15 @@ std::string sentence(const Finding& finding, const RunFile& run) {
   const std::string& kind = finding.kind;
   const std::string count = std::to_string(finding.times_s.size());
   const char* direction = finding.size > 0 ? " up by " : " down by ";
+  constexpr double kelvin_of_0_degC = 273.15;
+  if (kind == "spikes" && is_operating(finding.column))
+    return finding.column + " has stray values (" + count + ") of up to " + size +
+           ", beyond five times all others: a code of the controller? Leave these rows out.";
+  if (kind == "spikes" && finding.times_s.size() > 20 &&
+      std::abs(std::abs(finding.size) - kelvin_of_0_degC) < 15.0)
+    return finding.column + " reads about 273 K " + (finding.size > 0 ? "more" : "less") + " in " +
+           count + " rows, from " + at + " on: " + (finding.size > 0 ? "these" : "the others") +
+           " are in kelvin. Subtract 273.15 there.";
   if (kind == "spikes")
     return finding.column + " has spikes (" + count + ") of up to " + size +
            ": check its plug and its shield, and leave these values out.";

@@ -165,6 +165,22 @@ void check_leaps(RunFile& run, std::size_t index, std::size_t column, Suspicions
   found.push_back(made);
 }
 
+/// Stray values of a signal are taken out.
+void check_stray(RunFile& run, std::size_t index, std::size_t column, Suspicions& found) {
+  constexpr double score = 100.0;
+  std::vector<double>& values = run.values[column];
+  const std::vector<std::size_t> rows = stray_rows(values);
+  if (rows.empty()) return;
+  Suspicion made = suspicion("spikes", run.columns[column], index, run.time_s()[rows.front()],
+                             run.time_s()[rows.back()], 0, score);
+  for (const std::size_t row : rows) {
+    made.finding.times_s.push_back(run.time_s()[row]);
+    if (std::abs(values[row]) > std::abs(made.finding.size)) made.finding.size = values[row];
+    values[row] = std::numeric_limits<double>::quiet_NaN();
+  }
+  found.push_back(made);
+}
+
 double range_of(const std::vector<double>& values, StillRows rows) {
   double low = std::numeric_limits<double>::infinity();
   double high = -low;
@@ -292,6 +308,8 @@ void check_spikes(RunFile& run, std::size_t index, Suspicions& found) {
   for (std::size_t column = 0; column < run.columns.size(); ++column)
     if (is_temperature(run.columns[column]) || is_output(run.columns[column]))
       check_leaps(run, index, column, found);
+    else if (is_operating(run.columns[column]) && run.columns[column] != "time_s")
+      check_stray(run, index, column, found);
 }
 
 void check_values(const std::vector<RunFile>& runs, Suspicions& found) {

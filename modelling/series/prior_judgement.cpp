@@ -35,6 +35,8 @@ RunFile part_of(const RunFile& run, const Eigen::VectorXd& time_s, const Fold& f
 }  // namespace
 
 bool PriorJudgement::holds() const {
+  for (std::size_t o = 0; o < prior_um.size(); ++o)
+    if (!(prior_um[o] < none_um[o])) return false;
   return prior_um.empty() ||
          log_mean(prior_um) < log_mean(none_um) + std::log(1.0 - identification::less_than_none);
 }

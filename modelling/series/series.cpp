@@ -210,8 +210,11 @@ OutputSeries output_series(const std::vector<Statistics>& machines, const std::s
 
 /// Features of ModelDomain over the ranges of the machine and its sisters.
 void fill_domain(const Columns& columns, MadeFrom& made_from) {
+  // A signal may be there by its square only.
   const auto subject = [&](const std::string& name) {
-    return columns.subjects[static_cast<std::size_t>(columns.find(name, 1.0))];
+    const Eigen::Index linear = columns.find(name, 1.0);
+    return columns
+        .subjects[static_cast<std::size_t>(linear >= 0 ? linear : columns.find(name, 2.0))];
   };
   std::vector<double> sd;
   const auto add = [&](double low, double high, double least) {

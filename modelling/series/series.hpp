@@ -67,7 +67,8 @@ struct PriorJudgement {
   std::vector<double> own_um;    ///< the machine's own fit
   std::vector<double> none_um;
 
-  /// True if the prior leaves a tenth less than no model, in geometric mean of the outputs.
+  /// True if the prior leaves less than no model of every output, and a tenth less in geometric
+  /// mean.
   [[nodiscard]] bool holds() const;
   /// Reason to compare the two later, not to choose: all four measured machines with this result on
   /// the first part of a run had the smaller error with the prior on the rest.
@@ -94,7 +95,7 @@ struct Comparison {
   std::string output;
   Departure departure;
   double remainder_um{0.0};  ///< remainder of its posterior
-  double median_um{0.0};     ///< of the sisters' remainders
+  double median_um{0.0};     ///< of the sisters' remainders; 0: fewer than three
   double deviations{0.0};    ///< in 1.4826 median absolute deviations of the sisters' logarithms
   double false_alarm{0.0};   ///< probability threshold of a departure
 };

@@ -65,8 +65,9 @@ std::string comparison_text(const std::vector<Comparison>& comparisons) {
         text += printed("  %-24s explains %.0f %%, effect differs by %.3g um\n",
                         departure.parts[i].name.c_str(), 100.0 * departure.parts[i].share,
                         departure.parts[i].effect_um);
-    text += printed("  residual: %.3g um, of the sisters %.3g um (median)\n", each.remainder_um,
-                    each.median_um);
+    text += printed("  residual: %.3g um", each.remainder_um);
+    text += each.median_um > 0.0 ? printed(", of the sisters %.3g um (median)\n", each.median_um)
+                                 : ", of fewer than three sisters no usual one is known\n";
   }
   return text;
 }
@@ -86,7 +87,7 @@ std::string comparison_json(const std::vector<Comparison>& comparisons) {
                         {"false_alarm", each.false_alarm},
                         {"subjects", parts},
                         {"remainder_um", each.remainder_um},
-                        {"sisters_um", each.median_um},
+                        {"sisters_um", each.median_um > 0.0 ? Json(each.median_um) : Json(nullptr)},
                         {"remainder_deviations", each.deviations}};
   }
   return all.dump();

@@ -10,6 +10,7 @@
 
 #include "config/run_forms/number_form.hpp"
 #include "config/run_forms/text_table.hpp"
+#include "config/text/printable_text.hpp"
 #include "config/text/problems.hpp"
 #include "config/toml/toml_reader.hpp"
 #include "modelling/thermal_test/test_report.hpp"
@@ -62,6 +63,7 @@ class PartReader {
       columns.push_back(found);
     }
     if (axes.empty()) refuse(0, "x_um, y_um, z_um", "(missing)", "one of them must be a column");
+    std::vector<std::vector<double>> values(columns.size());
     for (std::size_t row = 0; row < table_.rows(); ++row) {
       const std::string word(states[row]);
       if (word != "cold" && word != "warm")
@@ -79,8 +81,15 @@ class PartReader {
           refuse(table_.lines[row], name, std::string(field),
                  "the feature already has a value for this repeat and state");
         place = *number;
+        values[i].push_back(*number);
       }
     }
+    for (std::size_t i = 0; i < columns.size(); ++i)
+      if (values[i].size() > 2 && std::all_of(values[i].begin(), values[i].end(), [&](double each) {
+            return each == values[i].front();
+          }))
+        refuse(0, table_.columns[columns[i]].header, number_text(values[i].front()),
+               "is the value of every row: the gauge shows nothing; leave the column out");
     return std::move(features_);
   }
 

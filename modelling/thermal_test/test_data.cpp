@@ -392,14 +392,26 @@ TestData test_data(const RunFile& given, const TestOptions& options) {
   std::vector<std::string> outputs;
   std::copy_if(run.columns.begin(), run.columns.end(), std::back_inserter(outputs),
                [](const std::string& column) { return is_output(column); });
-  for (const Blunders& each : leave_out_blunders(run, outputs))
+  for (const Outliers& each : leave_out_outliers(run, outputs))
     data.description.push_back(each.text());
   data.kind = options.kind;
   data.file = run.name;
   data.phases.from_s = run.time_s()[run.selected_begin];
   data.phases.to_s = run.time_s()[run.selected_end - 1];
   const std::vector<AxisBinding> bindings = bind_axes(run, options);
-  for (const AxisBinding& binding : bindings) data.axes.push_back(axis_of(run, binding, options));
+  for (const AxisBinding& binding : bindings) {
+    TestAxis axis = axis_of(run, binding, options);
+    const auto [least, most] =
+        std::minmax_element(axis.measured.value.begin(), axis.measured.value.end());
+    if (*least < *most)
+      data.axes.push_back(std::move(axis));
+    else
+      data.left_out.push_back(axis.name + " (" + axis.from + ") is left out: all its values are " +
+                              "the same, so the probe shows nothing");
+  }
+  if (data.axes.empty() && !data.left_out.empty())
+    throw ConfigurationError({Problem{run.name, 0, "", "", data.left_out.front()}});
+  data.description.insert(data.description.end(), data.left_out.begin(), data.left_out.end());
   add_growths(run, bindings, options, data.axes);
   for (const TestAxis& axis : data.axes)
     data.description.push_back(axis.name + " is " + axis.from + ", " +

@@ -6,6 +6,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "config/runs/model_inputs.hpp"
 #include "daemon/history/replay/record_loader.hpp"
 #include "modelling/command_line.hpp"
 #include "modelling/thermal_test/part_test.hpp"
@@ -67,10 +68,19 @@ int run_report(ReportOptions options) {
   if (options.tolerance_um) throw cli::Failure("--tolerance-um: only with --test part");
   options.test.kind = kinds.at(options.kind);
   cli::RunLoader loader(options.columns);
-  TestData before = test_data(cli::load_record(options.before, loader), options.test);
+  const RunFile first = cli::load_record(options.before, loader);
+  TestData before = test_data(first, options.test);
   std::optional<TestData> after;
-  if (!options.after.empty())
-    after = test_data(cli::load_record(options.after, loader), options.test);
+  if (!options.after.empty()) {
+    const RunFile second = cli::load_record(options.after, loader);
+    if (share_rows(first, second))
+      throw cli::Failure(options.after + ": has rows of " + options.before +
+                         "; before and after must be two recordings");
+    after = test_data(second, options.test);
+  }
+  for (const TestData* data : {&before, after ? &*after : nullptr})
+    for (const std::string& axis : data == nullptr ? std::vector<std::string>{} : data->left_out)
+      std::fprintf(stderr, "%s: %s\n", data->file.c_str(), axis.c_str());
   const TestAnswer answer = answer_of(std::move(before), std::move(after));
   cli::write_file(options.output, report_html(answer));
   if (!options.json.empty()) cli::write_file(options.json, report_json(answer));

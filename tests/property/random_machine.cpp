@@ -36,6 +36,8 @@ void add_covariance(Chance& chance, ThermalModel& model) {
 void add_domain(Chance& chance, ThermalModel& model) {
   MadeFrom& made_from = model.made_from.emplace();
   made_from.columns = model.inputs;
+  made_from.low.assign(model.inputs.size(), 15.0);
+  made_from.high.assign(model.inputs.size(), 30.0);
   made_from.taus_s = {0.0};
   if (chance.one_in(2)) made_from.taus_s.push_back(chance.between(1.0, 300.0));
   made_from.distance_max = chance.between(0.3, 2.0);

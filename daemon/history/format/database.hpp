@@ -35,7 +35,7 @@ class DatabaseError : public HistoryError {
     return (code_ & 0xFF) == SQLITE_CORRUPT || (code_ & 0xFF) == SQLITE_NOTADB;
   }
   /// True if the disk is full or writing failed temporarily; the connection remains usable.
-  [[nodiscard]] bool is_for_now() const noexcept {
+  [[nodiscard]] bool is_temporary() const noexcept {
     return (code_ & 0xFF) == SQLITE_FULL || code_ == SQLITE_IOERR_WRITE ||
            code_ == SQLITE_IOERR_FSYNC;
   }

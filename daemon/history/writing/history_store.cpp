@@ -183,7 +183,7 @@ void HistoryStore::rescue(const std::string& changed) {
   // it, since a partial copy would damage the database.
   const DatabaseError failed(code, changed + " was removed, and the disk takes nothing (" +
                                        sqlite3_errstr(code) + "): tried again");
-  if (failed.is_for_now() && has_database) throw failed;
+  if (failed.is_temporary() && has_database) throw failed;
   const bool is_moved = code == SQLITE_OK && in_log == moved;
   // Otherwise closing would checkpoint again and delete the file with the log's name.
   sqlite3_db_config(database_->handle(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);

@@ -272,7 +272,7 @@ bool HistoryWriter::Parts::write() {
   } catch (const DatabaseError& error) {
     if (error.is_damage()) store.move_aside(error.what());
     // Stays open on a full disk, since reopening would need space.
-    if (error.is_for_now())
+    if (error.is_temporary())
       store.note_files();
     else
       store.close();

@@ -71,7 +71,7 @@ std::optional<BridgeAnswer> BridgeController::report(const BridgeReport& report)
                   [](double um) { return std::isfinite(um); });
   BridgeAnswer answer;
   if (commands_.fresh()) gate_.offered(commands_.front().command, commands_.front().computed_at);
-  const bool moved = taking && taking_ && !gate_.explains(report.applied_um);
+  const bool moved = taking && taking_ && !gate_.check_read_back(report.applied_um);
   if (moved) health_.last_error = "the controller applies an offset that was not sent";
   if (silent || report.session != session_ || taking != taking_) gate_.lost();
   if (answered_ && taking && !silent && report.session == session_) {

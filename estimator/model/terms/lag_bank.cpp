@@ -16,8 +16,8 @@ class LagBank final : public Term {
   void add(const TermInput& input, std::span<double> displacement_um) noexcept override;
   void add_slope(const TermInput& /*input*/, std::size_t /*output*/,
                  std::span<double> /*slope_um_per_K*/) const noexcept override {}
-  void add_slope_on_the_way(std::size_t output,
-                            std::span<double> slope_um_per_K) const noexcept override;
+  void add_transient_slope(std::size_t output,
+                           std::span<double> slope_um_per_K) const noexcept override;
   void restart() noexcept override { started_ = false; }
   void visit_state(StateArchive& archive) override {
     archive(started_, at_, step_, shares_, late_);
@@ -101,8 +101,8 @@ void LagBank::add(const TermInput& input, std::span<double> displacement_um) noe
 }
 
 /// A rise acts through the time constants one after the other.
-void LagBank::add_slope_on_the_way(std::size_t output,
-                                   std::span<double> slope_um_per_K) const noexcept {
+void LagBank::add_transient_slope(std::size_t output,
+                                  std::span<double> slope_um_per_K) const noexcept {
   const double* gains = gains_.data() + output * late_.size();
   for (std::size_t i = 0; i < columns_.size(); ++i) {
     if (!columns_[i].temperature || columns_[i].squared) continue;

@@ -40,8 +40,8 @@ class Term {
   virtual void add_slope(const TermInput& input, std::size_t output,
                          std::span<double> slope_um_per_K) const noexcept = 0;
   /// After all add_slope(): the transient effect, where larger than the steady state.
-  virtual void add_slope_on_the_way(std::size_t /*output*/,
-                                    std::span<double> /*slope_um_per_K*/) const noexcept {}
+  virtual void add_transient_slope(std::size_t /*output*/,
+                                   std::span<double> /*slope_um_per_K*/) const noexcept {}
   /// After both: from the corrected rise to the reading.
   virtual void correct_slope(std::span<double> /*slope_um_per_K*/) const noexcept {}
   /// Clears the past: lags start at their input's present value.

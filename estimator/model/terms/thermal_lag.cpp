@@ -22,8 +22,8 @@ class ThermalLag final : public Term {
   }
   void add_slope(const TermInput& /*input*/, std::size_t /*output*/,
                  std::span<double> /*slope_um_per_K*/) const noexcept override {}
-  void add_slope_on_the_way(std::size_t output,
-                            std::span<double> slope_um_per_K) const noexcept override {
+  void add_transient_slope(std::size_t output,
+                           std::span<double> slope_um_per_K) const noexcept override {
     double& slope = slope_um_per_K[subject_];
     const double at_once = slope - gain_um_per_K_[output];
     if (std::abs(at_once) > std::abs(slope)) slope = at_once;

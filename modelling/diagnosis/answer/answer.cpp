@@ -204,8 +204,16 @@ void print(const RemainderBank& remainder) {
 
 }  // namespace
 
+bool all_fail_on_test_runs(const Diagnosis& diagnosis) {
+  return !diagnosis.findings.empty() &&
+         std::all_of(diagnosis.findings.begin(), diagnosis.findings.end(), fails_on_test_runs);
+}
+
 void print(const Diagnosis& diagnosis) {
-  std::printf("verdict: %s\n", diagnosis.verdict.c_str());
+  for (const std::string& warning : diagnosis.warnings)
+    std::printf("warning: %s\n", warning.c_str());
+  std::printf("verdict: %s%s\n", diagnosis.verdict.c_str(),
+              all_fail_on_test_runs(diagnosis) ? ", but the test runs contradict it" : "");
   for (const NamedFinding& finding : diagnosis.findings) {
     std::printf("%s of %s", finding.cause.c_str(), finding.subject.c_str());
     if (finding.run) std::printf(" in %s", finding.run->c_str());
@@ -374,11 +382,9 @@ std::string diagnosis_json(const Diagnosis& diagnosis, bool weighed) {
   Json findings = Json::array();
   for (const NamedFinding& finding : diagnosis.findings)
     findings.push_back(finding_json(finding, unit));
-  Json answer = {{"verdict", diagnosis.verdict},
-                 {"baseline", baseline},
-                 {"findings", findings},
-                 {"extended", extended},
-                 {"unexplained_fraction", unexplained}};
+  Json answer = {{"verdict", diagnosis.verdict}, {"warnings", diagnosis.warnings},
+                 {"baseline", baseline},         {"findings", findings},
+                 {"extended", extended},         {"unexplained_fraction", unexplained}};
   if (!headroom.empty()) answer["headroom"] = headroom;
   if (diagnosis.remainder) answer["remainder"] = remainder_json(*diagnosis.remainder, unit);
   if (!diagnosis.families.empty()) answer["families"] = diagnosis.families;

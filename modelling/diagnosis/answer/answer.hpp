@@ -104,10 +104,14 @@ struct Diagnosis {
   std::vector<Candidate> weighed;          ///< likeliest first
   /// Probability of each family, including `none`; empty if no hypotheses were weighed.
   std::map<std::string, double> families{};
+  std::vector<std::string> warnings{};  ///< of the data, such as a displacement of reversed sign
 };
 
 /// True if the finding improves no output of the test runs; the extended model then omits it.
 [[nodiscard]] bool fails_on_test_runs(const NamedFinding& finding);
+
+/// True if there are findings, and the test runs contradict each.
+[[nodiscard]] bool all_fail_on_test_runs(const Diagnosis& diagnosis);
 
 /// Two digits, three if the first is 1: "53", "0.0040", "1810".
 [[nodiscard]] std::string figure(double value);

@@ -548,6 +548,7 @@ std::string fitted_text(const ReportData& report) {
 std::string report_html(const Diagnosis& diagnosis, const ReportData& report) {
   const std::vector<Advice> steps = next_steps(diagnosis);
   std::string html = html_begin("What the model gets wrong") + own_style;
+  if (!diagnosis.warnings.empty()) html += html_list(diagnosis.warnings);
   html += html_paragraph(verdict_text(diagnosis, steps)) + summary(diagnosis, report) +
           fitted_text(report) + steps_html(steps);
   if (!diagnosis.findings.empty()) html += html_heading("What was found");

@@ -59,6 +59,15 @@ Cause time_shift() {
 
 constexpr std::size_t periods_max = 400;
 
+/// Least measured values of a run: one of many periods fits fewer by chance.
+constexpr Eigen::Index wave_values_min = 24;
+
+bool has_values_for_a_wave(const MeasuredData& data, std::size_t output) {
+  return std::all_of(data.runs.begin(), data.runs.end(), [output](const MeasuredRun& run) {
+    return run.measured_um[output].array().isFinite().count() >= wave_values_min;
+  });
+}
+
 /// Periods of which the longest run contains at least five, so close that a neighbour of the true
 /// period is at most a fifth of a turn off at the run's end.
 std::vector<double> periods_of(const Material& material) {
@@ -90,6 +99,7 @@ Panel waves(const MeasuredRun& run, std::size_t runs, const Shapes& shapes) {
 std::vector<Hypothesis> periodic_disturbance_hypotheses(const Material& material,
                                                         const Subject& subject) {
   if (subject.kind != SubjectKind::output) return {};
+  if (!has_values_for_a_wave(material.data(), subject.index)) return {};
   const std::vector<double> periods = periods_of(material);
   if (periods.empty()) return {};
   const std::size_t runs = material.data().runs.size();

@@ -14,8 +14,6 @@ namespace thermocomp::diagnosis {
 namespace {
 
 constexpr double unknown = std::numeric_limits<double>::infinity();
-/// Least values of an output.
-constexpr Eigen::Index values_min = 12;
 /// Number of temperatures that predict a reading: those with the largest covariance.
 constexpr std::size_t neighbours = 8;
 constexpr double neighbour_sd_K = 30.0;  ///< for a column whose largest value is 1
@@ -25,6 +23,9 @@ constexpr double fitted_factor = 1.1;
 /// Tolerance of the cosine of two proportional vectors, per element: short vectors are
 /// proportional by chance.
 constexpr double ridge_angle = 0.0015;
+/// Largest penalty of a ridge regression, relative to the inputs' variances: with a larger ratio of
+/// products to variances the coefficients are wrong.
+constexpr double ridge_penalty_max = 0.1;
 
 Panel offsets_of(const OutputRows& rows) {
   Panel offsets = Panel::Zero(rows.size(), std::ssize(rows.runs()));
@@ -56,14 +57,16 @@ double rms_beside(const Column& values, const Panel& columns) {
 /// True if the coefficients were fitted to these rows, with or without free offsets of the runs,
 /// and so may have absorbed a cause: another fit of the same columns then gains nothing. After a
 /// ridge regression on standardised inputs, the product of each input's displacement c with the
-/// residual is proportional to the variance of c.
+/// residual is the penalty times the variance of c.
 bool fitted_to(const Column& remainder, const Panel& free, const Panel& coefficients) {
   const Eigen::VectorXd variances =
       (coefficients.rowwise() - coefficients.colwise().mean()).colwise().squaredNorm();
   const auto is_ridge = [&](const Panel& beside) {
     const Eigen::VectorXd products = coefficients.transpose() * left_by(remainder, beside);
-    return products.dot(variances) > (1.0 - ridge_angle * static_cast<double>(variances.size())) *
-                                         products.norm() * variances.norm();
+    const double along = products.dot(variances);
+    return along > (1.0 - ridge_angle * static_cast<double>(variances.size())) * products.norm() *
+                       variances.norm() &&
+           along < ridge_penalty_max * variances.squaredNorm();
   };
   const auto leaves_nothing = [&](const Panel& beside) {
     return rms_beside(remainder, beside) <
@@ -153,7 +156,7 @@ Fits::Fits(const MeasuredData& data, Readings& readings, const std::vector<Expla
       return run.measured_um[output] - run.model_um[output];
     });
     const Eigen::Array<bool, Eigen::Dynamic, 1> present = left.array().isFinite();
-    if (present.count() < values_min) continue;
+    if (present.count() < static_cast<Eigen::Index>(values_min)) continue;
     left = present.select(left.array(), 0.0);
     OutputRows of(data.rows, present);
     Panel free = offsets_of(of);

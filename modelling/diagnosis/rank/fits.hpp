@@ -13,6 +13,9 @@
 
 namespace thermocomp::diagnosis {
 
+/// An output with fewer measured values in all runs is not judged.
+inline constexpr std::size_t values_min = 12;
+
 struct Explanation {
   const Hypothesis* hypothesis{nullptr};
   Shape shape{};

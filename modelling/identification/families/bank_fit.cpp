@@ -26,6 +26,9 @@ constexpr double weight_of_lag = 0.7;
 /// Share of the places' RMS deviation added in quadrature to each place's own before scaling it to
 /// 1, so that a place that hardly moved is not amplified.
 constexpr double usual_share = 0.05;
+/// The same for a signal's columns, as a share of its deviation in all rows: in the rows with a
+/// probing it may hardly move.
+constexpr double usual_share_of_signal = 0.01;
 /// Penalties for columns of standard deviation 1: ridge_penalty is added to their mean square,
 /// l1_price is subtracted from their correlation with the output. Both, weight_of_lag and
 /// usual_share were set on spindle, printer, one telescope, one cell and one probe; the other
@@ -92,6 +95,28 @@ Eigen::VectorXd sparse_minimum(const Eigen::MatrixXd& a, const Eigen::VectorXd& 
   return w;
 }
 
+/// Standard deviation of each signal to its power in all rows of the courses; 0 for temperatures.
+std::vector<double> course_deviations(const MeasuredTests& tests, const BankColumns& columns) {
+  std::vector<double> deviations(columns.subjects.size(), 0.0);
+  for (std::size_t i = tests.places.size(); i < deviations.size(); ++i) {
+    const auto signal = std::find(tests.signals.begin(), tests.signals.end(), columns.subjects[i]);
+    double rows = 0.0;
+    double sum = 0.0;
+    double squares = 0.0;
+    for (std::size_t run = 0; run < tests.runs.size(); ++run) {
+      const Eigen::ArrayXd values = tests.course(run)
+                                        .signals.col(signal - tests.signals.begin())
+                                        .array()
+                                        .pow(columns.powers[i]);
+      rows += static_cast<double>(values.size());
+      sum += values.sum();
+      squares += values.square().sum();
+    }
+    deviations[i] = std::sqrt(std::max(0.0, squares / rows - std::pow(sum / rows, 2.0)));
+  }
+  return deviations;
+}
+
 /// Factors of the columns for the fit; 0 (no gain): columns that never move, and all columns of a
 /// signal that did not move.
 /// @param deviation  standard deviation of each column
@@ -102,19 +127,22 @@ Eigen::VectorXd scales(const Eigen::VectorXd& deviation, const Eigen::VectorXd& 
   const double usual_K = std::sqrt(deviation.head(places).squaredNorm() /
                                    static_cast<double>(std::max<Eigen::Index>(places, 1)));
   const auto late = static_cast<Eigen::Index>(columns.late());
+  const std::vector<double> usual = course_deviations(tests, columns);
   Eigen::VectorXd scale = Eigen::VectorXd::Zero(deviation.size());
   for (Eigen::Index i = 0; i < deviation.size(); ++i) {
     if (!(deviation[i] > 1e-12 * size[i])) continue;
-    const Eigen::Index subject = i % static_cast<Eigen::Index>(columns.subjects.size());
-    if (i >= late) {
-      scale[i] = weight_of_hinge / deviation[i];
-    } else if (subject < places) {
-      scale[i] = 1.0 / std::hypot(deviation[i], usual_share * usual_K);
-    } else if (tests.moved(columns.subjects[static_cast<std::size_t>(subject)])) {
-      scale[i] = 1.0 / deviation[i];
-    }
-    if (i >= static_cast<Eigen::Index>(columns.subjects.size()) && i < late)
-      scale[i] *= weight_of_lag;
+    const auto subject = static_cast<std::size_t>(
+        i < late ? i % std::ssize(columns.subjects)
+                 : std::find(columns.subjects.begin(), columns.subjects.end(),
+                             columns.hinges[static_cast<std::size_t>(i - late)].signal) -
+                       columns.subjects.begin());
+    const bool is_place = subject < tests.places.size();
+    if (!is_place && !tests.moved(columns.subjects[subject])) continue;
+    const double weight = i >= late                          ? weight_of_hinge
+                          : i < std::ssize(columns.subjects) ? 1.0
+                                                             : weight_of_lag;
+    scale[i] = weight / std::hypot(deviation[i], is_place ? usual_share * usual_K
+                                                          : usual_share_of_signal * usual[subject]);
   }
   return scale;
 }

@@ -219,47 +219,90 @@ std::vector<FamilyResult> judged(const MeasuredTests& tests, const FitOptions& o
 }
 
 using Judgement = std::pair<MeasuredTests, std::vector<FamilyResult>>;
+using Judgements = std::vector<Judgement>;
+using Outputs = std::vector<std::size_t>;
+
+Outputs all_outputs(const Judgement& judgement) {
+  Outputs outputs(judgement.first.outputs.size());
+  std::iota(outputs.begin(), outputs.end(), std::size_t{0});
+  return outputs;
+}
 
 /// Geometric mean RMS of a family over outputs and folds: outputs that move little have the same
 /// weight, and one stretch does not decide.
-double left_by(const Judgement& judgement, std::size_t family) {
+double left_by(const Judgement& judgement, std::size_t family, const Outputs& outputs) {
   const auto& [tests, results] = judgement;
   double sum = 0.0;
-  for (std::size_t o = 0; o < tests.outputs.size(); ++o) {
+  for (const std::size_t o : outputs) {
     const double least_um = std::max(least_share * results[0].left_out_rms_um[o], 1e-30);
     for (const double rms_um : results[family].fold_um[o])
       sum += std::log(std::max(rms_um, least_um));
   }
-  return std::exp(sum / static_cast<double>(tests.outputs.size() * tests.folds.size()));
+  return std::exp(sum / static_cast<double>(outputs.size() * tests.folds.size()));
 }
 
 /// Geometric mean over judgements.
-double left_by(const std::vector<Judgement>& judgements, std::size_t family) {
+double left_by(const Judgements& judgements, std::size_t family, const Outputs& outputs) {
   double product = 1.0;
-  for (const Judgement& each : judgements) product *= left_by(each, family);
+  for (const Judgement& each : judgements) product *= left_by(each, family, outputs);
   return std::pow(product, 1.0 / static_cast<double>(judgements.size()));
 }
 
-double total_squares(const FamilyResult& result) {
-  return std::accumulate(result.scores.begin(), result.scores.end(), 0.0);
+/// Sum over outputs of the family's squares relative to those of no model.
+double total_squares(const Judgement& judgement, std::size_t family, const Outputs& outputs) {
+  const std::vector<FamilyResult>& results = judgement.second;
+  double sum = 0.0;
+  for (const std::size_t o : outputs)
+    sum += std::pow(
+        results[family].left_out_rms_um[o] / std::max(results[0].left_out_rms_um[o], 1e-30), 2.0);
+  return sum;
+}
+
+bool answers(const Judgements& judgements, std::size_t family) {
+  return std::all_of(judgements.begin(), judgements.end(),
+                     [&](const Judgement& each) { return each.second[family].answers; });
 }
 
 /// Judgement in which the family's total error is not below that of no model; empty: none.
-std::string worse_than_none(const std::vector<Judgement>& judgements, std::size_t family) {
-  for (const auto& [tests, results] : judgements)
-    if (!(total_squares(results[family]) < total_squares(results[0])))
+std::string worse_than_none(const Judgements& judgements, std::size_t family,
+                            const Outputs& outputs) {
+  for (const Judgement& each : judgements) {
+    const MeasuredTests& tests = each.first;
+    if (!(total_squares(each, family, outputs) < total_squares(each, 0, outputs)))
       return tests.runs.size() > 1 && tests.folds.size() == tests.runs.size() ? "whole runs"
              : tests.folds.size() == 2                                        ? "halves"
                                                                               : "stretches";
+  }
   return "";
+}
+
+/// The family leaves a tenth less of the output than no model, and nowhere more.
+bool predicts(const Judgements& judgements, std::size_t family, std::size_t output) {
+  return answers(judgements, family) && worse_than_none(judgements, family, {output}).empty() &&
+         left_by(judgements, family, {output}) <
+             (1.0 - less_than_none) * left_by(judgements, 0, {output});
+}
+
+/// The outputs that a family predicts; all, if there is none.
+Outputs predictable(const Judgements& judgements) {
+  const Outputs all = all_outputs(judgements.front());
+  Outputs outputs;
+  for (const std::size_t o : all)
+    for (std::size_t family = 1; family < judgements.front().second.size(); ++family)
+      if (predicts(judgements, family, o)) {
+        outputs.push_back(o);
+        break;
+      }
+  return outputs.empty() ? all : outputs;
 }
 
 /// Gives the gradual signals gains in the bank if every judgement is better with them; no hinges,
 /// which would follow any course of time.
-void add_gradual(std::vector<Judgement>& judgements, const BankColumns& columns,
+void add_gradual(Judgements& judgements, const BankColumns& columns,
                  const std::function<void()>& done) {
   const std::vector<std::string> gradual = judgements[0].first.gradual;
-  std::vector<Judgement> with = judgements;
+  const Outputs outputs = all_outputs(judgements[0]);
+  Judgements with = judgements;
   for (auto& [tests, results] : with) {
     std::erase_if(tests.unmoved, [&](const std::string& name) {
       return std::find(gradual.begin(), gradual.end(), name) != gradual.end();
@@ -269,26 +312,26 @@ void add_gradual(std::vector<Judgement>& judgements, const BankColumns& columns,
   const std::size_t bank = index_of_family(Family::lag_bank);
   const double share = 1.0 - less_with_gradual;
   for (std::size_t i = 0; i < with.size(); ++i)
-    if (!(left_by(with[i], bank) < share * left_by(judgements[i], bank)) ||
-        !(total_squares(with[i].second[bank]) <
-          share * share * total_squares(judgements[i].second[bank])))
+    if (!(left_by(with[i], bank, outputs) < share * left_by(judgements[i], bank, outputs)) ||
+        !(total_squares(with[i], bank, outputs) <
+          share * share * total_squares(judgements[i], bank, outputs)))
       return;
   judgements = std::move(with);
 }
 
 /// Chooses no model unless a family leaves a tenth less; the bank unless its error exceeds that of
-/// few sensors by a tenth. Families worse than no model in any judgement are excluded.
-void choose(const std::vector<Judgement>& judgements, FamiliesFit& fit) {
+/// few sensors by a tenth. Families worse than no model in any judgement are excluded. Outputs that
+/// no family predicts do not count.
+void choose(const Judgements& judgements, FamiliesFit& fit) {
+  const Outputs outputs = predictable(judgements);
   std::size_t chosen = 0;
-  std::vector<double> left_um{left_by(judgements, 0)};
+  std::vector<double> left_um{left_by(judgements, 0, outputs)};
   std::string worse;
   for (std::size_t i = 1; i < fit.results.size(); ++i) {
     left_um.push_back(std::numeric_limits<double>::infinity());
-    if (!std::all_of(judgements.begin(), judgements.end(),
-                     [&](const Judgement& each) { return each.second[i].answers; }))
-      continue;
-    left_um[i] = left_by(judgements, i);
-    const std::string where = worse_than_none(judgements, i);
+    if (!answers(judgements, i)) continue;
+    left_um[i] = left_by(judgements, i, outputs);
+    const std::string where = worse_than_none(judgements, i, outputs);
     if (!where.empty()) {
       worse.append("; ").append(to_string(all_families[i])).append(" is worse than no model on ");
       worse += where;
@@ -303,6 +346,34 @@ void choose(const std::vector<Judgement>& judgements, FamiliesFit& fit) {
                            "model %.3g um",
                            left_um[chosen], left_um[0]) +
                        worse;
+  if (chosen == 0) return;
+  for (const std::size_t o : all_outputs(judgements.front()))
+    if (!predicts(judgements, chosen, o)) fit.without_gains.push_back(o);
+}
+
+/// Sets every coefficient of the output to 0.
+void clear_gains(ThermalModel& model, std::size_t output) {
+  const std::string& name = model.outputs[output];
+  std::fill(model.matrix_um_per_K[output].begin(), model.matrix_um_per_K[output].end(), 0.0);
+  for (TermSpec& term : model.terms) {
+    if (const auto bank = term.bank.gain_um_per_unit.find(name);
+        bank != term.bank.gain_um_per_unit.end())
+      for (std::vector<double>& gains : bank->second) std::fill(gains.begin(), gains.end(), 0.0);
+    for (auto& [key, by_output] : term.per_output) by_output[name] = 0.0;
+  }
+}
+
+/// The chosen family's result, and that of no model for the outputs without gains.
+FamilyResult result_of_model(const std::vector<FamilyResult>& results, const FamiliesFit& fit) {
+  const FamilyResult& none = results.front();
+  FamilyResult result = results[index_of_family(fit.chosen)];
+  for (const std::size_t o : fit.without_gains) {
+    const auto column = static_cast<Eigen::Index>(o);
+    result.left_out_um.col(column) = none.left_out_um.col(column);
+    result.left_out_rms_um[o] = none.left_out_rms_um[o];
+    result.fold_um[o] = none.fold_um[o];
+  }
+  return result;
 }
 
 /// Groups of places, and of signals, whose courses are too correlated to be separated.
@@ -463,7 +534,7 @@ void add_warnings(const MeasuredTests& tests, FamiliesFit& fit) {
     fit.warnings.emplace_back(
         "judged within one run: the error on other days is unknown. Next: a run of another day "
         "with another course of speeds or loads; fit both, and each judges the other");
-  const FamilyResult& chosen = fit.chosen_result();
+  const FamilyResult& chosen = fit.of_model;
   const FamilyResult& none = fit.results[index_of_family(Family::none)];
   for (const std::string& signal : fit.unmoved)
     fit.warnings.push_back(signal +
@@ -488,8 +559,16 @@ void add_warnings(const MeasuredTests& tests, FamiliesFit& fit) {
         "no family is better than no model on left-out data: the matrix is 0");
     return;
   }
+  const auto has_gains = [&fit](std::size_t o) {
+    return std::find(fit.without_gains.begin(), fit.without_gains.end(), o) ==
+           fit.without_gains.end();
+  };
+  for (const std::size_t o : fit.without_gains)
+    fit.warnings.push_back(tests.outputs[o] +
+                           ": no better than without a model on left-out data: its coefficients "
+                           "are 0. Next: thermocomp inspect, and fit it by itself");
   for (std::size_t o = 0; o < tests.outputs.size(); ++o)
-    if (is_unfit(chosen.left_out_rms_um[o], none.left_out_rms_um[o]))
+    if (has_gains(o) && is_unfit(chosen.left_out_rms_um[o], none.left_out_rms_um[o]))
       fit.warnings.push_back(tests.outputs[o] +
                              printed(": on left-out data the model leaves %.0f %% of the RMS "
                                      "without a model; one that is fit "
@@ -503,7 +582,7 @@ void add_warnings(const MeasuredTests& tests, FamiliesFit& fit) {
   }
   for (std::size_t o = 0; o < tests.outputs.size(); ++o)
     for (std::size_t f = 0; f < tests.folds.size(); ++f)
-      if (!(chosen.fold_um[o][f] < none.fold_um[o][f]))
+      if (has_gains(o) && !(chosen.fold_um[o][f] < none.fold_um[o][f]))
         fit.warnings.push_back(tests.outputs[o] + ": on " + tests.fold_name(f) +
                                ", left out, the model is worse than no model");
 }
@@ -540,10 +619,6 @@ MeasuredTests in_halves(const MeasuredTests& tests) {
   return halves;
 }
 
-const FamilyResult& FamiliesFit::chosen_result() const {
-  return results[index_of_family(chosen)];
-}
-
 FamiliesFit fit_families(const MeasuredTests& given, const FitOptions& options,
                          std::optional<Family> forced,
                          const std::function<void(double)>& progress) {
@@ -559,7 +634,7 @@ FamiliesFit fit_families(const MeasuredTests& given, const FitOptions& options,
   const auto done = [&] { progress(std::min(1.0, ++step / steps)); };
   BankColumns columns = bank_columns(given);
   add_hinges(given, columns);
-  std::vector<Judgement> judgements;
+  Judgements judgements;
   for (const MeasuredTests* each : {&given, &further})
     if (!each->folds.empty())
       judgements.emplace_back(*each, judged(*each, options, forced, columns, done));
@@ -571,13 +646,15 @@ FamiliesFit fit_families(const MeasuredTests& given, const FitOptions& options,
   if (forced) {
     fit.chosen = *forced;
     fit.chosen_because = "as requested";
+    fit.without_gains.clear();
   }
-  if (one_run && judgements.size() > 1)
-    fit.other_half_um = judgements[1].second[index_of_family(fit.chosen)].left_out_rms_um;
   fit.together = moved_together(tests);
-  if (!fit.chosen_result().answers)
-    throw std::runtime_error(std::string(to_string(fit.chosen)) + ": " +
-                             fit.chosen_result().why_not);
+  const FamilyResult& of_family = fit.results[index_of_family(fit.chosen)];
+  if (!of_family.answers)
+    throw std::runtime_error(std::string(to_string(fit.chosen)) + ": " + of_family.why_not);
+  fit.of_model = result_of_model(fit.results, fit);
+  if (one_run && judgements.size() > 1)
+    fit.other_half_um = result_of_model(judgements[1].second, fit).left_out_rms_um;
   if (fit.chosen == Family::none)
     fit.model = no_model(tests);
   else if (fit.chosen == Family::lag_bank)
@@ -588,6 +665,10 @@ FamiliesFit fit_families(const MeasuredTests& given, const FitOptions& options,
   else
     fit.model = model_of(
         tests, fit.few.emplace(fit_equation(tests, options_of(fit.chosen, tests, options))));
+  for (const std::size_t o : fit.without_gains) {
+    clear_gains(fit.model, o);
+    if (fit.few) fit.few->outputs[o].coefficients.setZero();
+  }
   fit.model.made_from = made_from_tests(tests, fit);
   add_warnings(tests, fit);
   return fit;

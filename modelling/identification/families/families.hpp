@@ -41,6 +41,8 @@ struct FamilyResult {
 struct FamiliesFit {
   std::vector<FamilyResult> results;  ///< order of all_families
   Family chosen{Family::none};
+  FamilyResult of_model;  ///< that of the chosen; of no model for outputs without gains
+  std::vector<std::size_t> without_gains;  ///< outputs that the chosen family does not predict
   std::vector<double> other_half_um;  ///< RMS on the halves of a single run by models of the other
   std::string chosen_because;         ///< one line with the decisive figures
   std::vector<std::vector<std::string>> together;  ///< places that always moved alike
@@ -48,15 +50,14 @@ struct FamiliesFit {
   ThermalModel model;      ///< of the chosen family, on all rows, with [made_from]
   std::optional<Fit> few;  ///< of static_few and lagged_few
   std::vector<std::string> warnings;
-
-  [[nodiscard]] const FamilyResult& chosen_result() const;
 };
 
 /// Judges none, static_few and lag_bank on left-out runs; two or three runs also on stretches, a
 /// single one on stretches and halves. A family worse than no model in any judgement is excluded.
 /// The bank is chosen unless its error exceeds that of few sensors by a tenth, and no model unless
-/// a family leaves a tenth less. lagged_few and physical are judged only if forced. Gradual signals
-/// get gains in the bank if it leaves a tenth less with them in every judgement.
+/// a family leaves a tenth less. An output that the chosen family does not predict gets no gains.
+/// lagged_few and physical are judged only if forced. Gradual signals get gains in the bank if it
+/// leaves a tenth less with them in every judgement.
 /// @param forced    family in place of the chosen one
 /// @param progress  called with the completed share of the work
 /// @throws std::runtime_error if the forced family has no answer

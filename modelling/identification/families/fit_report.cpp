@@ -223,7 +223,7 @@ std::string fit_html(const MeasuredTests& tests, const Fit& fit) {
 
 std::string families_html(const MeasuredTests& tests, const FamiliesFit& fit) {
   Fit shown = fit.few.value_or(Fit{});
-  const FamilyResult& chosen = fit.chosen_result();
+  const FamilyResult& chosen = fit.of_model;
   shown.left_out_um = chosen.left_out_um;
   if (shown.grouping.groups.empty())
     shown.grouping = group_places(similarity(tests, true), noise_floor(tests));
@@ -333,7 +333,7 @@ std::string families_json(const MeasuredTests& tests, const FamiliesFit& fit) {
   json["together"] = fit.together;
   json["unmoved"] = fit.unmoved;
   json["judged_within_one_run"] = tests.runs.size() < 2;
-  const FamilyResult& chosen = fit.chosen_result();
+  const FamilyResult& chosen = fit.of_model;
   for (std::size_t o = 0; o < tests.outputs.size(); ++o) {
     json["left_out_rms_um"][tests.outputs[o]] = chosen.left_out_rms_um[o];
     json["no_model_rms_um"][tests.outputs[o]] = fit.results.front().left_out_rms_um[o];

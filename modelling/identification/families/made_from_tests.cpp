@@ -209,7 +209,7 @@ MadeFrom made_from_tests(const MeasuredTests& tests, const FamiliesFit& fit) {
     made_from.taus_s.pop_back();
   fill_ranges(tests, made_from);
   fill_domain(tests, made_from);
-  const FamilyResult& chosen = fit.chosen_result();
+  const FamilyResult& chosen = fit.of_model;
   const FamilyResult& none = fit.results.front();
   Eigen::MatrixXd measured(chosen.left_out_um.rows(), chosen.left_out_um.cols());
   Eigen::Index begin = 0;

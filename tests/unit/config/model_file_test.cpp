@@ -420,10 +420,10 @@ TEST_CASE("a diameter names one of the outputs once, and survives writing", "[mo
   const std::string diameter = "[[diameter]]\noutput = \"dia_um\"\naxis = \"x\"\n";
   const ThermalModel model = parse_model(text + diameter, "m.toml");
   CHECK(model.diameters == std::vector<DiameterSpec>{{"dia_um", "x", 1.0}});
-  CHECK(of_axes(model).matrix_um_per_K[0][0] == 2.0);
+  CHECK(in_axis_units(model).matrix_um_per_K[0][0] == 2.0);
   CHECK(parse_model(write_model(model), "m.toml").diameters == model.diameters);
   const ThermalModel other = parse_model(text + diameter + "sign = \"-\"\n", "m.toml");
-  CHECK(of_axes(other).matrix_um_per_K[0][0] == -2.0);
+  CHECK(in_axis_units(other).matrix_um_per_K[0][0] == -2.0);
   CHECK(parse_model(write_model(other), "m.toml").diameters == other.diameters);
   CHECK_THROWS_WITH(parse_model(text + diameter + diameter, "m.toml"),
                     Catch::Contains("is a diameter already"));

@@ -143,16 +143,16 @@ TEST_CASE("a model moves the outputs that have a coefficient", "[config][model]"
   model.inputs = {"bed_degC"};
   model.outputs = {"x_um", "z_um"};
   model.matrix_um_per_K = {{0.0}, {0.0}};
-  CHECK_FALSE(moves(model));
+  CHECK_FALSE(has_gain(model));
   TermSpec term;
   term.kind = "speed_growth";
   term.per_output["gain_um_per_unit2"]["z_um"] = 1e-7;
   model.terms.push_back(term);
-  CHECK(moves(model));
-  CHECK(moves(model, "z_um"));
-  CHECK_FALSE(moves(model, "x_um"));
+  CHECK(has_gain(model));
+  CHECK(has_gain(model, "z_um"));
+  CHECK_FALSE(has_gain(model, "x_um"));
   model.matrix_um_per_K[0][0] = -2.0;
-  CHECK(moves(model, "x_um"));
+  CHECK(has_gain(model, "x_um"));
 }
 
 TEST_CASE("the commented example of a bank of lags loads", "[config][model]") {

@@ -161,6 +161,13 @@ TEST_CASE("files of other programs are read, and their interpretation is reporte
   }
 }
 
+TEST_CASE("a column in degF is converted in a file of our own form too", "[config][run]") {
+  const RunFile run = parse_run("time_s,t1_degF,z_um\n0,68,0\n10,86,1\n", "run.csv");
+  CHECK(run.column("t1_degC")[0] == Approx(20.0));
+  CHECK(run.column("t1_degC")[1] == Approx(30.0));
+  CHECK_FALSE(run.understood.empty());
+}
+
 TEST_CASE("our own form is read without a report", "[config][run]") {
   const std::string own = "time_s,t1_degC,z_um,door\n0,20.5,1,0\n";
   CHECK(read(own).understood.empty());

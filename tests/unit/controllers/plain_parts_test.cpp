@@ -112,7 +112,7 @@ TEST_CASE("written() is a recent confirmation on this link", "[controllers]") {
 TEST_CASE("a controller whose exchange takes seconds is waited for", "[controllers]") {
   WriteGate gate(100ms);
   gate.synchronised();
-  gate.turned(2300ms);
+  gate.note_exchange_time(2300ms);
   gate.offered(of_epoch(1), 100s);
   gate.sent(100s);
   gate.confirmed(100s);
@@ -171,7 +171,7 @@ TEST_CASE("an axis on its way to an offset sent lately is explained, one elsewhe
   std::array<double, axes_max> applied_um{};
   applied_um.fill(not_a_number);
   applied_um[0] = 10.0;
-  CHECK(gate.explains(applied_um));
+  CHECK(gate.check_read_back(applied_um));
   const auto send = [&](double offset_um) {
     OffsetCommand command = of_epoch(gate.epoch());
     command.offset_um[0] = offset_um;
@@ -182,27 +182,27 @@ TEST_CASE("an axis on its way to an offset sent lately is explained, one elsewhe
   send(14.0);
   send(12.0);
   applied_um[0] = 13.9;  // late: still at an earlier offset
-  CHECK(gate.explains(applied_um));
+  CHECK(gate.check_read_back(applied_um));
   applied_um[0] = 11.0;
-  CHECK(gate.explains(applied_um));
+  CHECK(gate.check_read_back(applied_um));
   CHECK(gate.verdict(0s) == SendVerdict::send);
   applied_um[0] = not_a_number;
-  CHECK(gate.explains(applied_um));
+  CHECK(gate.check_read_back(applied_um));
   CHECK(gate.verdict(0s) == SendVerdict::nothing_to_send);
   const OffsetCommand driven = gate.command();
   gate.offered(of_epoch(gate.epoch()), 0s);  // the axis is not driven: the others are written
   CHECK(gate.verdict(0s) == SendVerdict::send);
   gate.offered(driven, 0s);
   applied_um[0] = 11.0;
-  CHECK(gate.explains(applied_um));
+  CHECK(gate.check_read_back(applied_um));
   CHECK(gate.verdict(0s) == SendVerdict::send);
   applied_um[0] = not_a_number;
-  CHECK(gate.explains(applied_um));
+  CHECK(gate.check_read_back(applied_um));
   applied_um[0] = 0.0;  // re-homed meanwhile
-  CHECK_FALSE(gate.explains(applied_um));
+  CHECK_FALSE(gate.check_read_back(applied_um));
   // A new epoch starts from there.
   static_cast<void>(gate.synchronised());
-  CHECK(gate.explains(applied_um));
+  CHECK(gate.check_read_back(applied_um));
 }
 
 TEST_CASE("a command computed before an axis moved elsewhere is not sent", "[controllers]") {
@@ -215,12 +215,12 @@ TEST_CASE("a command computed before an axis moved elsewhere is not sent", "[con
   command.offset_um[0] = 20.0;
   command.valid[0] = true;
   command.look = gate.look();
-  CHECK(gate.explains(applied_um));
+  CHECK(gate.check_read_back(applied_um));
   applied_um[0] = 0.0;  // re-homed; no command of this epoch yet
-  CHECK(gate.explains(applied_um));
+  CHECK(gate.check_read_back(applied_um));
   gate.offered(command, 0s);
   CHECK(gate.verdict(0s) == SendVerdict::resynchronise);
-  CHECK(gate.explains(applied_um));
+  CHECK(gate.check_read_back(applied_um));
   CHECK(gate.verdict(0s) == SendVerdict::resynchronise);
   command.offset_um[0] = 0.0;
   command.look = gate.look();
@@ -235,9 +235,9 @@ TEST_CASE("an axis that was never sent an offset is always explained", "[control
   WriteGate gate(100ms);
   static_cast<void>(gate.synchronised());
   std::array<double, axes_max> applied_um{};
-  CHECK(gate.explains(applied_um));
+  CHECK(gate.check_read_back(applied_um));
   applied_um[3] = 200.0;
-  CHECK(gate.explains(applied_um));
+  CHECK(gate.check_read_back(applied_um));
 }
 
 TEST_CASE("neighbours are read in one request, distant registers are not", "[controllers]") {
@@ -462,16 +462,16 @@ TEST_CASE("a controller that moves between read-back and first command is detect
   command.offset_um[0] = 23.1;
   command.valid[0] = true;
   gate.offered(command, 1s);
-  CHECK(gate.explains(applied_um));
+  CHECK(gate.check_read_back(applied_um));
   applied_um[0] = -11.0;  // re-homed before the first command of this epoch
-  CHECK_FALSE(gate.explains(applied_um));
-  CHECK_FALSE(gate.explains(applied_um));  // nor the next time
+  CHECK_FALSE(gate.check_read_back(applied_um));
+  CHECK_FALSE(gate.check_read_back(applied_um));  // nor the next time
   // An axis that is not to be driven is always explained.
   command.link_epoch = gate.synchronised(applied_um);
   command.valid[0] = false;
   gate.offered(command, 2s);
   applied_um[0] = 5.0;
-  CHECK(gate.explains(applied_um));
+  CHECK(gate.check_read_back(applied_um));
 }
 
 TEST_CASE("a CAN controller reports at its start that the system has no CAN",

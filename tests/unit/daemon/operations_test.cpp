@@ -105,7 +105,7 @@ TEST_CASE("while the reference is lost, enable is refused until one is taken", "
 TEST_CASE("a reload of an unreadable file changes nothing", "[daemon]") {
   Rig rig;
   CHECK_THROWS_AS(Rig::answer(rig.operations.reload()), ConfigurationError);
-  rig.operations.hang_up();  // the same, logged
+  rig.operations.reload_by_signal();  // the same, logged
   CHECK_FALSE(rig.operations.is_busy());
   CHECK(rig.give(CommandKind::disable) == nlohmann::json{{"done", true}});
 }

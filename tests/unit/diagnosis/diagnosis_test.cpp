@@ -472,6 +472,48 @@ TEST_CASE("an output keeps coefficients whose correction leaves it worse on the 
   CHECK(borne_out.extended.matrix_um_per_K[0][0] == Approx(5.1).epsilon(0.005));
 }
 
+TEST_CASE("a displacement of reversed sign is a warning before any cause", "[diagnosis]") {
+  const auto reversed = [](unsigned seed) {
+    RunFile run = run_with(seed, 600, [](double, double, int) { return 0.0; });
+    for (double& each : run.values[3]) each = -each;
+    return run;
+  };
+  const Diagnosis answer = diagnose(one_input(), {reversed(1)}, {reversed(2)});
+  REQUIRE(answer.warnings.size() == 1);
+  CHECK(answer.warnings[0].find("z_um: measured is -1.0") == 0);
+}
+
+TEST_CASE("an effect of a recorded place is named whatever its sign", "[diagnosis]") {
+  for (const double lacks_um_per_K : {-1.5, 1.5}) {
+    CAPTURE(lacks_um_per_K);
+    const Diagnosis answer =
+        diagnosis_of([&](double, double rise_K, int) { return lacks_um_per_K * rise_K; });
+    REQUIRE_FALSE(answer.findings.empty());
+    // The place warms as a low pass of the speed, so the two cannot be told apart.
+    const std::string& cause = answer.findings[0].cause;
+    CHECK((cause == "wrong_coefficient" || cause == "missing_heat_source"));
+    CHECK(answer.outputs.at("z_um").extended_test_rms_um <
+          0.2 * answer.outputs.at("z_um").test_rms_um);
+    CHECK(answer.warnings.empty());
+  }
+}
+
+TEST_CASE("few values do not make a cycle", "[diagnosis]") {
+  std::mt19937 random(3);
+  for (unsigned seed = 1; seed < 9; ++seed) {
+    std::vector<RunFile> runs;
+    for (unsigned i = 0; i < 2; ++i) {
+      RunFile run = run_with(2 * seed + i, 900, [](double, double, int) { return 0.0; });
+      for (std::size_t row = 0; row < run.rows(); ++row)
+        if (std::uniform_int_distribution<int>(0, 59)(random) != 0) run.values[3][row] = NAN;
+      runs.push_back(std::move(run));
+    }
+    const RunFile test = run_with(99, 400, [](double, double, int) { return 0.0; });
+    for (const NamedFinding& finding : diagnose(one_input(), runs, {test}).findings)
+      CHECK(finding.cause != "periodic_disturbance");
+  }
+}
+
 TEST_CASE("missing values are left out, and a run without any is refused", "[diagnosis]") {
   RunFile train = run_with(1, 600, [](double rpm, double, int) { return 4e-7 * rpm * rpm; });
   for (std::size_t row = 0; row < train.rows(); row += 3) train.values[3][row] = NAN;

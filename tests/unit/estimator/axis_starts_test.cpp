@@ -56,7 +56,7 @@ TEST_CASE("registers that contradict the offset sent are not followed", "[start]
   CHECK_FALSE(bench.axis().driven());
   CHECK(bench.axis().start_unknown());
   CHECK(bench.axis().start() == StartEvidence::unknown);
-  CHECK_FALSE(bench.axis().forgotten());
+  CHECK_FALSE(bench.axis().last_offset_unknown());
   CHECK_FALSE(bench.bank.synced());
   bench.reconnect(100ms, 0.0);
   bench.steps(20, 30.0);
@@ -96,7 +96,7 @@ TEST_CASE("with an unknown start an axis is not driven until released", "[start]
   bench.steps(20, 30.0);
   CHECK_FALSE(bench.axis().driven());
   CHECK(bench.axis().start_unknown());
-  CHECK(bench.axis().forgotten());
+  CHECK(bench.axis().last_offset_unknown());
   CHECK(std::abs(bench.axis().offset_um()) <= 50.0);
   bench.release();
   CHECK(bench.axis().start() == StartEvidence::released);
@@ -191,7 +191,7 @@ TEST_CASE("without registers or read-back, a controller must not have had time t
   bench.reconnect(3s, none);
   bench.steps(3, 0.4);
   CHECK_FALSE(bench.axis().driven());
-  CHECK(bench.axis().forgotten());
+  CHECK(bench.axis().last_offset_unknown());
   bench.release();
   bench.save();
   bench.step(0.4);

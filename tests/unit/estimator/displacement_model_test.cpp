@@ -422,7 +422,7 @@ TEST_CASE("a diameter moves its axis by half, with its sign, for all parts of a 
   for (const double sign : {1.0, -1.0}) {
     model.diameters = {{"dia_um", "x", sign}};
     DisplacementModel whole(model);
-    DisplacementModel of_axis(of_axes(model));
+    DisplacementModel of_axis(in_axis_units(model));
     const std::vector<double> reference(model.temperature_columns().size(), 20.0);
     std::vector<double> dia_um(2);
     std::vector<double> axis_um(2);

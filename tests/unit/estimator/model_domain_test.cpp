@@ -59,6 +59,36 @@ TEST_CASE("the distance uses the covariance: a feature at its own standard devia
   CHECK(domain.sd_um(0) == Approx(std::hypot(1.5, 2.5)));  // its runs count as one
 }
 
+TEST_CASE("a signal beyond a tenth of its recorded range is outside, as are its low passes",
+          "[domain]") {
+  ThermalModel model = made_model();
+  TermSpec& term = model.terms.emplace_back();
+  term.kind = "signal_hinge";
+  term.subject = "spindle_rpm";
+  term.shared["above"] = 1000.0;
+  term.per_output["gain_um_per_unit"]["z_um"] = 1e-3;
+  MadeFrom& made_from = *model.made_from;
+  made_from.columns.emplace_back("spindle_rpm");
+  made_from.low.push_back(0.0);
+  made_from.high.push_back(4000.0);
+  made_from.taus_s = {0.0, 600.0};
+  made_from.mean = {20.0, 0.0, 2000.0, 0.0, 2000.0};
+  made_from.covariance.assign(5, Vector(5, 0.0));
+  for (std::size_t i = 0; i < 5; ++i) made_from.covariance[i][i] = i % 2 == 0 && i > 0 ? 9e6 : 4.0;
+  ModelDomain domain(model);
+  const auto outside_at = [&](std::chrono::seconds now, double rpm) {
+    domain.step(now, Vector{20.0, 0.0}, Vector{20.0, 0.0}, Vector{rpm});
+    return domain.outside();
+  };
+  CHECK_FALSE(outside_at(1s, 4300.0));
+  CHECK(outside_at(10s, 4500.0));
+  CHECK(domain.used_share() == Approx(1.0 / (1.125 * 1.125)));
+  CHECK(domain.furthest_column() == 1);
+  CHECK_FALSE(outside_at(20s, 3000.0));
+  for (int i = 0; i < 200; ++i) static_cast<void>(outside_at(30s + i * 10s, 5000.0));
+  CHECK(outside_at(2100s, 3000.0));  // the machine still has the heat
+}
+
 TEST_CASE("a cold morning is outside although the machine has not moved", "[domain]") {
   ModelDomain domain(made_model());
   domain.step(1s, Vector{12.0, 12.0}, Vector{12.0, 12.0}, {});

@@ -141,7 +141,7 @@ TEST_CASE("a first value refuted by a confirmed jump while young is taken anew",
     CHECK_FALSE(moment.step(reference).known);
   }
   SECTION("it had stood for long") {
-    moment.refuted_at[0] = 100s + Reference::young + 1s;
+    moment.refuted_at[0] = 100s + Reference::provisional_time + 1s;
     CHECK_FALSE(moment.step(reference).changed);
   }
   SECTION("the jump was before it") {

@@ -285,7 +285,7 @@ TEST_CASE("the neighbours' expectation confirms a jump and refutes the value bef
           "[screening]") {
   Screening screening(settling());
   look_each_second(screening, 0s, 20s, 22.0);
-  const auto expect = [&](double degC, double sd_K) { screening.surround({degC, sd_K, false}); };
+  const auto expect = [&](double degC, double sd_K) { screening.expect({degC, sd_K, false}); };
   SECTION("where they are sure and agree") {
     expect(27.5, 0.4);
     CHECK(look_each_second(screening, 20s, 30s, 28.0) == 0);
@@ -315,16 +315,16 @@ TEST_CASE("the neighbours' expectation confirms a jump and refutes the value bef
 TEST_CASE("an expectation does not apply after the next outage", "[screening]") {
   Screening screening(settling());
   look_each_second(screening, 0s, 20s, 22.0);
-  screening.surround({22.0, 0.1, false});
+  screening.expect({22.0, 0.1, false});
   CHECK(look_each_second(screening, 90s, 101s, 22.3) == 1);
   CHECK(look_each_second(screening, 300s, 311s, 29.0) == 1);
 }
 
 TEST_CASE("a module that is not ready does not settle", "[screening]") {
   Screening screening(settling());
-  screening.surround({not_a_number, 0.0, true});
+  screening.expect({not_a_number, 0.0, true});
   CHECK(look_each_second(screening, 0s, 60s, 25.0) == 0);
-  screening.surround({});
+  screening.expect({});
   CHECK(look(screening, 60s, 25.0));
 }
 

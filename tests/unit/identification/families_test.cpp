@@ -9,6 +9,7 @@
 #include <catch2/catch.hpp>
 
 #include "config/model/model_file.hpp"
+#include "config/runs/model_inputs.hpp"
 #include "estimator/model/displacement_model.hpp"
 #include "machine_runs.hpp"
 #include "modelling/identification/families/bank_fit.hpp"
@@ -29,7 +30,7 @@ TEST_CASE("a machine of two static places gets their gains, and small lags", "[f
       4, [](double quick, double slow, double, double) { return 5.0 * quick - 3.0 * slow; });
   const FamiliesFit fit = fitted(tests);
   CHECK(fit.chosen == Family::lag_bank);
-  CHECK(fit.chosen_result().left_out_rms_um[0] < 0.6);
+  CHECK(fit.of_model.left_out_rms_um[0] < 0.6);
   CHECK(fit.model.matrix_um_per_K[0][0] == Approx(5.0).epsilon(0.02));
   CHECK(fit.model.matrix_um_per_K[0][1] == Approx(-3.0).epsilon(0.1));
 }
@@ -49,7 +50,7 @@ TEST_CASE("delayed displacement gets no static model", "[families]") {
       4, [](double, double, double late, double rpm) { return 6.0 * late + 4e-3 * rpm; });
   const FamiliesFit fit = fitted(tests);
   CHECK(fit.chosen >= Family::lagged_few);
-  CHECK(fit.chosen_result().left_out_rms_um[0] <
+  CHECK(fit.of_model.left_out_rms_um[0] <
         0.6 * result_of(fit, Family::static_few).left_out_rms_um[0]);
 }
 
@@ -77,8 +78,7 @@ TEST_CASE("a model that leaves half or more is reported as unfit for use", "[fam
     const FamiliesFit fit = fitted(tests, Family::static_few);
     const std::string message = families_text(tests, fit);
     const std::string page = families_html(tests, fit);
-    const double share =
-        fit.chosen_result().left_out_rms_um[0] / fit.results.front().left_out_rms_um[0];
+    const double share = fit.of_model.left_out_rms_um[0] / fit.results.front().left_out_rms_um[0];
     CAPTURE(noise_um, share);
     CHECK((share >= 0.5) == (noise_um > 1.0));
     CHECK((message.find("Next: thermocomp diagnose") != std::string::npos) == (share >= 0.5));
@@ -131,6 +131,56 @@ TEST_CASE("a model judged within one run has a warning", "[families]") {
   CHECK(message.find("Next: a run of another day") != std::string::npos);
   CHECK(message.find("on another day (each half of this run by a model of the other)") !=
         std::string::npos);
+}
+
+TEST_CASE("an output that cannot be predicted gets no gains, and the others keep theirs",
+          "[families]") {
+  std::mt19937_64 engine(7);
+  std::vector<RunFile> files;
+  for (std::size_t i = 0; i < 3; ++i) {
+    RunFile& run = files.emplace_back(machine_run(
+        std::string("run").append(std::to_string(i)), i + 1,
+        [](double quick, double slow, double, double) { return 5.0 * quick - 3.0 * slow; }));
+    run.columns.emplace_back("x_um");
+    std::vector<double>& noise_um = run.values.emplace_back();
+    for (std::size_t row = 0; row < run.values[0].size(); ++row)
+      noise_um.push_back(20.0 * gaussian(engine));
+  }
+  TestOptions options;
+  options.outputs = {"x_um", "z_um"};
+  const FamiliesFit fit = fitted(measured_tests(files, options));
+  CHECK(fit.chosen != Family::none);
+  CHECK(fit.without_gains == std::vector<std::size_t>{0});
+  CHECK_FALSE(has_gain(fit.model, "x_um"));
+  CHECK(has_gain(fit.model, "z_um"));
+  CHECK(fit.of_model.left_out_rms_um[0] == fit.results[0].left_out_rms_um[0]);
+  CHECK(fit.of_model.left_out_rms_um[1] < 0.1 * fit.results[0].left_out_rms_um[1]);
+  CHECK(fit.model.made_from->outputs.at("x_um").left_out_rms_um > 15.0);
+}
+
+TEST_CASE("a stray value of a signal is left out of the fit", "[families]") {
+  RunFile run = machine_run("run", 1, [](double quick, double, double, double) { return quick; });
+  run.values[3][100] = 65535.0;
+  TestOptions options;
+  options.outputs = {"z_um"};
+  options.signals = true;
+  const MeasuredTests tests = measured_tests({run}, options);
+  CHECK(tests.rows() == static_cast<Eigen::Index>(run.values[0].size()) - 1);
+  CHECK(tests.moved("spindle_rpm"));
+  CHECK(tests.notes.size() == 1);
+}
+
+TEST_CASE("a first value far from the next ones is genuine in a record of few probings",
+          "[families]") {
+  RunFile run = machine_run("run", 1, [](double quick, double, double, double) { return quick; });
+  std::vector<double>& z_um = run.values[4];
+  std::fill(z_um.begin(), z_um.end(), not_a_number);
+  const std::vector<double> probed{0.0,   -12.8, -17.9, -18.2, -18.9, -19.4,
+                                   -19.1, -18.8, -18.5, -18.9, -19.0, -18.7};
+  for (std::size_t i = 0; i < probed.size(); ++i) z_um[25 * i] = probed[i];
+  CHECK(leave_out_outliers(run, {"z_um"}).empty());
+  z_um[100] = 320.0;
+  CHECK(leave_out_outliers(run, {"z_um"}).size() == 1);
 }
 
 TEST_CASE("fit prints one expected error per output, and its basis", "[families]") {
@@ -362,7 +412,7 @@ TEST_CASE("a bank fits a curved response to a signal", "[families]") {
 
   const FamiliesFit fit = fitted(tests);
   CHECK(fit.chosen == Family::lag_bank);
-  CHECK(fit.chosen_result().left_out_rms_um[0] < 1.2);  // the curve alone moves by 2.8
+  CHECK(fit.of_model.left_out_rms_um[0] < 1.2);  // the curve alone moves by 2.8
   // The hinges are in the model, and carry the curve.
   const auto curve_um = [&](double x_mm) {
     double sum_um = 0.0;
@@ -566,7 +616,7 @@ TEST_CASE("a coefficient that depends on the start temperature is fitted (C1)", 
   const double always_um_per_K = fit.model.matrix_um_per_K[0][0];
   CHECK(always_um_per_K + gain_at(fit.model, 16.0) == Approx(4.25).epsilon(0.02));
   CHECK(always_um_per_K + gain_at(fit.model, 25.0) == Approx(6.5).epsilon(0.02));
-  CHECK(fit.chosen_result().left_out_rms_um[0] <
+  CHECK(fit.of_model.left_out_rms_um[0] <
         0.4 * result_of(fit, Family::static_few).left_out_rms_um[0]);
 }
 

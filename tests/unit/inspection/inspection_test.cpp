@@ -67,6 +67,26 @@ TEST_CASE("offsets of the compensation are not displacements of the machine", "[
     CHECK_THAT(each.column, !Catch::Contains("z_"));
 }
 
+TEST_CASE("a controller's error code in a signal is named", "[inspection]") {
+  RunFile run = recording();
+  column(run, "spindle_rpm")[333] = 65535.0;
+  const Inspection inspection = inspect({run}, 0.5);
+  const Finding* found = find(inspection, "spikes");
+  REQUIRE(found != nullptr);
+  CHECK(found->column == "spindle_rpm");
+  CHECK(found->probability > 0.9);
+  CHECK(found->text.find("stray values (1) of up to 65535 rpm") != std::string::npos);
+}
+
+TEST_CASE("a reading in kelvin from some row on is named as such", "[inspection]") {
+  RunFile run = recording();
+  for (std::size_t row = 500; row < rows; ++row) column(run, "t4_degC")[row] += 273.15;
+  const Inspection inspection = inspect({run}, 0.5);
+  REQUIRE_FALSE(inspection.findings.empty());
+  CHECK(inspection.findings[0].column == "t4_degC");
+  CHECK(inspection.findings[0].text.find("in kelvin") != std::string::npos);
+}
+
 TEST_CASE("nothing is found in a faultless recording", "[inspection]") {
   for (unsigned seed = 1; seed <= 3; ++seed) {
     const Inspection inspection = inspect({recording(seed)});

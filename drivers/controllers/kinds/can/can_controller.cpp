@@ -284,7 +284,7 @@ void CanController::receive() {
   }
   report_error();
   if (!gate_.in_sync()) return;
-  if (gate_.explains(state_.applied_um))
+  if (gate_.check_read_back(state_.applied_um))
     publish(true, monotonic_now());
   else
     synchronise();  // re-homed or overridden: earlier commands are no longer valid

@@ -126,7 +126,7 @@ void ModbusDialogue::act() {
   const nanoseconds exchange_began = connection_.now();
   exchange();
   const nanoseconds now = connection_.now();
-  gate_.turned(now - exchange_began);
+  gate_.note_exchange_time(now - exchange_began);
   if (now - began > period) {
     const std::scoped_lock lock(health_mutex_);
     ++health_.write.late;
@@ -299,7 +299,7 @@ void ModbusDialogue::exchange() {
 bool ModbusDialogue::look() {
   if (!read_all()) return false;
   show_piezos();
-  if (!gate_.explains(judged_um())) {
+  if (!gate_.check_read_back(judged_um())) {
     gate_.synchronised(judged_um());
     const std::scoped_lock lock(health_mutex_);
     health_.last_error = "the controller applies an offset that was not sent";
@@ -376,16 +376,16 @@ bool ModbusDialogue::write_command() {
     if (written) written->taken();
   gate_.sent(now);
   if (requests.empty()) return true;  // no axis is driven, and nothing else must be written
-  const auto untaken = std::find_if(written_.begin(), written_.end(), [](const auto& written) {
-    return written && !written->untaken().empty();
-  });
-  if (untaken == written_.end()) {
+  const auto difference_text = std::find_if(
+      written_.begin(), written_.end(),
+      [](const auto& written) { return written && !written->difference_text().empty(); });
+  if (difference_text == written_.end()) {
     gate_.confirmed(now);
     note_confirmed(now);
   } else {
     gate_.unconfirmed();
     const std::scoped_lock lock(health_mutex_);
-    health_.last_error = health_.write.error = untaken_error(config_, **untaken);
+    health_.last_error = health_.write.error = untaken_error(config_, **difference_text);
   }
   publish(true);
   return true;

@@ -249,7 +249,7 @@ std::string untaken_error(const ModbusControllerConfig& config, const WrittenOff
   return "writes are answered, but " +
          (s7 != nullptr ? s7_place(*s7, request.address, request.count)
                         : "register " + std::to_string(request.address)) +
-         " keeps another value: " + written.untaken();
+         " keeps another value: " + written.difference_text();
 }
 
 namespace {

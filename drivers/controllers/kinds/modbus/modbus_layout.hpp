@@ -114,7 +114,7 @@ class WrittenOffsets {
   /// True if the registers hold the newest offsets written or the newest ones answered.
   [[nodiscard]] bool is_one_written(std::span<const std::uint16_t> words) const noexcept;
   /// "-17.30 was written, -5.46 is read"; empty: writes are taken, or it is unknown.
-  [[nodiscard]] const std::string& untaken() const noexcept { return untaken_; }
+  [[nodiscard]] const std::string& difference_text() const noexcept { return untaken_; }
 
  private:
   enum class Held : std::uint8_t { not_known, yes, no };
