@@ -65,14 +65,17 @@ void add_plan_command(CLI::App& app, std::function<int()>& action) {
   CLI::App* sub = app.add_subcommand("plan", "test plan from factors and levels");
   CLI::Option* const factors = sub->add_option("FACTORS.toml", options->factors,
                                                "factors, levels, forbidden combinations, stops");
-  sub->add_option(
-         "--apart", options->runs,
-         "instead: plan the shortest run that separates columns which moved alike in these runs")
-      ->type_name("RUN.csv")
-      ->excludes(factors);
+  CLI::Option* const apart =
+      sub->add_option(
+             "--apart", options->runs,
+             "instead: plan the shortest run that separates columns which moved alike in these "
+             "runs")
+          ->type_name("RUN.csv")
+          ->excludes(factors);
   sub->add_option("--columns", options->columns, cli::columns_help);
   sub->add_option("--out", options->folder,
-                  "folder for the sheet, the plan and a run file to fill in for each test");
+                  "folder for the sheet, the plan and a run file to fill in for each test")
+      ->excludes(apart);
   sub->add_flag("--json", options->json, "print the plan as JSON");
   sub->callback([options, factors, &action] {
     if (options->runs.empty() && factors->empty())

@@ -214,7 +214,13 @@ void leave_out_foreign(const ThermalModel& like, const std::vector<RunFile>& run
 
 /// Warns of readings that `inspect` doubts. They are used nevertheless: only the user can decide.
 void note_doubtful_readings(const std::vector<RunFile>& runs, MeasuredTests& tests) {
-  for (const inspection::Finding& each : inspection::inspect(runs, doubted_from).findings) {
+  inspection::Inspection inspection;
+  {
+    cli::Progress progress("inspecting the recordings");
+    inspection = inspection::inspect(runs, doubted_from,
+                                     [&progress](double share) { progress.update(share); });
+  }
+  for (const inspection::Finding& each : inspection.findings) {
     if (std::find(tests.places.begin(), tests.places.end(), each.column) == tests.places.end())
       continue;
     // Of spikes, the far ones are left out.

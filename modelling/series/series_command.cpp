@@ -84,6 +84,11 @@ int run(const Options& options) {
   machines.reserve(options.files.size());
   for (const std::string& file : options.files)
     machines.push_back(of_argument(options, loader, file));
+  for (std::size_t i = 0; i < machines.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      if (machines[i].xx == machines[j].xx && machines[i].yy == machines[j].yy)
+        throw std::runtime_error(options.files[i] + ": is the recording of " + options.files[j] +
+                                 "; a machine counts once");
   const Series series = series_of(machines, options.scatter);
   cli::write_file(options.result, write_series(series));
   if (options.result != "-") cli::write_file("-", text_of(series));
