@@ -115,7 +115,9 @@ int run_correction(const CourseOptions& options) {
   std::vector<RunFile> runs;
   RunLoader loader(options.columns);
   for (const std::string& record : options.records) {
-    for (RunFile& part : between_references(load_record(record, loader))) {
+    std::vector<RunFile> parts = between_references(load_record(record, loader));
+    leave_out_empty_parts(model, parts);
+    for (RunFile& part : parts) {
       for (const Outliers& each : leave_out_outliers(part, model.outputs))
         std::fprintf(stderr, "%s: %s\n", part.name.c_str(), each.text().c_str());
       runs.push_back(std::move(part));

@@ -158,12 +158,6 @@ Prediction predict_stretch(const ThermalModel& model, const RunFile& run) {
   return result;
 }
 
-bool has_value_of_each(const RunFile& run, const std::vector<std::string>& columns) {
-  return std::all_of(columns.begin(), columns.end(), [&run](const std::string& name) {
-    return first_value(run.column(name)).has_value();
-  });
-}
-
 void append(const Column& part, Column& whole) {
   whole.insert(whole.end(), part.begin(), part.end());
 }
@@ -192,12 +186,11 @@ Prediction predict(const ThermalModel& model, const RunFile& run) {
       return measured_column(each, output) != nullptr;
     });
   };
+  std::vector<RunFile> parts = between_references(run);
+  leave_out_empty_parts(model, parts);
   std::optional<Prediction> whole;
-  for (const RunFile& part : between_references(run)) {
+  for (const RunFile& part : parts) {
     if (is_measured(run) && !is_measured(part)) continue;
-    if (!has_value_of_each(part, model.temperature_columns()) ||
-        !has_value_of_each(part, model.signal_columns()))
-      continue;
     const Prediction stretch = predict_stretch(model, part);
     if (whole)
       append(stretch, *whole);

@@ -76,7 +76,8 @@ int run_plain(const GlobalOptions& global, const PlainCommand& command) {
   if (flag_of(answer, "dry_run"))
     std::cout << "DRY RUN: nothing is written to the controller. The switch outlives the dry run:\n"
                  "thermocomp disable before you end it, so that no axis moves unwatched\n";
-  print_moves(global);
+  else if (std::string_view(command.method) != "cycle_end")
+    print_moves(global);
   return exit_success;
 }
 

@@ -14,7 +14,6 @@ namespace thermocomp::cli {
 /// To test whether a Modbus controller accepts writes, the registers' present values are written
 /// back as the daemon would. This moves nothing if every axis already applies the value in its
 /// register; otherwise, or while a daemon runs, nothing is written and the result says so.
-/// register; otherwise, or while a daemon runs, nothing is written and the result says so.
 /// @param listen_s  listening time on CAN
 /// @param writes_back  false: nothing is written
 /// @param progress  called with a line of progress

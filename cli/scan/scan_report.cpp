@@ -367,8 +367,13 @@ std::optional<std::int64_t> likely_open_code(const ModbusChannel& channel,
 }
 
 bool is_plausible(const ModbusChannel& channel, double temp_degC, const PlausibleRange& range) {
+  // While scanning, a float this close to 0 is rather the wrong words than a temperature.
+  constexpr double resolved_min = 1e-3;
+  const bool is_float =
+      channel.encoding == Encoding::float32 || channel.encoding == Encoding::float64;
+  const double raw = std::abs((temp_degC - channel.offset_degC) / channel.scale);
   return temp_degC >= range.min_degC && temp_degC <= range.max_degC &&
-         may_be_measured(channel, temp_degC);
+         may_be_measured(channel, temp_degC) && !(is_float && raw > 0.0 && raw < resolved_min);
 }
 
 std::vector<std::string> hints_for_words(const ModbusChannel& channel,

@@ -84,6 +84,13 @@ bool are_of_one_measurement(const RunFile& a, const RunFile& b) {
 }  // namespace
 
 bool share_rows(const RunFile& a, const RunFile& b) {
+  // Stretches of one file cannot be told apart by their content if the machine repeats itself.
+  const auto file_of = [](const RunFile& run) {
+    return run.is_part ? parse_selection(run.name).file.string() : run.name;
+  };
+  if ((a.is_part || b.is_part) && same_file(file_of(a), file_of(b)))
+    return std::max(a.time_s()[a.selected_begin], b.time_s()[b.selected_begin]) <=
+           std::min(a.time_s()[a.selected_end - 1], b.time_s()[b.selected_end - 1]);
   if (same_file(a.name, b.name))
     return std::max(a.selected_begin, b.selected_begin) < std::min(a.selected_end, b.selected_end);
   return are_of_one_measurement(a, b);
@@ -154,7 +161,7 @@ double way_of(const Values& values, const Values& leaps) {
   return expected[expected.size() - 1 - rim] - expected[rim];
 }
 
-Outliers blunders_of(const RunFile& run, const std::string& column) {
+Outliers outliers_of(const RunFile& run, const std::string& column) {
   Outliers found;
   found.column = column;
   Values values;
@@ -245,7 +252,7 @@ std::vector<Outliers> leave_out_outliers(RunFile& run, const std::vector<std::st
   std::vector<Outliers> all;
   for (const std::string& column : columns) {
     if (!run.find(column)) continue;
-    Outliers found = blunders_of(run, column);
+    Outliers found = outliers_of(run, column);
     if (!found.times_s.empty()) all.push_back(std::move(found));
     Outliers stuck = stuck_of(run, column);
     if (!stuck.times_s.empty()) all.push_back(std::move(stuck));
@@ -322,6 +329,24 @@ ModelInputs model_inputs(const ThermalModel& model, const RunFile& run) {
   inputs.reference_degC = references(model, run, inputs.temperatures, names);
   inputs.rows = whole_rows(run.rows(), inputs);
   return inputs;
+}
+
+void leave_out_empty_parts(const ThermalModel& model, std::vector<RunFile>& runs) {
+  const auto has_values_of = [](const RunFile& run, const std::vector<std::string>& names) {
+    return std::all_of(names.begin(), names.end(), [&run](const std::string& name) {
+      return first_value(run.column(name)).has_value();
+    });
+  };
+  const auto is_empty = [&](const RunFile& run) {
+    return run.is_part && !(has_values_of(run, model.temperature_columns()) &&
+                            has_values_of(run, model.signal_columns()));
+  };
+  if (std::all_of(runs.begin(), runs.end(), is_empty)) return;
+  for (const RunFile& run : runs)
+    if (is_empty(run))
+      std::fprintf(stderr, "%s is left out: a column of the model has no value there\n",
+                   run.name.c_str());
+  std::erase_if(runs, is_empty);
 }
 
 bool is_mostly_known(const std::vector<double>& column) {

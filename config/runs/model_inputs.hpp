@@ -61,6 +61,10 @@ struct ModelInputs {
 /// @throws ConfigurationError when a column is missing, or one needed as reference has no value
 [[nodiscard]] ModelInputs model_inputs(const ThermalModel& model, const RunFile& run);
 
+/// The parts of exports in which a column of the model has no value, such as before the first
+/// reading, are left out, with a line on stderr; never all of them.
+void leave_out_empty_parts(const ThermalModel& model, std::vector<RunFile>& runs);
+
 /// True if at most a fifth of the values are missing.
 [[nodiscard]] bool is_mostly_known(const std::vector<double>& column);
 

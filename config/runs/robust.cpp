@@ -83,9 +83,24 @@ std::vector<std::size_t> stray_rows(const std::vector<double>& values) {
   if (sizes.size() < usual_rows) return {};
   const auto usual = sizes.end() - 1 - static_cast<std::ptrdiff_t>(sizes.size() / usual_rows);
   std::nth_element(sizes.begin(), usual, sizes.end());
+  const double limit = times_usual * *usual;
   std::vector<std::size_t> rows;
-  for (std::size_t row = 0; row < values.size() && *usual > 0.0; ++row)
-    if (std::abs(values[row]) > times_usual * *usual) rows.push_back(row);
+  double kept = 0.0;
+  for (std::size_t row = 0; row < values.size() && *usual > 0.0; ++row) {
+    if (std::abs(values[row]) > limit)
+      rows.push_back(row);
+    else if (std::isfinite(values[row]))
+      kept = std::max(kept, std::abs(values[row]));
+  }
+  // A burst of the machine has courses: a code is one value, or alone in its row.
+  const auto is_code = [&](std::size_t i) {
+    const bool is_alone = (i == 0 || rows[i - 1] + 1 < rows[i]) &&
+                          (i + 1 == rows.size() || rows[i] + 1 < rows[i + 1]);
+    return std::abs(values[rows[i]]) > times_usual * kept &&
+           (is_alone || values[rows[i]] == values[rows.front()]);
+  };
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    if (!is_code(i)) return {};
   return rows;
 }
 

@@ -362,18 +362,21 @@ std::vector<RunFile> between_references(const RunFile& run) {
     const std::size_t begin = std::max(bounds[i], run.selected_begin);
     const std::size_t end = std::min(bounds[i + 1], run.selected_end);
     if (begin >= end) continue;
-    RunFile& part = parts.emplace_back(run);
-    part.references.clear();
-    part.selected_begin = bounds[i];
-    part.selected_end = bounds[i + 1];
-    part.name = part.argument = selected_name(part);
+    RunFile& part = parts.emplace_back();
+    part.columns = run.columns;
+    part.understood = run.understood;
+    part.wall_zero = run.wall_zero;
+    for (const std::vector<double>& column : run.values)
+      part.values.emplace_back(column.begin() + static_cast<std::ptrdiff_t>(bounds[i]),
+                               column.begin() + static_cast<std::ptrdiff_t>(bounds[i + 1]));
+    const std::vector<double>& time_s = run.time_s();
+    const auto bound = [&](std::size_t row) {
+      return row == 0 || row == run.rows() ? "" : number_text(time_s[row]);
+    };
+    part.name = part.argument = run.name + "@" + bound(bounds[i]) + ":" + bound(bounds[i + 1]);
     part.is_part = true;
     part.selected_begin = begin - bounds[i];
     part.selected_end = end - bounds[i];
-    for (std::vector<double>& column : part.values) {
-      column.resize(bounds[i + 1]);
-      column.erase(column.begin(), column.begin() + static_cast<std::ptrdiff_t>(bounds[i]));
-    }
   }
   return parts;
 }
@@ -417,6 +420,8 @@ std::string write_run(const RunFile& run) {
   }
   text += '\n';
   for (std::size_t row = 0; row < run.rows(); ++row) {
+    if (std::binary_search(run.references.begin(), run.references.end(), row))
+      text.append("# ").append(number_text(run.time_s()[row])).append(reference_mark) += '\n';
     for (std::size_t i = 0; i < run.columns.size(); ++i) {
       if (i > 0) text += ',';
       const double value = run.values[i][row];

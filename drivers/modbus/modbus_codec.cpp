@@ -362,7 +362,7 @@ Decoded decode(std::span<const std::uint16_t> registers, const NumberFormat& for
 }
 
 bool may_be_measured(const ModbusChannel& channel, double temp_degC) noexcept {
-  constexpr double resolved_min = 1e-3;
+  constexpr double resolved_min = 1e-6;
   if (channel.encoding != Encoding::float32 && channel.encoding != Encoding::float64) return true;
   const double raw = std::abs((temp_degC - channel.offset_degC) / channel.scale);
   return raw == 0.0 || raw >= resolved_min;

@@ -338,7 +338,8 @@ struct ModelDomain::Metric {
     double most = 0.0;
     for (std::size_t i = 0; i < columns.size(); ++i) most = std::max(most, beyond(i));
     const double measured = measure();
-    return most > beyond_the_range ? std::max(measured, distance_max * (1.0 + most)) : measured;
+    if (!(most > beyond_the_range)) return measured;
+    return std::max(measured, distance_max * (1.0 + most - beyond_the_range));
   }
 
   [[nodiscard]] double measure() const noexcept {

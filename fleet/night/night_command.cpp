@@ -38,7 +38,7 @@ struct Tally {
 };
 
 /// Works until all nights are taken. A failure is stored and does not stop the others.
-void work_off_some(const std::string& conninfo, const Nights& nights, std::size_t all,
+void evaluate_some(const std::string& conninfo, const Nights& nights, std::size_t all,
                    Tally& tally) {
   pqxx::connection store = open_store(conninfo);
   for (std::size_t i = tally.next++; i < nights.size(); i = tally.next++) {
@@ -107,7 +107,7 @@ int run_here(const std::string& conninfo, const NightOptions& options) {
     for (unsigned i = 0; i < std::min<std::size_t>(options.jobs, nights.size()); ++i)
       threads.emplace_back([&] {
         try {
-          work_off_some(conninfo, nights, all.size(), tally);
+          evaluate_some(conninfo, nights, all.size(), tally);
         } catch (const std::exception& error) {  // the store is unreachable; the rest stays open
           std::fprintf(stderr, "%s\n", error.what());
           ++tally.failed;

@@ -182,7 +182,7 @@ Headroom headroom(double noise, double unexplained, double predictable) {
 namespace {
 
 /// The measured displacement as a multiple of the predicted one, if it follows it but for a factor
-/// that no thermal effect explains: another sign or unit.
+/// far from 1: another sign or unit, or a model of another machine.
 std::vector<std::string> scale_warnings(const MeasuredData& data) {
   constexpr double follows_min = 0.9;  // share of the measured variance
   constexpr Interval usual{0.6, 1.6};
@@ -331,10 +331,12 @@ Diagnosis diagnosis_of(const Options& options, ReportData* report) {
   cli::Progress line(searching);
   const auto progress = [&line] { line.update(-1.0); };
   const ThermalModel model = load_model(options.model);
-  for (std::vector<RunFile>* runs : {&train, &test})
+  for (std::vector<RunFile>* runs : {&train, &test}) {
+    leave_out_empty_parts(model, *runs);
     for (RunFile& run : *runs)
       for (const Outliers& each : leave_out_outliers(run, model.outputs))
         std::fprintf(stderr, "%s: %s\n", run.name.c_str(), each.text().c_str());
+  }
   return diagnose(model, std::move(train), std::move(test), report, progress);
 }
 

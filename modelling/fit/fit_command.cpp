@@ -230,6 +230,18 @@ void note_doubtful_readings(const std::vector<RunFile>& runs, MeasuredTests& tes
   }
 }
 
+/// A model of all columns has a domain of two features per temperature and one per signal.
+void refuse_too_many(const MeasuredTests& tests) {
+  if (2 * tests.places.size() + tests.signals.size() <= domain_features_max) return;
+  throw std::runtime_error(std::to_string(tests.places.size()) + " temperatures and " +
+                           std::to_string(tests.signals.size()) +
+                           " signals are too many for one model: twice the temperatures plus the "
+                           "signals must be at most " +
+                           std::to_string(domain_features_max) +
+                           ". Next: thermocomp group shows which warm alike; name one of each "
+                           "group in --places, or --family static_few");
+}
+
 int run(const Options& options) {
   FitOptions fit_options;
   read_terms(options.terms, fit_options);
@@ -251,11 +263,7 @@ int run(const Options& options) {
     test_options.folds_of_one_run = std::max(test_options.folds_of_one_run, blocks_of_one_run);
   }
   MeasuredTests tests = measured_tests(runs, test_options);
-  if (!few && 2 * tests.places.size() + tests.signals.size() > domain_features_max)
-    throw std::runtime_error(
-        std::to_string(tests.places.size()) + " temperatures are too many for a model: at most " +
-        std::to_string((domain_features_max - tests.signals.size()) / 2) +
-        ". Next: thermocomp group shows which warm alike; name one of each group in --places");
+  if (!few && (options.family.empty() || options.family == "lag_bank")) refuse_too_many(tests);
   note_doubtful_readings(runs, tests);
   for (const std::string& note : tests.notes) std::fprintf(stderr, "%s\n", note.c_str());
   if (!options.prior.empty()) return run_prior(options, runs, tests, fit_options);

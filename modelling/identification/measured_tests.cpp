@@ -111,6 +111,22 @@ void leave_out_stray_values(RunFile& run, std::vector<std::string>& notes) {
   }
 }
 
+/// Share of rows with a value in the run, or in all parts of its file.
+double share_in_file(const std::vector<RunFile>& runs, const RunFile& run,
+                     const std::string& column) {
+  if (!run.is_part) return share_present(run, run.column(column));
+  const auto file_of = [](const RunFile& each) { return parse_selection(each.name).file; };
+  double present = 0.0;
+  double rows = 0.0;
+  for (const RunFile& each : runs) {
+    if (!each.is_part || file_of(each) != file_of(run)) continue;
+    const auto count = static_cast<double>(each.rows());
+    present += count * share_present(each, each.column(column));
+    rows += count;
+  }
+  return present / rows;
+}
+
 /// Columns that every run has with enough values. Rows in which one is missing are left out:
 /// `predict` and the daemon have no value there.
 template <class Wanted>
@@ -120,7 +136,7 @@ std::vector<std::string> usable(const std::vector<RunFile>& runs, Wanted wanted,
   for (const std::string& column : runs.front().columns) {
     if (!wanted(column)) continue;
     const auto sparse = [&](const RunFile& run) {
-      return share_present(run, run.column(column)) < share_present_min;
+      return share_in_file(runs, run, column) < share_present_min;
     };
     if (!in_all(runs, column))
       notes.push_back(column + " is left out: not every run has it");
@@ -264,23 +280,17 @@ void gather_probings(RunFile& run, const std::vector<std::string>& outputs,
                     "one output at a time, all count");
 }
 
-/// Leaves out the parts of a file with too few displacements, such as before its first reference.
-void leave_out_short_parts(std::vector<RunFile>& runs, const std::vector<std::string>& outputs,
-                           std::vector<std::string>& notes) {
-  const auto is_short = [&](const RunFile& run) {
-    std::size_t probed = 0;
-    for (std::size_t row = run.selected_begin; row < run.selected_end; ++row)
-      if (std::all_of(outputs.begin(), outputs.end(), [&](const std::string& name) {
-            return std::isfinite(run.column(name)[row]);
-          }))
-        ++probed;
-    return run.is_part && probed < rows_min;
-  };
-  if (outputs.empty() || std::all_of(runs.begin(), runs.end(), is_short)) return;
-  for (const RunFile& run : runs)
-    if (is_short(run))
-      notes.push_back(run.name + " is left out: it has fewer than 3 displacements");
-  std::erase_if(runs, is_short);
+/// Selected rows with every place, output and signal.
+std::size_t complete_rows(const RunFile& run, const MeasuredTests& tests) {
+  std::vector<const std::vector<double>*> columns;
+  for (const std::vector<std::string>* names : {&tests.places, &tests.outputs, &tests.signals})
+    for (const std::string& name : *names) columns.push_back(&run.column(name));
+  std::size_t complete = 0;
+  for (std::size_t row = run.selected_begin; row < run.selected_end; ++row)
+    if (std::all_of(columns.begin(), columns.end(),
+                    [row](const auto* column) { return std::isfinite((*column)[row]); }))
+      ++complete;
+  return complete;
 }
 
 /// A note if the temperatures had moved before the first displacement, else empty.
@@ -340,13 +350,21 @@ void leave_out_still_places(MeasuredTests& tests) {
   tests.places = names;
 }
 
+/// Selected values of a signal up to the last row with an output; all without outputs.
+Eigen::VectorXd until_last_probing(const TestRun& run, Eigen::Index signal) {
+  Eigen::Index end = run.time_s.size();
+  while (end > run.begin + 1 && run.outputs_um.cols() > 0 &&
+         !run.outputs_um.row(end - 1).allFinite())
+    --end;
+  return run.signals.col(signal).segment(run.begin, end - run.begin);
+}
+
 bool is_constant(const MeasuredTests& tests, std::size_t signal) {
   double within = 0.0;
   double size = 0.0;
   for (const TestRun& run : tests.between) {
-    const auto column = run.signals.col(static_cast<Eigen::Index>(signal))
-                            .tail(run.time_s.size() - run.begin)
-                            .array();
+    const Eigen::ArrayXd column =
+        until_last_probing(run, static_cast<Eigen::Index>(signal)).array();
     within += (column - column.mean()).square().sum();
     size += column.square().sum();
   }
@@ -361,9 +379,7 @@ struct Reversals {
 
 Reversals reversals_of(const MeasuredTests& tests, std::size_t signal) {
   const auto column = static_cast<Eigen::Index>(signal);
-  const auto selected = [column](const TestRun& run) {
-    return run.signals.col(column).tail(run.time_s.size() - run.begin);
-  };
+  const auto selected = [column](const TestRun& run) { return until_last_probing(run, column); };
   double least = std::numeric_limits<double>::infinity();
   double most = -least;
   for (const TestRun& run : tests.between) {
@@ -374,10 +390,11 @@ Reversals reversals_of(const MeasuredTests& tests, std::size_t signal) {
   Reversals reversals;
   for (const TestRun& run : tests.between) {
     int way = 0;  // up: 1, down: -1
-    double last = selected(run)[0];
+    const Eigen::VectorXd values = selected(run);
+    double last = values[0];
     double low = last;
     double high = last;
-    for (const double value : selected(run)) {
+    for (const double value : values) {
       reversals.largest_step =
           std::max(reversals.largest_step, std::abs(value - last) / (most - least));
       last = value;
@@ -486,7 +503,6 @@ MeasuredTests measured_tests(const std::vector<RunFile>& given, const TestOption
       tests.notes.push_back(run.name + ": " + each.text());
     gather_probings(run, options.outputs, tests.notes);
   }
-  leave_out_short_parts(runs, options.outputs, tests.notes);
   for (const std::string& name : options.places)
     if (!is_temperature(name)) refuse("", name, "must be a temperature (*_degC, *_K)");
   for (const std::string& name : options.outputs)
@@ -503,7 +519,16 @@ MeasuredTests measured_tests(const std::vector<RunFile>& given, const TestOption
     tests.constant.assign(constant, tests.signals.end());
     tests.signals.erase(constant, tests.signals.end());
   }
-  for (const RunFile& run : runs) {
+  const auto is_short = [&tests](const RunFile& run) {
+    return run.is_part && complete_rows(run, tests) < rows_min;
+  };
+  const bool all_short = std::all_of(runs.begin(), runs.end(), is_short);
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    const RunFile& run = runs[i];
+    if (!all_short && is_short(run)) {
+      tests.notes.push_back(run.name + " is left out: fewer than 3 of its rows are complete");
+      continue;
+    }
     if (const std::string late = late_displacement(run, tests.places, tests.outputs); !late.empty())
       tests.notes.push_back(late);
     const auto of_run = [&](bool between_probings) {
@@ -511,6 +536,7 @@ MeasuredTests measured_tests(const std::vector<RunFile>& given, const TestOption
     };
     tests.runs.push_back(of_run(options.between_probings));
     tests.between.push_back(of_run(true));
+    tests.given.push_back(i);
   }
   find_unmoved(tests);
   leave_out_still_places(tests);

@@ -50,6 +50,7 @@ struct MeasuredTests {
   /// `runs` with the rows before the first and between two probings, outputs NaN there; rises over
   /// its first row, changes of outputs since the first probing.
   std::vector<TestRun> between;
+  std::vector<std::size_t> given;  ///< number of each run among those given
   std::vector<Fold> folds;
   HotHalf hot;
   std::vector<std::string> notes;  ///< what was left out and why

@@ -94,7 +94,7 @@ RunFile selected_part(RunFile run, const std::vector<std::string>& outputs) {
 
 /// The run without values that hide or imitate changes: outliers, which are added to `found`, and
 /// stuck displacements, whose jump at the end resembles a new zero.
-RunFile without_blunders(RunFile run, std::size_t index, Suspicions& found) {
+RunFile without_outliers(RunFile run, std::size_t index, Suspicions& found) {
   check_spikes(run, index, found);
   std::vector<std::string> outputs = run.columns;
   std::erase_if(outputs, [](const std::string& name) { return !is_output(name); });
@@ -116,7 +116,7 @@ Cleaned without_steps(const std::vector<RunFile>& runs, const std::vector<std::s
   Suspicions spikes;
   Suspicions steps;
   for (const RunFile& run : runs)
-    despiked.push_back(without_blunders(selected_part(run, outputs), despiked.size(), spikes));
+    despiked.push_back(without_outliers(selected_part(run, outputs), despiked.size(), spikes));
   check_changes(make_recording(despiked, rows_max(runs.size())), Looked::displacements, steps, {});
   Inspection inspection;
   for (Suspicion& each : steps) {
@@ -139,7 +139,7 @@ Inspection inspect(const std::vector<RunFile>& given, double probability_min,
     inspection.runs.push_back(sampling_of(runs[i]));
     check_clock(runs[i], i, inspection.runs.back(), suspicions);
     check_empty(runs[i], i, suspicions);
-    despiked.push_back(without_blunders(runs[i], i, suspicions));
+    despiked.push_back(without_outliers(runs[i], i, suspicions));
   }
   check_values(runs, suspicions);
   for (const Suspicion& each : suspicions)

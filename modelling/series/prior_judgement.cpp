@@ -72,7 +72,8 @@ PriorJudgement judged(const Series& prior, const std::vector<RunFile>& runs,
     if (out.end - out.begin < rows_min) return judgement;
     std::vector<RunFile> rest;
     for (const Fold& each : parts.folds)
-      if (&each != &out) rest.push_back(part_of(runs[each.run], tests.runs[each.run].time_s, each));
+      if (&each != &out)
+        rest.push_back(part_of(runs[tests.given[each.run]], tests.runs[each.run].time_s, each));
     std::vector<std::string> notes;
     const Statistics machine =
         statistics_of(rest, "the machine", tests.outputs, prior.columns.taus_s, notes);

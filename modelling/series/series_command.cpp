@@ -86,7 +86,9 @@ int run(const Options& options) {
     machines.push_back(of_argument(options, loader, file));
   for (std::size_t i = 0; i < machines.size(); ++i)
     for (std::size_t j = 0; j < i; ++j)
-      if (machines[i].xx == machines[j].xx && machines[i].yy == machines[j].yy)
+      if (machines[i].xx.rows() == machines[j].xx.rows() &&
+          machines[i].yy.size() == machines[j].yy.size() && machines[i].xx == machines[j].xx &&
+          machines[i].yy == machines[j].yy)
         throw std::runtime_error(options.files[i] + ": is the recording of " + options.files[j] +
                                  "; a machine counts once");
   const Series series = series_of(machines, options.scatter);

@@ -187,12 +187,14 @@ Statistics statistics_of(const std::vector<RunFile>& runs, std::string machine,
   statistics.yy = Eigen::VectorXd::Zero(outputs_count);
   std::vector<RunRows> all;
   for (const identification::TestRun& run : tests.runs) {
-    std::vector<Eigen::Index> probed;
-    for (Eigen::Index row = run.begin; row < run.time_s.size(); ++row)
+    std::vector<Eigen::Index> probed;  // from the first of the run, to which all are relative
+    for (Eigen::Index row = 0; row < run.time_s.size(); ++row)
       if (run.outputs_um.row(row).allFinite()) probed.push_back(row);
-    const auto rows = static_cast<Eigen::Index>(probed.size());
+    const auto rows = std::count_if(probed.begin(), probed.end(),
+                                    [&run](Eigen::Index row) { return row >= run.begin; });
     RunRows& selected = all.emplace_back();
-    selected.x = bank_of(run, tests, bank, probed);
+    selected.x = bank_of(run, tests, bank, probed).bottomRows(rows);
+    probed.erase(probed.begin(), probed.end() - rows);
     selected.y = run.outputs_um(probed, Eigen::all);
     selected.seconds.resize(rows);
     const Eigen::VectorXd time_s = run.time_s(probed);

@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "config/runs/model_inputs.hpp"
+#include "config/text/printable_text.hpp"
 #include "config/text/problems.hpp"
 #include "config/text/units.hpp"
 
@@ -373,10 +374,27 @@ std::string to_string(TestKind kind) {
 
 namespace {
 
+/// Displacement counts anew from a reference.
+void refuse_new_reference(const RunFile& run) {
+  const auto is_measured_before = [&](std::size_t row) {
+    for (std::size_t i = 0; i < run.columns.size(); ++i)
+      if (is_output(run.columns[i]) && !run.columns[i].ends_with("_offset_um") &&
+          !run.columns[i].ends_with("_applied_um"))
+        for (std::size_t each = run.selected_begin; each < row; ++each)
+          if (std::isfinite(run.values[i][each])) return true;
+    return false;
+  };
+  for (const std::size_t row : run.references)
+    if (row > run.selected_begin && row < run.selected_end && is_measured_before(row))
+      refuse(run, "selection", run.name,
+             "must not contain a new reference, such as at " + number_text(run.time_s()[row]) +
+                 " s: displacement counts anew from there");
+}
+
 std::optional<bool> is_compensated(const RunFile& run) {
   std::optional<bool> compensated;
   for (std::size_t i = 0; i < run.columns.size(); ++i) {
-    if (!run.columns[i].ends_with("_offset_um")) continue;
+    if (!run.columns[i].ends_with("_applied_um")) continue;  // an offset may be a dry run's
     for (std::size_t row = run.selected_begin; row < run.selected_end; ++row)
       if (std::isfinite(run.values[i][row]))
         compensated = compensated.value_or(false) || run.values[i][row] != 0.0;
@@ -387,6 +405,7 @@ std::optional<bool> is_compensated(const RunFile& run) {
 }  // namespace
 
 TestData test_data(const RunFile& given, const TestOptions& options) {
+  refuse_new_reference(given);
   TestData data;
   RunFile run = given;
   std::vector<std::string> outputs;

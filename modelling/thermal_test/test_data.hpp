@@ -80,7 +80,7 @@ struct TestData {
   std::vector<double> speed_time_s;
   std::vector<double> speed;
   std::vector<double> breaks_s;          ///< times of speed changes
-  std::optional<bool> compensated;       ///< an offset was in effect; nullopt: not recorded
+  std::optional<bool> compensated;       ///< an offset was read back; nullopt: not recorded
   std::vector<std::string> left_out;     ///< axes of probes that never moved; sentences
   std::vector<std::string> description;  ///< interpretation of the columns, one line each
 };

@@ -59,13 +59,14 @@ Cause time_shift() {
 
 constexpr std::size_t periods_max = 400;
 
-/// Least measured values of a run: one of many periods fits fewer by chance.
+/// Least measured values, mean of the runs: one of many periods fits fewer by chance.
 constexpr Eigen::Index wave_values_min = 24;
 
 bool has_values_for_a_wave(const MeasuredData& data, std::size_t output) {
-  return std::all_of(data.runs.begin(), data.runs.end(), [output](const MeasuredRun& run) {
-    return run.measured_um[output].array().isFinite().count() >= wave_values_min;
-  });
+  Eigen::Index values = 0;
+  for (const MeasuredRun& run : data.runs)
+    values += run.measured_um[output].array().isFinite().count();
+  return values >= wave_values_min * std::ssize(data.runs);
 }
 
 /// Periods of which the longest run contains at least five, so close that a neighbour of the true

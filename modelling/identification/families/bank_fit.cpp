@@ -188,7 +188,8 @@ BankColumns bank_columns(const MeasuredTests& tests) {
   std::vector<double> steps_s;
   for (std::size_t i = 0; i < tests.runs.size(); ++i) {
     const Eigen::VectorXd& time_s = tests.course(i).time_s;
-    longest_s = std::max(longest_s, time_s[time_s.size() - 1] - time_s[0]);
+    longest_s =
+        std::max(longest_s, tests.runs[i].time_s[tests.runs[i].time_s.size() - 1] - time_s[0]);
     for (Eigen::Index row = 1; row < time_s.size(); ++row)
       steps_s.push_back(time_s[row] - time_s[row - 1]);
   }

@@ -23,6 +23,7 @@ inline constexpr std::array<Family, 5> all_families{
 /// none of 60 sets of four to seven simulated runs, and in three of 30 sets with noise that wanders
 /// for hours.
 inline constexpr double less_than_none = 0.1;
+inline constexpr const char* as_requested = "as requested";  ///< `chosen_because` of a given family
 [[nodiscard]] std::string_view to_string(Family family) noexcept;
 [[nodiscard]] std::optional<Family> family_of(std::string_view name);
 
@@ -64,6 +65,9 @@ struct FamiliesFit {
 [[nodiscard]] FamiliesFit fit_families(const MeasuredTests& tests, const FitOptions& options,
                                        std::optional<Family> forced,
                                        const std::function<void(double)>& progress);
+
+/// Adds what the runs cannot show, and outputs and runs for which the model is not fit for use.
+void add_warnings(const MeasuredTests& tests, FamiliesFit& fit);
 
 /// The halves of the only run as folds, since a model is used after its record.
 [[nodiscard]] MeasuredTests in_halves(const MeasuredTests& tests);

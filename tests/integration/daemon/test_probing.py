@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from lab import assert_replays_exactly, eventually, run_tool
+from lab import assert_replays_exactly, eventually, read_columns, run_tool
 from plain_devices import assert_slewed
 
 STEP_UM = 2.5
@@ -212,7 +212,10 @@ def test_a_new_reference_begins_a_run_in_an_export(machine, lab):
     daemon.end()
     exported = lab.folder / "run.csv"
     assert run_tool("export", daemon.history, "-o", exported)[0] == 0
-    status, out, errors = run_tool("predict", "--model", machine.model, exported, "-o", lab.folder / "p.csv")
+    predicted = lab.folder / "p.csv"
+    status, out, errors = run_tool("predict", "--model", machine.model, exported, "-o", predicted)
     assert status == 0, errors
+    # Each stretch begins with its own first measured value.
+    assert [value for value in read_columns(predicted)["z_measured_um"] if value == value] == [0.0, 0.0]
     _, _, errors = run_tool("inspect", exported)
     assert "run.csv: displacement counts anew from each reference: read as 2 runs" in errors, errors

@@ -82,7 +82,7 @@ TEST_CASE("a signal beyond a tenth of its recorded range is outside, as are its 
   };
   CHECK_FALSE(outside_at(1s, 4300.0));
   CHECK(outside_at(10s, 4500.0));
-  CHECK(domain.used_share() == Approx(1.0 / (1.125 * 1.125)));
+  CHECK(domain.used_share() == Approx(1.0 / (1.025 * 1.025)));
   CHECK(domain.furthest_column() == 1);
   CHECK_FALSE(outside_at(20s, 3000.0));
   for (int i = 0; i < 200; ++i) static_cast<void>(outside_at(30s + i * 10s, 5000.0));

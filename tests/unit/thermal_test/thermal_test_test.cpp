@@ -316,7 +316,7 @@ TEST_CASE("a comparison says whether an offset was in effect and the machine as 
   const auto answer = [](double before_um, double after_um, double warmer_K) {
     const auto test_of = [](double offset_um, double temp_degC) {
       RunFile run = simulated(0.2, 9);
-      run.columns.insert(run.columns.end(), {"z_offset_um", "head_degC"});
+      run.columns.insert(run.columns.end(), {"z_applied_um", "head_degC"});
       run.values.emplace_back(run.rows(), offset_um);
       run.values.emplace_back(run.rows(), temp_degC);
       return test_data(run, options_of(TestKind::environment));
