@@ -36,8 +36,7 @@ std::vector<RunFile> RunLoader::load(const std::vector<std::string>& arguments) 
     const RunFile run = load(argument);
     std::vector<RunFile> parts = between_references(run);
     if (!run.references.empty())
-      std::fprintf(stderr,
-                   "%s: displacement counts anew from each reference: read as %zu runs\n",
+      std::fprintf(stderr, "%s: displacement counts anew from each reference: read as %zu runs\n",
                    run.name.c_str(), parts.size());
     std::move(parts.begin(), parts.end(), std::back_inserter(runs));
   }
