@@ -158,18 +158,6 @@ TEST_CASE("an output that cannot be predicted gets no gains, and the others keep
   CHECK(fit.model.made_from->outputs.at("x_um").left_out_rms_um > 15.0);
 }
 
-TEST_CASE("a stray value of a signal is left out of the fit", "[families]") {
-  RunFile run = machine_run("run", 1, [](double quick, double, double, double) { return quick; });
-  run.values[3][100] = 65535.0;
-  TestOptions options;
-  options.outputs = {"z_um"};
-  options.signals = true;
-  const MeasuredTests tests = measured_tests({run}, options);
-  CHECK(tests.rows() == static_cast<Eigen::Index>(run.values[0].size()) - 1);
-  CHECK(tests.moved("spindle_rpm"));
-  CHECK(tests.notes.size() == 1);
-}
-
 TEST_CASE("a first value far from the next ones is genuine in a record of few probings",
           "[families]") {
   RunFile run = machine_run("run", 1, [](double quick, double, double, double) { return quick; });
@@ -347,17 +335,6 @@ TEST_CASE("a bank's low passes see the rows before the first and between two pro
   const Eigen::MatrixXd whole = bank_of(all.course(0), all, columns, all.rows_in_course(0));
   const Eigen::MatrixXd expected = whole(probed, Eigen::all).rowwise() - whole.row(probed[0]);
   CHECK((BankEquations(rare, columns).rows()[0] - expected).norm() < 1e-9 * expected.norm());
-}
-
-TEST_CASE("a signal that moves between probings has moved", "[families]") {
-  RunFile run = machine_run("run", 1, [](double quick, double, double, double) { return quick; });
-  const double usual_rpm = run.values[3][0];
-  for (std::size_t row = 0; row < run.values[4].size(); ++row)
-    if (run.values[3][row] != usual_rpm) run.values[4][row] = not_a_number;
-  TestOptions options;
-  options.outputs = {"z_um"};
-  options.signals = true;
-  CHECK(measured_tests({run}, options).moved("spindle_rpm"));
 }
 
 TEST_CASE("the order of the columns in a file does not change a bank's gains", "[families]") {

@@ -12,6 +12,7 @@
 #include <catch2/catch.hpp>
 
 #include "config/model/model_file.hpp"
+#include "config/runs/robust.hpp"
 #include "machine_runs.hpp"
 #include "modelling/identification/families/bank_fit.hpp"
 
@@ -139,4 +140,64 @@ TEST_CASE("signals that never moved, or only together, are named", "[signals]") 
   CHECK(std::any_of(fit.warnings.begin(), fit.warnings.end(), [](const std::string& warning) {
     return warning.starts_with("oil_on: the same value in all rows");
   }));
+}
+
+TEST_CASE("a signal that moves between probings has moved", "[families]") {
+  RunFile run = machine_run("run", 1, [](double quick, double, double, double) { return quick; });
+  const double usual_rpm = run.values[3][0];
+  for (std::size_t row = 0; row < run.values[4].size(); ++row)
+    if (run.values[3][row] != usual_rpm) run.values[4][row] = not_a_number;
+  TestOptions options;
+  options.outputs = {"z_um"};
+  options.signals = true;
+  CHECK(measured_tests({run}, options).moved("spindle_rpm"));
+}
+
+TEST_CASE("rows after the last probing do not show that a signal moved", "[signals]") {
+  RunFile run = machine_run("run", 1, [](double quick, double, double, double) { return quick; });
+  for (std::size_t row = 0; row < run.values[3].size(); ++row) {
+    run.values[3][row] = row < 100 || row >= 320 ? 0.0 : 1.0;
+    if (row >= 300) run.values[4][row] = not_a_number;
+  }
+  TestOptions options;
+  options.outputs = {"z_um"};
+  options.signals = true;
+  CHECK_FALSE(measured_tests({run}, options).moved("spindle_rpm"));
+}
+
+TEST_CASE("a stray value of a signal is left out of the fit", "[families]") {
+  RunFile run = machine_run("run", 1, [](double quick, double, double, double) { return quick; });
+  run.values[3][100] = 65535.0;
+  TestOptions options;
+  options.outputs = {"z_um"};
+  options.signals = true;
+  const MeasuredTests tests = measured_tests({run}, options);
+  CHECK(tests.rows() == static_cast<Eigen::Index>(run.values[0].size()) - 1);
+  CHECK(tests.moved("spindle_rpm"));
+  CHECK(tests.notes.size() == 1);
+}
+
+TEST_CASE("a burst of a signal is no stray value", "[signals]") {
+  std::vector<double> power_W(900, 100.0);
+  for (std::size_t i = 0; i < 4; ++i) power_W[500 + i] = 3000.0 + 1000.0 * static_cast<double>(i);
+  CHECK(stray_rows(power_W).empty());
+  power_W.assign(900, 100.0);
+  power_W[500] = power_W[501] = 65535.0;  // one code, twice
+  CHECK(stray_rows(power_W) == std::vector<std::size_t>{500, 501});
+  power_W[502] = 600.0;  // not beyond five times of what is kept, nor the code
+  CHECK(stray_rows(power_W).empty());
+}
+
+TEST_CASE("a place that is missing in one stretch of an export leaves out that stretch only",
+          "[signals]") {
+  RunFile run = machine_run("run", 1, [](double quick, double, double, double) { return quick; });
+  run.references = {100, 200};
+  for (std::size_t row = 100; row < 200; ++row) run.values[1][row] = not_a_number;
+  TestOptions options;
+  options.outputs = {"z_um"};
+  const MeasuredTests tests = measured_tests(between_references(run), options);
+  CHECK(tests.places == std::vector<std::string>{"t1_degC", "t2_degC"});
+  CHECK(tests.given == std::vector<std::size_t>{0, 2});
+  REQUIRE(tests.notes.size() == 1);
+  CHECK(tests.notes[0] == "run@6000:12000 is left out: fewer than 3 of its rows are complete");
 }
