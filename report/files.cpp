@@ -33,11 +33,14 @@ std::vector<RunFile> RunLoader::load(const std::vector<std::string>& arguments) 
   std::vector<RunFile> runs;
   runs.reserve(arguments.size());
   for (const std::string& argument : arguments) {
-    const RunFile run = load(argument);
+    RunFile run = load(argument);
+    if (run.references.empty()) {
+      runs.push_back(std::move(run));
+      continue;
+    }
     std::vector<RunFile> parts = between_references(run);
-    if (!run.references.empty())
-      std::fprintf(stderr, "%s: displacement counts anew from each reference: read as %zu runs\n",
-                   run.name.c_str(), parts.size());
+    std::fprintf(stderr, "%s: displacement counts anew from each reference: read as %zu runs\n",
+                 run.name.c_str(), parts.size());
     std::move(parts.begin(), parts.end(), std::back_inserter(runs));
   }
   return runs;

@@ -33,7 +33,7 @@ struct ScanDevice {
   std::string name;
   std::string address;  ///< "unit 3"; empty on CAN
   bool answers{false};
-  std::string note;  ///< fault of the whole device
+  std::string note;  ///< fault of the whole device, or an unlikely unit
   std::vector<ScanChannel> channels;
 };
 

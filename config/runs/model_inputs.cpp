@@ -19,7 +19,7 @@
 namespace thermocomp {
 namespace {
 
-bool same_file(const std::string& a, const std::string& b) {
+bool same_file(const std::filesystem::path& a, const std::filesystem::path& b) {
   if (a == b) return true;
   std::error_code failed;
   return std::filesystem::equivalent(a, b, failed) && !failed;
@@ -85,9 +85,6 @@ bool are_of_one_measurement(const RunFile& a, const RunFile& b) {
 
 bool share_rows(const RunFile& a, const RunFile& b) {
   // Stretches of one file cannot be told apart by their content if the machine repeats itself.
-  const auto file_of = [](const RunFile& run) {
-    return run.is_part ? parse_selection(run.name).file.string() : run.name;
-  };
   if ((a.is_part || b.is_part) && same_file(file_of(a), file_of(b)))
     return std::max(a.time_s()[a.selected_begin], b.time_s()[b.selected_begin]) <=
            std::min(a.time_s()[a.selected_end - 1], b.time_s()[b.selected_end - 1]);

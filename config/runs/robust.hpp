@@ -32,7 +32,7 @@ namespace thermocomp {
 
 /// Rows of a signal with stray values, such as an error code of the controller: more than five
 /// times the magnitude of all others, in at most one of 200 rows, each alone or all of one value.
-/// None if nearly all values are 0.
+/// Empty if nearly all values are 0.
 [[nodiscard]] std::vector<std::size_t> stray_rows(const std::vector<double>& values);
 
 /// Rows [begin, end) of one value.

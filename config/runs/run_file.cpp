@@ -351,6 +351,10 @@ std::string sheet_of(const std::filesystem::path& path) {
 
 }  // namespace
 
+std::filesystem::path file_of(const RunFile& run) {
+  return run.is_part ? parse_selection(run.name).file : std::filesystem::path(run.name);
+}
+
 std::vector<RunFile> between_references(const RunFile& run) {
   std::vector<std::size_t> bounds{0};
   for (const std::size_t row : run.references)

@@ -38,6 +38,9 @@ struct RunSelection {
 [[nodiscard]] RunFile parse_run(std::string_view text, const std::string& name,
                                 const RunSelection& selection = {}, const ColumnMap* map = nullptr);
 
+/// The file of a run or of a part of one.
+[[nodiscard]] std::filesystem::path file_of(const RunFile& run);
+
 /// The stretches between references, each a run with references and lags of its own, named
 /// FILE@T0:T1; those without a selected row are omitted.
 [[nodiscard]] std::vector<RunFile> between_references(const RunFile& run);

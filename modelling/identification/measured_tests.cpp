@@ -115,7 +115,6 @@ void leave_out_stray_values(RunFile& run, std::vector<std::string>& notes) {
 double share_in_file(const std::vector<RunFile>& runs, const RunFile& run,
                      const std::string& column) {
   if (!run.is_part) return share_present(run, run.column(column));
-  const auto file_of = [](const RunFile& each) { return parse_selection(each.name).file; };
   double present = 0.0;
   double rows = 0.0;
   for (const RunFile& each : runs) {

@@ -158,6 +158,8 @@ class RunExport {
     text_ += wall_.at(row_[0], wall_ns);
     for (const std::string& what : walk.happened()) text_ += comment_at(row_[0], what);
     append_row(text_, row_);
+    for (const std::string& reference : walk.references_after_row())
+      text_ += comment_at(row_[0], reference);
     out_ << text_;
     text_.clear();
     ++summary_.rows;

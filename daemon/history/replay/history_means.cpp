@@ -177,6 +177,7 @@ void HistoryMeans::Parts::take_row(std::uint64_t cycle) {
   std::fill(walk->row.begin(), walk->row.end(), not_a_number);
   walk->walk.fill(walk->row, cycle);
   static_cast<void>(walk->walk.happened());
+  static_cast<void>(walk->walk.references_after_row());
   open->add(walk->without_measured(walk->row));
   for (const ExportedProbing& probing : walk->walk.probings())
     open->probings.push_back({walk->setup.estimator.axes[probing.axis].output, 0, probing.wall_ns,

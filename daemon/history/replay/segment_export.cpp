@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <span>
+#include <utility>
 
 #include "config/text/printable_text.hpp"
 #include "estimator/estimator_config.hpp"
@@ -161,6 +163,10 @@ std::vector<std::string> SegmentExport::happened() {
   return all;
 }
 
+std::vector<std::string> SegmentExport::references_after_row() {
+  return std::exchange(references_after_row_, {});
+}
+
 std::vector<ExportedProbing> SegmentExport::probings() {
   std::vector<ExportedProbing> all;
   all.swap(probings_);
@@ -190,6 +196,7 @@ void SegmentExport::extend(std::int64_t last_cycle) {
 
 void SegmentExport::skip() {
   happened_.clear();
+  references_after_row_.clear();
   probings_.clear();
   measured_um_.fill(not_a_number);
   displacement_um_.fill(not_a_number);
@@ -254,7 +261,17 @@ void SegmentExport::take_command() {
   if (kind == CommandKind::accept) text.append(" ").append(config_.sensors[record_.index].name);
   if (names_axis && kind != CommandKind::release)
     text.append(" ").append(number_text(record_.value)).append(" um");
-  happened_.push_back(std::move(text));
+  if (kind == CommandKind::measured && !references_after_row_.empty()) {
+    // The row has one displacement of an axis: the one that counts from the new reference.
+    std::move(references_after_row_.begin(), references_after_row_.end(),
+              std::back_inserter(happened_));
+    references_after_row_.clear();
+    displacement_um_.fill(not_a_number);
+  }
+  const bool is_after_probing = kind == CommandKind::reference &&
+                                std::any_of(displacement_um_.begin(), displacement_um_.end(),
+                                            [](double each_um) { return std::isfinite(each_um); });
+  (is_after_probing ? references_after_row_ : happened_).push_back(std::move(text));
   if (kind == CommandKind::measured) take_measured();
 }
 

@@ -68,6 +68,8 @@ class SegmentExport {
   void fill(std::vector<double>& row, std::uint64_t cycle);
   /// Begin and end of faults, and commands since the last call; one text each.
   [[nodiscard]] std::vector<std::string> happened();
+  /// References taken after a probing of the row, which belongs to the time before them.
+  [[nodiscard]] std::vector<std::string> references_after_row();
   /// Probings between the last two calls of fill().
   [[nodiscard]] std::vector<ExportedProbing> probings();
   /// Call when the segment has grown: next() continues.
@@ -108,6 +110,7 @@ class SegmentExport {
   Report report_;
   std::vector<Fault> faults_reported_;
   std::vector<std::string> happened_;
+  std::vector<std::string> references_after_row_;
   std::vector<ExportedProbing> probings_;
   std::string not_followed_;  ///< why stepping has failed, until reported
 };

@@ -346,6 +346,7 @@ void choose(const Judgements& judgements, FamiliesFit& fit) {
     if (!predicts(judgements, chosen, o)) fit.without_gains.push_back(o);
   if (fit.without_gains.size() < fit.results.front().left_out_rms_um.size()) return;
   fit.chosen = Family::none;
+  fit.chosen_because += ", but is no better than no model for any output alone";
   fit.without_gains.clear();
 }
 

@@ -205,8 +205,7 @@ def test_a_new_reference_begins_a_run_in_an_export(machine, lab):
         machine.warm_by(offset_um)
         daemon.wait_for_offset(6.0, 0.05)  # the second from the new reference on
         assert daemon.cli("measured", "z", "0.5")[0] == 0
-        daemon.committed()
-        if offset_um == 6.0:
+        if offset_um == 6.0:  # at once: often within the same row of the export
             assert daemon.cli("reference", "--force")[0] == 0
             daemon.wait_for_offset(0.0, 0.05)
     daemon.end()

@@ -9,7 +9,6 @@
 #include <catch2/catch.hpp>
 
 #include "config/model/model_file.hpp"
-#include "config/runs/model_inputs.hpp"
 #include "estimator/model/displacement_model.hpp"
 #include "machine_runs.hpp"
 #include "modelling/identification/families/bank_fit.hpp"
@@ -156,19 +155,6 @@ TEST_CASE("an output that cannot be predicted gets no gains, and the others keep
   CHECK(fit.of_model.left_out_rms_um[0] == fit.results[0].left_out_rms_um[0]);
   CHECK(fit.of_model.left_out_rms_um[1] < 0.1 * fit.results[0].left_out_rms_um[1]);
   CHECK(fit.model.made_from->outputs.at("x_um").left_out_rms_um > 15.0);
-}
-
-TEST_CASE("a first value far from the next ones is genuine in a record of few probings",
-          "[families]") {
-  RunFile run = machine_run("run", 1, [](double quick, double, double, double) { return quick; });
-  std::vector<double>& z_um = run.values[4];
-  std::fill(z_um.begin(), z_um.end(), not_a_number);
-  const std::vector<double> probed{0.0,   -12.8, -17.9, -18.2, -18.9, -19.4,
-                                   -19.1, -18.8, -18.5, -18.9, -19.0, -18.7};
-  for (std::size_t i = 0; i < probed.size(); ++i) z_um[25 * i] = probed[i];
-  CHECK(leave_out_outliers(run, {"z_um"}).empty());
-  z_um[100] = 320.0;
-  CHECK(leave_out_outliers(run, {"z_um"}).size() == 1);
 }
 
 TEST_CASE("fit prints one expected error per output, and its basis", "[families]") {

@@ -7,6 +7,8 @@
 
 #include <catch2/catch.hpp>
 
+#include "config/runs/model_inputs.hpp"
+#include "machine_runs.hpp"
 #include "synthetic_places.hpp"
 
 namespace thermocomp::identification {
@@ -166,6 +168,19 @@ TEST_CASE("a stretch of an export with fewer than three displacements is left ou
   CHECK(tests.runs[0].name == "run.csv@100:250");
   CHECK(tests.runs[1].outputs_um(0, 0) == 0.0);
   CHECK(has_note(tests, "run.csv@:100 is left out: fewer than 3 of its rows are complete"));
+}
+
+TEST_CASE("a first value far from the next ones is genuine in a record of few probings",
+          "[identification]") {
+  RunFile run = machine_run("run", 1, [](double quick, double, double, double) { return quick; });
+  std::vector<double>& z_um = run.values[4];
+  std::fill(z_um.begin(), z_um.end(), not_a_number);
+  const std::vector<double> probed{0.0,   -12.8, -17.9, -18.2, -18.9, -19.4,
+                                   -19.1, -18.8, -18.5, -18.9, -19.0, -18.7};
+  for (std::size_t i = 0; i < probed.size(); ++i) z_um[25 * i] = probed[i];
+  CHECK(leave_out_outliers(run, {"z_um"}).empty());
+  z_um[100] = 320.0;
+  CHECK(leave_out_outliers(run, {"z_um"}).size() == 1);
 }
 
 }  // namespace
