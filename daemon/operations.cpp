@@ -53,6 +53,20 @@ bool is_done(Outcome outcome, const char* asked) {
           asked));
 }
 
+/// What a reload changed of the models: "model SHA-256 3f...", "candidate FILE". Empty: nothing.
+std::string changes_of(const DaemonConfig& before, const DaemonConfig& after) {
+  std::string text;
+  if (after.model_checksum != before.model_checksum)
+    text = "model SHA-256 " + after.model_checksum.substr(0, 16);
+  const auto candidate = [](const DaemonConfig& config) {
+    return config.candidate ? "candidate " + config.candidate->file.string()
+                            : std::string("no candidate");
+  };
+  if (candidate(after) != candidate(before))
+    text.append(text.empty() ? "" : ", ").append(candidate(after));
+  return text;
+}
+
 void add_recorder(CycleParts& parts, const DaemonConfig& config, HistoryWriter* history) {
   if (history != nullptr)
     parts.recorder = history->make_recorder({config.text, config.model_text, config.model_checksum},
@@ -214,13 +228,26 @@ void Operations::finish_loading() {
     reload_->next = std::move(loaded->config);
     reload_->answer->outcome = cycle_.replace(std::move(loaded->parts), Clock::now());
   } catch (const std::exception& error) {
-    if (!reload_->is_asked)
-      spdlog::error("reload refused, the running configuration stays:\n{}", error.what());
+    note_refused(error.what());
     reload_->answer->error = std::current_exception();
     loaded->config = {};
     malloc_trim(0);  // locked memory of the refused parts is not returned otherwise
     end_reload();
   }
+}
+
+/// Recorded for those who do not see the client's answer or the log: the daemon would not start
+/// again with these files.
+void Operations::note_refused(const std::string& why) {
+  if (!reload_->is_asked)
+    spdlog::error("reload refused, the running configuration stays:\n{}", why);
+  const std::string line = why.substr(0, why.find('\n'));
+  if (reload_->candidate == candidate_)
+    reload_problem_ = "the last reload was refused, the configuration before runs: " + line;
+  if (parts_.journal == nullptr) return;
+  Event event = command_event("reload", reload_->by);
+  event.detail = "refused: " + line;
+  parts_.journal->command(std::move(event));
 }
 
 void Operations::end_reload() {
@@ -253,12 +280,15 @@ void Operations::finish_reload() {
     return;
   }
   if (outcome == Outcome::done) {
+    Event event = command_event("reload", reload_->by);
+    event.detail = changes_of(parts_.config, reload_->next);
     parts_.config = std::move(reload_->next);
     candidate_ = reload_->candidate;
+    reload_problem_.clear();
     set_log_level(parts_.config.log_level);
     note_reference(parts_.cycle.parts().estimator.persistent_state(parts_.cycle.report()),
                    ReferenceOrigin::reload);
-    if (parts_.journal != nullptr) parts_.journal->command(command_event("reload", reload_->by));
+    if (parts_.journal != nullptr) parts_.journal->command(std::move(event));
     spdlog::info("reloaded: model {} (SHA-256 {})", parts_.config.model_file.string(),
                  parts_.config.model_checksum);
   } else {

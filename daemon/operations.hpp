@@ -57,6 +57,8 @@ class Operations {
       const std::optional<std::filesystem::path>& candidate = std::nullopt);
   /// Reload by SIGHUP. Any number of signals during a reload cause one further reload.
   void reload_by_signal();
+  /// Why the configuration on disk does not run; empty: it does, as far as known.
+  [[nodiscard]] const std::string& reload_problem() const noexcept { return reload_problem_; }
 
   void poll();
   [[nodiscard]] bool is_busy() const noexcept { return cycle_.is_busy(); }
@@ -102,6 +104,7 @@ class Operations {
   void finish_loading();
   void finish_reload();
   void end_reload();
+  void note_refused(const std::string& why);
   void carried_out(const Command& done);
   void report_saved(bool again);
   void note_reference(const PersistentState& state, ReferenceOrigin origin);
@@ -122,6 +125,7 @@ class Operations {
   std::optional<Reload> reload_;
   std::optional<std::filesystem::path> candidate_;  ///< named by an operator; empty: none
   bool reload_again_{false};
+  std::string reload_problem_;
   std::string asked_for_;
   std::string reported_save_error_;
   std::uint64_t reported_serial_{0};  ///< newest state reported to the estimator as on disk

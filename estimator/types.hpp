@@ -70,7 +70,7 @@ struct ControllerState {
   /// Changes when the link is established, re-established or paused: a command of another epoch was
   /// computed without knowing the offset applied now. 0: never connected.
   std::uint32_t link_epoch{0};
-  std::uint64_t look{0};  ///< sequence number of this read-back
+  std::uint64_t read_back_number{0};  ///< sequence number of this read-back
   bool online{false};
   /// The newest offsets were confirmed within the last few periods of the link: answered on Modbus,
   /// sent on CAN, taken by the bridge.
@@ -90,9 +90,9 @@ struct OffsetCommand {
   std::array<bool, axes_max> valid{};        ///< false: this axis must not be driven
   /// Link epoch of these offsets; a controller link sends only offsets of its own epoch.
   std::uint32_t link_epoch{0};
-  /// ControllerState::look that they were computed from; the link does not use them to move an axis
+  /// ControllerState::read_back_number that they were computed from; the link does not use them to move an axis
   /// away from a newer read-back.
-  std::uint64_t look{0};
+  std::uint64_t read_back_number{0};
 };
 
 /// Commands of an operator or of the CNC program. `stop` comes from the daemon before it ends:

@@ -17,6 +17,7 @@ void BridgeState::ask(Axis& axis, double offset_mm) {
 void BridgeState::take(const Answer& answer, const MachineView& reported, nanoseconds now) {
   answered_at_ = now;
   outputs_.heartbeat = !outputs_.heartbeat;
+  if (answer.all_driven) driven_at_ = now;
   mode_ = answer.mode;
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     const double applied_mm = reported.axes[i].applied_mm;
@@ -25,6 +26,10 @@ void BridgeState::take(const Answer& answer, const MachineView& reported, nanose
     else if (reported.taking && answer.anew && std::isfinite(applied_mm))
       ask(axes_[i], std::clamp(applied_mm, -limits_.offset_mm_max, limits_.offset_mm_max));
   }
+}
+
+bool BridgeState::is_fresh(const std::optional<nanoseconds>& time, nanoseconds now) const {
+  return time && std::chrono::duration<double>(now - *time).count() <= limits_.fresh_s;
 }
 
 bool BridgeState::lasts(const std::optional<nanoseconds>& since, nanoseconds now) const {
@@ -57,9 +62,8 @@ Outputs BridgeState::show(const MachineView& view, nanoseconds now) {
     if (!std::isfinite(shown.applied_mm + shown.wanted_mm + shown.position_mm)) fault();
   }
   if (!std::isfinite(view.spindle_rpm)) fault();
-  outputs_.fresh =
-      answered_at_ && std::chrono::duration<double>(now - *answered_at_).count() <= limits_.fresh_s;
-  outputs_.compensating = outputs_.fresh && view.taking && mode_ == "compensating";
+  outputs_.fresh = is_fresh(answered_at_, now);
+  outputs_.compensating = is_fresh(driven_at_, now) && view.taking && mode_ == "compensating";
   // No warning if an operator has switched it off.
   if (!view.taking || outputs_.compensating || mode_ == "disabled")
     idle_since_.reset();

@@ -53,6 +53,7 @@ class BridgeState {
 
   void ask(Axis& axis, double offset_mm);
   void compare(Axis& axis, const AxisView& view, nanoseconds now);
+  [[nodiscard]] bool is_fresh(const std::optional<nanoseconds>& time, nanoseconds now) const;
   [[nodiscard]] bool lasts(const std::optional<nanoseconds>& since, nanoseconds now) const;
 
   Limits limits_;
@@ -60,6 +61,7 @@ class BridgeState {
   Outputs outputs_;
   std::string mode_;
   std::optional<nanoseconds> answered_at_;
+  std::optional<nanoseconds> driven_at_;  ///< newest answer that drives every axis
   std::optional<nanoseconds> idle_since_;  ///< taking, but not compensating
 };
 

@@ -16,7 +16,10 @@ CLI::Validator between(double low, double high) {
           "FLOAT in [" + CLI::detail::to_string(low) + ", " + CLI::detail::to_string(high) + "]"};
 }
 
-void add_bridge_options(CLI::App& app, BridgeOptions& bridge) {
+void add_bridge_options(CLI::App& app, BridgeOptions& bridge, std::string& made_for) {
+  app.add_option("--units", bridge.unit, "of the machine (LINEAR_UNITS): mm or inch; required");
+  app.add_option("--made-for", made_for, "units for which the HAL file was made")
+      ->capture_default_str();
   app.add_option("--name", bridge.name, "of the HAL component")->capture_default_str();
   app.add_option("--axes", bridge.axes, "letters of the axes that take an offset")
       ->capture_default_str()
@@ -60,6 +63,8 @@ void add_hal_options(CLI::App& hal, Task& task, HalTexts& texts) {
                  "external offsets")
       ->required()
       ->transform(CLI::CheckedTransformer(ways));
+  hal.add_option("--units", options.unit, "LINEAR_UNITS of the machine's ini file: mm or inch")
+      ->capture_default_str();
   hal.add_option("--axes", texts.axes, "axes and their joints, as in x=0,y=1,z=2")->required();
   hal.add_option("--name", options.name, "name of the bridge's component")->capture_default_str();
   hal.add_option("--offset-mm-max", options.offset_mm_max, "bound of an offset")
@@ -99,6 +104,14 @@ std::map<std::string, std::string> read_signals(const std::vector<std::string>& 
   return signals;
 }
 
+/// The limits in the HAL file are numbers in the machine's unit. @throws BadOption
+void check_units(const std::string& machine, const std::string& made_for) {
+  if (unit_mm(machine) != unit_mm(made_for))
+    throw BadOption("the HAL file was made for a machine in " + made_for +
+                    ", and LINEAR_UNITS are " + machine +
+                    ": make it again with `thermocomp-linuxcnc hal --units " + machine + " ...`");
+}
+
 }  // namespace
 
 std::vector<HalAxis> read_axes(const std::string& text) {
@@ -121,13 +134,19 @@ std::optional<Task> read_command_line(int argc, const char* const* argv, int& st
   HalTexts texts;
   CLI::App app("Thermal offsets of thermocompd for LinuxCNC: a HAL component, started by loadusr");
   app.set_version_flag("--version", std::string("thermocomp-linuxcnc ") + THERMOCOMP_VERSION);
-  add_bridge_options(app, task.bridge);
+  std::string made_for = "mm";
+  add_bridge_options(app, task.bridge, made_for);
   CLI::App* hal = app.add_subcommand("hal", "prints the HAL file for a machine");
   add_hal_options(*hal, task, texts);
   try {
     app.parse(argc, argv);
     task.print_hal = hal->parsed();
-    if (task.print_hal) task.hal.axes = read_axes(texts.axes);
+    if (task.print_hal)
+      task.hal.axes = read_axes(texts.axes);
+    else if (task.bridge.unit.empty())
+      throw CLI::RequiredError("--units");
+    else
+      check_units(task.bridge.unit, made_for);
     task.hal.signals = read_signals(texts.signals);
   } catch (const CLI::ParseError& error) {
     status = app.exit(error) == 0 ? 0 : 2;

@@ -15,6 +15,7 @@ struct BridgeOptions {
   std::string axes{"xyz"};
   std::string socket{"/run/thermocomp/status.sock"};
   double period_s{0.05};
+  std::string unit;  ///< of the machine, in which HAL's pins are: mm or inch
   Limits limits;
 };
 

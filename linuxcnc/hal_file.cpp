@@ -45,10 +45,13 @@ void check(const HalFileOptions& options) {
 
 class Writer {
  public:
-  explicit Writer(const HalFileOptions& options) : options_(options) {}
+  explicit Writer(const HalFileOptions& options)
+      : options_(options), unit_mm_(unit_mm(options.unit)) {}
 
   void line(const std::string& text) { text_.append(text).append("\n"); }
   void set(const std::string& pin, const std::string& value) { line("setp " + pin + " " + value); }
+  /// Sets a length, speed or acceleration, which HAL has in the machine's unit.
+  void set_mm(const std::string& pin, double mm) { set(pin, number_text(mm / unit_mm_)); }
 
   /// Loads an instance per name and axis: limit3 names=tc.limit-x,tc.limit-y
   void load(const std::string& kind, const std::string& each, const std::string& further = {}) {
@@ -63,11 +66,8 @@ class Writer {
 
   /// Connects a pin of LinuxCNC to our pins, by the machine's own signal if it has one.
   void from_machine(const std::string& pin, const std::string& signal, const std::string& ours) {
-    const auto own = options_.signals.find(pin);
-    if (own == options_.signals.end())
-      line("net " + signal + " " + pin + " => " + ours);
-    else
-      line("net " + own->second + " => " + ours);
+    const std::string own = signal_of(pin, "");
+    line("net " + (own.empty() ? signal + " " + pin : own) + " => " + ours);
   }
   void net(const std::string& signal, const std::string& from, const std::string& to) {
     line("net " + signal + " " + from + " => " + to);
@@ -84,33 +84,50 @@ class Writer {
            std::string("axis.").append(1, axis.letter));
   }
   [[nodiscard]] std::string text() const { return text_; }
+  /// @throws BadOption: --signal names a pin that the file does not connect
+  void require_known_pins() const {
+    for (const auto& [pin, signal] : options_.signals)
+      if (known_pins_.count(pin) == 0)
+        throw BadOption("--signal " + pin + "=" + signal + ": the file does not connect the pin " +
+                        pin + "; it connects" + list(known_pins_));
+  }
   [[nodiscard]] const HalFileOptions& options() const { return options_; }
-  /// Signal between one of our pins and a drive.
-  [[nodiscard]] std::string drive_signal(const std::string& pin, const std::string& usual) const {
+  /// Signal of a pin in the machine's own files, or `usual`.
+  [[nodiscard]] std::string signal_of(const std::string& pin, const std::string& usual) {
+    known_pins_.insert(pin);
     const auto own = options_.signals.find(pin);
     return own == options_.signals.end() ? usual : own->second;
   }
   /// Signal that is true while offsets are taken. Joint: all joints are homed.
-  [[nodiscard]] std::string taking() const {
-    if (options_.way == Way::external) return "tc-taking";
-    const auto own = options_.signals.find("motion.is-all-homed");
-    return own == options_.signals.end() ? "tc-homed" : own->second;
+  [[nodiscard]] std::string taking() {
+    return options_.way == Way::external ? "tc-taking" : signal_of("motion.is-all-homed", "tc-homed");
   }
   [[nodiscard]] std::string bridge(const std::string& pin) const {
     return options_.name + "." + pin;
   }
 
  private:
+  static std::string list(const std::set<std::string>& names) {
+    std::string text;
+    for (const std::string& name : names) text += " " + name;
+    return text;
+  }
+
   const HalFileOptions& options_;
+  const double unit_mm_;
   std::string text_;
+  std::set<std::string> known_pins_;
 };
 
-void load_bridge(Writer& out, const std::string& name) {
+/// @param is_running  LinuxCNC runs already, and its ini file is out of reach
+void load_bridge(Writer& out, const std::string& name, bool is_running) {
   const HalFileOptions& options = out.options();
   std::string letters;
   for (const HalAxis& axis : options.axes) letters.push_back(axis.letter);
   out.line("loadusr -Wn " + name + " " + options.command + " --name " + name + " --axes " +
-           letters + (options.arguments.empty() ? "" : " " + options.arguments));
+           letters + " --units " + (is_running ? options.unit : "[TRAJ]LINEAR_UNITS") +
+           " --made-for " + options.unit +
+           (options.arguments.empty() ? "" : " " + options.arguments));
 }
 
 /// Connects inputs before outputs, so that a bridge that joins knows the applied offsets first.
@@ -159,8 +176,8 @@ void write_warning(Writer& out) {
 void write_limits(Writer& out, const std::string& axis) {
   const HalFileOptions& options = out.options();
   const std::string limit = "tc.limit-" + axis;
-  out.set(limit + ".min", number_text(-options.offset_mm_max));
-  out.set(limit + ".max", number_text(options.offset_mm_max));
+  out.set_mm(limit + ".min", -options.offset_mm_max);
+  out.set_mm(limit + ".max", options.offset_mm_max);
   out.line("net tc-asked-" + axis + " => tc.gate-" + axis + ".in1");
   out.set("tc.gate-" + axis + ".in0", "0");
   out.line("net " + out.taking() + " => tc.gate-" + axis + ".sel");
@@ -203,10 +220,10 @@ void write_joint(Writer& out) {
       "\n# ---- offsets apply while all joints are homed, else they return to zero, so that none\n"
       "# ---- is in effect during homing");
   out.from_machine("motion.is-all-homed", "tc-homed", "tc.speed.sel tc.acceleration.sel");
-  out.set("tc.speed.in0", number_text(options.homing_speed_mm_per_s));
-  out.set("tc.speed.in1", number_text(options.speed_mm_per_s));
-  out.set("tc.acceleration.in0", number_text(options.homing_acceleration_mm_per_s2));
-  out.set("tc.acceleration.in1", number_text(options.acceleration_mm_per_s2));
+  out.set_mm("tc.speed.in0", options.homing_speed_mm_per_s);
+  out.set_mm("tc.speed.in1", options.speed_mm_per_s);
+  out.set_mm("tc.acceleration.in0", options.homing_acceleration_mm_per_s2);
+  out.set_mm("tc.acceleration.in1", options.acceleration_mm_per_s2);
   out.line("net tc-speed tc.speed.out");
   out.line("net tc-acceleration tc.acceleration.out");
   out.each([&](const std::string& axis, const std::string& joint, const std::string&) {
@@ -219,18 +236,18 @@ void write_joint(Writer& out) {
     out.net("tc-wanted-" + axis, limit + ".out", offset + ".offset");
     out.net("tc-motion-cmd-" + axis, joint + ".motor-pos-cmd",
             offset + ".in tc.back-" + axis + ".in1");
-    out.net(out.drive_signal(offset + ".out", "tc-motor-cmd-" + axis), offset + ".out",
+    out.net(out.signal_of(offset + ".out", "tc-motor-cmd-" + axis), offset + ".out",
             "tc.back-" + axis + ".in0");
     out.set("tc.back-" + axis + ".gain1", "-1");
     out.line("net tc-applied-" + axis + " tc.back-" + axis + ".out");
-    out.line("net " + out.drive_signal(offset + ".fb-in", "tc-motor-fb-" + axis) + " => " + offset +
+    out.line("net " + out.signal_of(offset + ".fb-in", "tc-motor-fb-" + axis) + " => " + offset +
              ".fb-in");
     out.net("tc-motion-fb-" + axis, offset + ".fb-out", joint + ".motor-pos-fb");
   });
 }
 
-/// One count of eoffset-counts [mm]; finer than any offset.
-constexpr double count_mm = 1e-5;
+/// One count of eoffset-counts [mm or inch]; finer than any offset.
+constexpr double count = 1e-6;
 
 void write_external(Writer& out) {
   const HalFileOptions& options = out.options();
@@ -264,13 +281,13 @@ void write_external(Writer& out) {
     out.line("\n# ---- axis " + axis);
     write_limits(out, axis);
     out.line("net tc-clear => " + limit + ".load " + axis_pin + ".eoffset-clear");
-    out.set(limit + ".maxv", number_text(options.speed_mm_per_s));
-    out.set(limit + ".maxa", number_text(options.acceleration_mm_per_s2));
+    out.set_mm(limit + ".maxv", options.speed_mm_per_s);
+    out.set_mm(limit + ".maxa", options.acceleration_mm_per_s2);
     out.net("tc-limited-" + axis, limit + ".out", "tc.scale-" + axis + ".in");
-    out.set("tc.scale-" + axis + ".gain", number_text(1.0 / count_mm));
+    out.set("tc.scale-" + axis + ".gain", number_text(1.0 / count));
     out.net("tc-scaled-" + axis, "tc.scale-" + axis + ".out", "tc.count-" + axis + ".in");
     out.net("tc-counts-" + axis, "tc.count-" + axis + ".out", axis_pin + ".eoffset-counts");
-    out.set(axis_pin + ".eoffset-scale", number_text(count_mm));
+    out.set(axis_pin + ".eoffset-scale", number_text(count));
     out.set(axis_pin + ".eoffset-enable", "1");
     out.line("net tc-wanted-" + axis + " " + axis_pin + ".eoffset-request");
     out.line("net tc-applied-" + axis + " " + axis_pin + ".eoffset");
@@ -279,13 +296,21 @@ void write_external(Writer& out) {
 
 }  // namespace
 
+double unit_mm(const std::string& name) {
+  for (const char* mm : {"mm", "metric"})
+    if (name == mm) return 1.0;
+  for (const char* inch : {"in", "inch", "imperial"})
+    if (name == inch) return 25.4;
+  throw BadOption("unit " + name + ": LINEAR_UNITS are mm or inch");
+}
+
 std::string hal_file(const HalFileOptions& options) {
   check(options);
   Writer out(options);
   out.line(
       "# Thermal offsets, made by `thermocomp-linuxcnc hal`: make it again rather than edit it.");
   out.line("# To be loaded after the machine's own HAL files.");
-  load_bridge(out, options.name);
+  load_bridge(out, options.name, false);
   if (options.way == Way::joint)
     write_joint(out);
   else
@@ -293,6 +318,7 @@ std::string hal_file(const HalFileOptions& options) {
   write_warning(out);
   out.line("\n# ---- the bridge");
   connect_bridge(out, options.name);
+  out.require_known_pins();
   return out.text();
 }
 
@@ -308,7 +334,7 @@ std::string rejoin_file(const HalFileOptions& options, const std::string& name) 
       out.line("unlinkp " + out.bridge("offset-" + axis));
     });
   }
-  load_bridge(out, name);
+  load_bridge(out, name, true);
   connect_bridge(out, name);
   return out.text();
 }

@@ -21,6 +21,7 @@ struct HalAxis {
 
 struct HalFileOptions {
   Way way{Way::joint};
+  std::string unit{"mm"};  ///< of the machine: mm or inch
   std::vector<HalAxis> axes;
   double offset_mm_max{0.2};
   double speed_mm_per_s{0.05};         ///< speed of an offset while all joints are homed
@@ -43,7 +44,11 @@ class BadOption : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// @throws BadOption: no axis, a repeated axis or joint, an invalid letter or number
+/// A length unit as LinuxCNC names it in [TRAJ]LINEAR_UNITS, in mm. @throws BadOption
+[[nodiscard]] double unit_mm(const std::string& name);
+
+/// @throws BadOption: no axis, a repeated axis or joint, an invalid letter or number, a signal for
+/// a pin that the file does not connect
 [[nodiscard]] std::string hal_file(const HalFileOptions& options);
 
 /// File for `halcmd -f` after a bridge ended while LinuxCNC runs. After SIGTERM the bridge can be

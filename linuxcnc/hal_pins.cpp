@@ -36,7 +36,8 @@ struct HalPins::Pins {
   hal_u32_t* faults;
 };
 
-HalPins::HalPins(const std::string& name, const std::string& axes) : axes_(axes.size()) {
+HalPins::HalPins(const std::string& name, const std::string& axes, double unit_mm)
+    : axes_(axes.size()), unit_mm_(unit_mm) {
   if (axes_ > axes_max) throw HalError("at most 6 axes");
   component_ = hal_init(name.c_str());
   if (component_ < 0)
@@ -105,14 +106,15 @@ MachineView HalPins::read() const {
   view.mist = *pins_->mist;
   for (std::size_t i = 0; i < axes_; ++i) {
     const Pins::Axis& axis = pins_->axes[i];
-    view.axes.push_back({*axis.applied, *axis.wanted, *axis.position});
+    view.axes.push_back(
+        {*axis.applied * unit_mm_, *axis.wanted * unit_mm_, *axis.position * unit_mm_});
   }
   return view;
 }
 
 void HalPins::write(const Outputs& outputs, bool connected) {
   for (std::size_t i = 0; i < axes_; ++i)
-    if (outputs.offset_mm[i]) *pins_->axes[i].offset = *outputs.offset_mm[i];
+    if (outputs.offset_mm[i]) *pins_->axes[i].offset = *outputs.offset_mm[i] / unit_mm_;
   *pins_->fresh = outputs.fresh;
   *pins_->connected = connected;
   *pins_->compensating = outputs.compensating;

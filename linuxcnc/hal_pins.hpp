@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/// The bridge's HAL component: reads and writes its pins.
+/// The bridge's HAL component: reads and writes its pins, which are in the machine's unit.
 #pragma once
 
 #include <stdexcept>
@@ -17,8 +17,10 @@ class HalError : public std::runtime_error {
 
 class HalPins {
  public:
-  /// Creates the component with its pins and marks it ready. @throws HalError
-  HalPins(const std::string& name, const std::string& axes);
+  /// Creates the component with its pins and marks it ready.
+  /// @param unit_mm  the machine's unit [mm]
+  /// @throws HalError
+  HalPins(const std::string& name, const std::string& axes, double unit_mm);
   ~HalPins();  ///< leaves HAL, so that the component can be loaded again
   HalPins(const HalPins&) = delete;
   HalPins& operator=(const HalPins&) = delete;
@@ -32,6 +34,7 @@ class HalPins {
 
   int component_{-1};
   std::size_t axes_;
+  double unit_mm_;
   Pins* pins_{nullptr};
 };
 

@@ -133,7 +133,7 @@ class Exchange {
 /// Runs until SIGTERM or SIGINT. @throws HalError at the start
 void run_bridge(const BridgeOptions& options) {
   const int signals = open_signals();
-  HalPins pins(options.name, options.axes);
+  HalPins pins(options.name, options.axes, unit_mm(options.unit));
   BridgeState state(options.axes.size(), options.limits);
   Exchange exchange(options, state);
   Settled settled;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "linuxcnc/messages.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include <nlohmann/json.hpp>
@@ -103,6 +104,8 @@ Answer read_answer(std::string_view line, std::uint64_t id, std::string_view axe
   if (!anew.is_boolean() || !mode.is_string() || !offsets.is_object())
     throw BadAnswer("the result has values of the wrong kind");
   Answer answer{anew.get<bool>(), mode.get<std::string>(), {}};
+  answer.all_driven = std::none_of(offsets.begin(), offsets.end(),
+                                   [](const json& offset) { return offset.is_null(); });
   for (const char axis : axes)
     answer.offset_mm.push_back(read_offset(offsets, std::string(1, axis), offset_mm_max));
   return answer;

@@ -42,6 +42,7 @@ std::string command_text(const Event& event) {
   std::string text = event.code;
   if (!event.subject.name.empty()) text.append(" ").append(event.subject.name);
   if (!std::isnan(event.value)) text.append(" ").append(number_text(event.value)).append(" um");
+  if (!event.detail.empty()) text.append(": ").append(event.detail);
   return text;
 }
 

@@ -85,7 +85,7 @@ struct Event {
   /// "mismatch_latched", "not_connected", "frozen", "not_written", "estimated", "lost",
   /// "uncertain", "not_taken"; of the daemon "started", "stopping", "history", "offset".
   std::string code{};
-  std::string detail{};  ///< text of a device, driver or signal; may be empty
+  std::string detail{};  ///< text of a device, driver or signal; of a reload; may be empty
   /// suspected: error of the sensor [K]; recovery of a sensor: change over the fault if larger than
   /// rate_allowance_K [K]; commands `measured` and `prove`: [um]; NaN: none
   double value{std::numeric_limits<double>::quiet_NaN()};

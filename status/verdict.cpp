@@ -33,6 +33,7 @@ std::vector<std::string> axes_not_driven(const Status& status) {
 std::string confirmation_text(const Confirmation& values) {
   return "new values are being confirmed: " + joined(values.sensors) +
          " count after settle_s = " + duration_text(values.settle_s) +
+         " without a jump or a pause of stale_after_s" +
          (values.one_value_of.empty()
               ? ""
               : ", and not while all channels of " + values.one_value_of +
@@ -309,6 +310,9 @@ void add_degradations(const Status& status, std::vector<std::string>& why) {
     why.push_back("device " + module.name + ": " + frozen_text(module));
   if (status.history.enabled && !status.history.working)
     why.emplace_back("the history is not written");
+  if (!status.reference.changed.empty())
+    why.emplace_back("the reference was taken while the machine was not even");
+  why.insert(why.end(), status.warnings.begin(), status.warnings.end());
 }
 
 }  // namespace
@@ -336,10 +340,12 @@ Verdict verdict(const Status& status) {
             : !status.model.moves ? std::string(moves_nothing)
                                   : "the controller takes no offsets"};
   }
+  const auto idle = axes_not_driven(status);
+  const bool some_stay = status.mode == Mode::disabled && !idle.empty();
   return {false,
           status.mode == Mode::disabled,
           "no",
-          std::string(mode.meaning),
+          std::string(mode.meaning) + (some_stay ? ", not driven and staying: " + joined(idle) : ""),
           status.mode_since_s,
           std::string(mode.remedy)};
 }

@@ -159,7 +159,7 @@ double peak_error_um(Sent sent, double rate_um_per_s) {
       std::copy(shown_um.begin(), shown_um.end(), read.applied_um.begin());
       read.signals[0] = at_mm;
       read.taken_at = now;
-      ++read.look;
+      ++read.read_back_number;
       if (command.valid[0])
         cnc.take(now_s, {through_registers(
                              sent, ++writes,

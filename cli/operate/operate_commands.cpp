@@ -33,7 +33,7 @@ constexpr std::array<PlainCommand, 4> plain_commands{{
     {"enable", "enable", "switches the compensation on; offsets approach at their slew rate",
      "compensation switched on"},
     {"disable", "disable", "switches the compensation off; offsets go to zero at their slew rate",
-     "compensation switched off; offsets go to zero at their slew rate"},
+     "compensation switched off; the offsets of driven axes go to zero at their slew rate"},
     {"cycle-end", "cycle_end", "reports the end of a machining cycle", "end of cycle noted"},
     {"reload", "reload", "reloads configuration and model without a jump of the axes",
      "configuration and model reloaded"},
@@ -57,10 +57,13 @@ void print_moves(const GlobalOptions& global) {
   for (const json& axis : status.value("axes", json::array())) {
     const double from = number_of(axis, "offset");
     const double to = number_of(axis, "target");
-    if (!flag_of(axis, "driven") || !(std::abs(to - from) >= shown_um)) continue;
-    std::cout << "axis " << text_of(axis, "name") << " moves from " << fixed_signed(from, 2)
-              << " to " << fixed_signed(to, 2) << ' ' << text_of(axis, "unit")
-              << " at its slew rate\n";
+    const std::string subject = "axis " + text_of(axis, "name");
+    const std::string unit = " " + text_of(axis, "unit");
+    if (!flag_of(axis, "driven"))
+      std::cout << subject << " is not driven and stays at " << fixed_signed(from, 2) << unit << '\n';
+    else if (std::abs(to - from) >= shown_um)
+      std::cout << subject << " moves from " << fixed_signed(from, 2) << " to "
+                << fixed_signed(to, 2) << unit << " at its slew rate\n";
   }
 }
 

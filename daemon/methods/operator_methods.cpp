@@ -235,6 +235,7 @@ RpcPending prove(const DaemonActions& actions, const json& params) {
       std::abs(command.value_um) <= most_um,
       "a proving move is at most " + json(most_um).dump() + " um (compensation.prove_um_max)");
   const AxisReport& axis = view.report.axes[command.axis];
+  refuse_unless(!axis.latched, "the axis is not driven: its mismatch is latched; release it first");
   refuse_unless(axis.driven && !has_reason(view.report.reasons, Reason::controller_offline),
                 "the axis is not driven: the controller is offline or not in step");
   refuse_unless(!any_node(view, command.axis, &AxisReport::proving),

@@ -398,6 +398,9 @@ std::optional<ProbeDueStatus> probe_due_of(const StatusView& view) {
   return due.axes.empty() ? std::nullopt : std::optional(due);
 }
 
+/// A start may take so much longer than three times settle_s.
+constexpr double start_grace_s = 10.0;
+
 /// Sensors whose new values are not confirmed yet, by module.
 std::vector<Confirmation> confirmations_of(const StatusView& view) {
   const std::vector<SensorReport>& reports = view.report.sensors;
@@ -491,8 +494,14 @@ Status status_of(const StatusView& view) {
       status.sensors_suspected.push_back({name, *suspicion});
   }
   for (const BusHealth& bus : view.buses) status.buses.push_back(bus_of(view, bus));
-  if (has_reason(view.report.reasons, Reason::block_lost) && view.report.mode != Mode::starting)
+  if (has_reason(view.report.reasons, Reason::block_lost)) {
     status.confirming = confirmations_of(view);
+    // Each start confirms all values; only one that lasts needs a reason.
+    if (view.report.mode == Mode::starting)
+      std::erase_if(status.confirming, [&](const Confirmation& each) {
+        return status.mode_since_s < 3.0 * each.settle_s + start_grace_s;
+      });
+  }
   return status;
 }
 

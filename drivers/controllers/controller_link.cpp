@@ -28,7 +28,7 @@ std::uint32_t WriteGate::synchronised() noexcept {
   unseen_.fill(false);
   sent_ = {};
   applied_um_.fill(not_a_number);
-  unchanged_since_.fill(++look_);
+  unchanged_since_.fill(++read_back_number_);
   return epoch_;
 }
 
@@ -67,7 +67,7 @@ nanoseconds WriteGate::next_pause() noexcept {
 
 bool WriteGate::check_read_back(const std::array<double, axes_max>& applied_um) noexcept {
   bool explained = true;
-  ++look_;
+  ++read_back_number_;
   unseen_.fill(false);
   for (std::size_t axis = 0; axis < axes_max; ++axis) {
     const double before_um = applied_um_[axis];
@@ -82,7 +82,7 @@ bool WriteGate::check_read_back(const std::array<double, axes_max>& applied_um) 
       applied_um_[axis] = applied_um[axis];
     if (!std::isfinite(before_um)) continue;
     const bool is_unchanged = std::abs(applied_um[axis] - before_um) <= slack_um_[axis];
-    if (!is_unchanged) unchanged_since_[axis] = look_;
+    if (!is_unchanged) unchanged_since_[axis] = read_back_number_;
     if (lately.count == 0) {
       // Not driven yet: the first command starts from the previous read-back.
       explained = explained && (!to_be_driven || is_unchanged);
@@ -100,7 +100,7 @@ bool WriteGate::check_read_back(const std::array<double, axes_max>& applied_um) 
 
 /// True if the axis has moved since its first command was computed.
 bool WriteGate::moved_since_command(std::size_t axis) const noexcept {
-  return command_.valid[axis] && sent_[axis].count == 0 && command_.look < unchanged_since_[axis];
+  return command_.valid[axis] && sent_[axis].count == 0 && command_.read_back_number < unchanged_since_[axis];
 }
 
 void WriteGate::offered(const OffsetCommand& command, nanoseconds computed_at) noexcept {

@@ -117,7 +117,7 @@ class WriteGate {
   /// The newest epoch; 0: never synchronised.
   [[nodiscard]] std::uint32_t epoch() const noexcept { return epoch_; }
   /// Number of the last read-back: counts synchronised() and check_read_back().
-  [[nodiscard]] std::uint64_t look() const noexcept { return look_; }
+  [[nodiscard]] std::uint64_t read_back_number() const noexcept { return read_back_number_; }
 
   /// Takes the command that the cycle offers, possibly the same again.
   void offered(const OffsetCommand& command, nanoseconds computed_at) noexcept;
@@ -159,7 +159,7 @@ class WriteGate {
   bool in_sync_{false};
   bool link_is_new_{true};
   std::uint32_t epoch_{0};
-  std::uint64_t look_{0};
+  std::uint64_t read_back_number_{0};
   OffsetCommand command_{};
   nanoseconds computed_at_{};
   std::optional<nanoseconds> last_sent_;     ///< in this epoch
@@ -176,7 +176,7 @@ class WriteGate {
   std::array<SentLately, axes_max> sent_{};
   std::array<double, axes_max> applied_um_{};  ///< last read-back with a number
   std::array<bool, axes_max> unseen_{};        ///< was read back and is not now
-  /// look() at which the read-back of an axis last jumped.
+  /// read_back_number() at which that of an axis last jumped.
   std::array<std::uint64_t, axes_max> unchanged_since_{};
   std::array<double, axes_max> slack_um_{};
 };

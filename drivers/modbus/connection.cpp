@@ -266,7 +266,7 @@ void ModbusConnection::Implementation::await_answer(nanoseconds deadline, Exchan
   nanoseconds until = deadline;
   bool is_over = false;  // unrelated bytes may arrive endlessly
   while (true) {
-    const ModbusFrames::Found found = frames_.look();
+    const ModbusFrames::Found found = frames_.find();
     in_step_ = found != ModbusFrames::Found::no_frame;
     if (found == ModbusFrames::Found::answer) {
       exchange.arrived_at = port_->now();

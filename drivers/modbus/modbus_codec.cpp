@@ -133,7 +133,7 @@ bool ModbusFrames::is_full() const noexcept {
          (part.size() >= 5 && (part[1] & exception_bit) != 0);
 }
 
-ModbusFrames::Found ModbusFrames::look() {
+ModbusFrames::Found ModbusFrames::find() {
   return rtu_ ? look_rtu() : look_tcp();
 }
 

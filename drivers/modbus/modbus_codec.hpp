@@ -61,7 +61,7 @@ class ModbusFrames {
     other,    ///< another frame, see unexpected_text()
     no_frame  ///< as `other`, and the start of the next frame is unknown
   };
-  [[nodiscard]] Found look();
+  [[nodiscard]] Found find();
   [[nodiscard]] std::span<const std::uint8_t> answer() const noexcept { return answer_; }
   /// True if a frame is incomplete.
   [[nodiscard]] bool has_part() const noexcept { return received_ > begin_; }

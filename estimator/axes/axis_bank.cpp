@@ -31,7 +31,7 @@ void AxisBank::step(const StepTime& time, const Targets& targets, bool online,
   input.written = controller.written;
   input.taken_at = controller.taken_at;
   command.link_epoch = controller.link_epoch;
-  command.look = controller.look;
+  command.read_back_number = controller.read_back_number;
   for (const AxisSpan& span : spans_) {
     for (std::size_t i = span.first; i < span.end(); ++i) {
       input.applied_um = controller.applied_um[i];

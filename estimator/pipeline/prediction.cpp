@@ -97,10 +97,14 @@ ReferenceState Reference::step(nanoseconds now, const Temperatures& temps,
       temps_degC_[i] = not_a_number;
       state.changed = true;
     }
-    if (!std::isfinite(temps_degC_[i]) && temps.good[i] != 0) {
-      temps_degC_[i] = temps.measured_degC[i];
-      sampled_at_[i] = now;
-      state.changed = true;
+    if (temps.good[i] != 0) {
+      if (!std::isfinite(temps_degC_[i])) {
+        temps_degC_[i] = temps.measured_degC[i];
+        sampled_at_[i] = now;
+        state.changed = true;
+      } else if (std::abs(temps.measured_degC[i] - temps_degC_[i]) > provisional_K) {
+        sampled_at_[i] = never;
+      }
     }
     if (!std::isfinite(temps_degC_[i])) state.known = false;
   }

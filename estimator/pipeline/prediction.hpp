@@ -95,12 +95,15 @@ struct ReferenceState {
 /// such numbers, which mean a machine at rest; a sampled reference defines zero displacement in the
 /// present state, so its signals are those of that moment.
 ///
-/// A first good value is provisional for `provisional_time`: if a jump of its sensor begins in that
-/// time and is confirmed, the value was wrong and the column's reference is taken anew. (Waiting
-/// for a steady machine instead would leave one that is started warm without compensation.)
+/// A first good value is provisional for `provisional_time`, or until the column has moved by
+/// `provisional_K`, which a value that a module gives until it is ready does not: if a jump of its
+/// sensor begins before that and is confirmed, the value was wrong, and the column's reference is
+/// taken again. (Waiting for a steady machine instead would leave one that is started warm without
+/// compensation.)
 class Reference {
  public:
   static constexpr nanoseconds provisional_time = std::chrono::minutes(10);
+  static constexpr double provisional_K = 0.5;
 
   explicit Reference(const ThermalModel& model);
 
@@ -132,7 +135,7 @@ class Reference {
   const std::vector<std::string> signal_names_;
 
   std::vector<double> temps_degC_;
-  std::vector<nanoseconds> sampled_at_;  ///< one per column; min(): not a first value
+  std::vector<nanoseconds> sampled_at_;  ///< one per column; min(): not provisional
   std::vector<double> signals_;
 };
 

@@ -221,7 +221,7 @@ bool BlockBank::join(std::span<const std::uint8_t> left_out) noexcept {
 }
 
 void BlockBank::look_at(Sensor& sensor, nanoseconds now, const Reading& reading) noexcept {
-  sensor.fresh = sensor.screening.look(now, reading);
+  sensor.fresh = sensor.screening.step(now, reading);
   sensor.raw_degC = reading.temp_degC;
   sensor.fault = sensor.screening.fault(now);
   if (sensor.screening.waiting()) {

@@ -64,7 +64,7 @@ class Screening {
   explicit Screening(const ScreeningConfig& config);
 
   /// @return true for a new good reading, available by good_degC() and good_at()
-  bool look(nanoseconds now, const Reading& reading) noexcept {
+  bool step(nanoseconds now, const Reading& reading) noexcept {
     if (reading.taken_at == state_.seen_at && reading.fault == state_.seen_fault) return false;
     return take(now, reading);
   }

@@ -234,7 +234,7 @@ TEST_CASE("the end of the CAN link sends the newest command once more", "[vm][co
   }));
   OffsetCommand command;
   command.link_epoch = state.link_epoch;
-  command.look = state.look;
+  command.read_back_number = state.read_back_number;
   command.offset_um[0] = 1.5;
   command.valid[0] = true;
   link.offer(command);

@@ -107,7 +107,7 @@ void BridgeController::publish(const BridgeReport& report, bool taking, nanoseco
   state_.online = true;
   state_.written = gate_.written(now);
   state_.link_epoch = gate_.epoch();
-  state_.look = gate_.look();
+  state_.read_back_number = gate_.read_back_number();
   state_.signals = report.signals;
   state_.applied_um = report.applied_um;
   if (!taking) state_.applied_um.fill(not_a_number);

@@ -42,7 +42,7 @@ struct Bench {
   void want(double x_um, double z_um) {
     OffsetCommand command;
     command.link_epoch = state().link_epoch;
-    command.look = state().look;
+    command.read_back_number = state().read_back_number;
     command.offset_um = {x_um, z_um};
     command.valid = {true, true};
     link.offer(command);

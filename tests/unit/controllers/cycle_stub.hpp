@@ -48,7 +48,7 @@ class Cycle {
         const std::scoped_lock lock(mutex_);
         link_.newest(state_);
         wanted_.link_epoch = fixed_epoch != 0 ? fixed_epoch.load() : state_.link_epoch;
-        wanted_.look = state_.look;
+        wanted_.read_back_number = state_.read_back_number;
         if (!hung) link_.offer(wanted_);
       }
       std::this_thread::sleep_for(std::chrono::milliseconds{10});

@@ -258,6 +258,22 @@ TEST_CASE("a controller that restarts while another end of the link answers is a
   link.stop();
 }
 
+TEST_CASE("registers that are cleared on a link that lives begin another link", "[controllers]") {
+  ModbusMachine machine;
+  ModbusController link(without_read_back(three_axes(machine.port())));
+  Cycle cycle(link);
+  cycle.want(0, -5.46);
+  REQUIRE(eventually([&] { return cycle.state().written && int32_of(machine, 0) == -546; }));
+  std::this_thread::sleep_for(100ms);  // compared: the registers hold what is written
+  const std::uint32_t epoch = cycle.state().link_epoch;
+  cycle.fixed_epoch = epoch;  // commands for the link before are not sent on another
+  for (const int address : {0, 1}) machine.set_holding(address, 0);
+  REQUIRE(eventually([&] { return !is_same_link(cycle.state().link_epoch, epoch); }));
+  CHECK(cycle.state().applied_um[0] == 0.0);
+  CHECK(int32_of(machine, 0) == 0);
+  link.stop();
+}
+
 TEST_CASE("while a read-back is no number, nothing is written", "[controllers]") {
   ModbusMachine machine;
   ModbusControllerConfig config = three_axes(machine.port());
@@ -541,7 +557,7 @@ TEST_CASE("at its end the link writes the newest command once more and nothing e
   }));
   OffsetCommand command;
   command.link_epoch = state.link_epoch;
-  command.look = state.look;
+  command.read_back_number = state.read_back_number;
   command.offset_um[0] = 1.5;
   command.valid[0] = true;
   link.offer(command);

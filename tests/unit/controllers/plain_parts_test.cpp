@@ -214,7 +214,7 @@ TEST_CASE("a command computed before an axis moved elsewhere is not sent", "[con
   OffsetCommand command = of_epoch(gate.epoch());
   command.offset_um[0] = 20.0;
   command.valid[0] = true;
-  command.look = gate.look();
+  command.read_back_number = gate.read_back_number();
   CHECK(gate.check_read_back(applied_um));
   applied_um[0] = 0.0;  // re-homed; no command of this epoch yet
   CHECK(gate.check_read_back(applied_um));
@@ -223,7 +223,7 @@ TEST_CASE("a command computed before an axis moved elsewhere is not sent", "[con
   CHECK(gate.check_read_back(applied_um));
   CHECK(gate.verdict(0s) == SendVerdict::resynchronise);
   command.offset_um[0] = 0.0;
-  command.look = gate.look();
+  command.read_back_number = gate.read_back_number();
   gate.offered(command, 0s);
   CHECK(gate.verdict(0s) == SendVerdict::send);
   gate.sent(0s);
@@ -458,7 +458,7 @@ TEST_CASE("a controller that moves between read-back and first command is detect
   applied_um[0] = 23.0;
   OffsetCommand command;
   command.link_epoch = gate.synchronised(applied_um);
-  command.look = gate.look();
+  command.read_back_number = gate.read_back_number();
   command.offset_um[0] = 23.1;
   command.valid[0] = true;
   gate.offered(command, 1s);

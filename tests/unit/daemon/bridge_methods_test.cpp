@@ -40,7 +40,7 @@ TEST_CASE("a report becomes the controller's state and is answered", "[daemon][b
   CHECK(state.signals[1] == 1.0);
   OffsetCommand command;
   command.link_epoch = 1;
-  command.look = 1;
+  command.read_back_number = 1;
   command.valid[0] = true;
   command.offset_um[0] = 2.75;
   rig.bridge.offer(command);

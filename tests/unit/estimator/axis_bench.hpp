@@ -26,13 +26,13 @@ struct Bench {
     input.now += std::chrono::milliseconds(100);
     input.taken_at = input.now;
     input.target_um = target_um;
-    look();
+    read_back();
   }
   void steps(int count, double target_um) {
     for (int i = 0; i < count; ++i) step(target_um);
   }
   /// One step with the present input.
-  void look() {
+  void read_back() {
     Targets targets;
     targets.axis_um = {&input.target_um, 1};
     targets.may_change = input.may_change;

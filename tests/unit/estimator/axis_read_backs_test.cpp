@@ -175,7 +175,7 @@ TEST_CASE("after a disagreement an old read-back does not start an axis", "[axis
   for (int i = 0; i < 20; ++i) {  // the same read-back again and again
     bench.input.now += 100ms;
     bench.input.taken_at = taken_at;
-    bench.look();
+    bench.read_back();
     CHECK_FALSE(bench.axis().driven());
   }
 }

@@ -134,7 +134,7 @@ TEST_CASE("a repeated release does not restart the wait for the read-backs of a 
     bench.release();
     bench.input.now += 100ms;
     if (steps % 10 == 0) bench.input.taken_at = bench.input.now;  // one read-back per second
-    bench.look();
+    bench.read_back();
   }
   CHECK(steps <= 61);
 }
@@ -203,7 +203,7 @@ TEST_CASE("an offset that a pausing link did not write is not judged", "[axis]")
   bench.input.applied_um = 10 * bench.axis().offset_um();  // within the tolerance of the link
   bench.input.now += 10ms;  // the offset moves on, and the command is written
   bench.input.taken_at = bench.input.now;
-  bench.look();
+  bench.read_back();
   const double written_um = bench.axis().offset_um();
   bench.step(-3.0);
   bench.input.applied_um = 10 * written_um;

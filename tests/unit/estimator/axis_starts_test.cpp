@@ -207,7 +207,7 @@ TEST_CASE("a controller that was not there when the program began may have resta
     bench.input.online = false;
     for (int i = 0; i < static_cast<int>(10 * away_s); ++i) {
       bench.input.now += 100ms;
-      bench.look();
+      bench.read_back();
     }
     bench.input.link_epoch = 1;
     bench.input.online = true;

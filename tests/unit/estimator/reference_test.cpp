@@ -148,6 +148,19 @@ TEST_CASE("a first value refuted by a confirmed jump while young is taken anew",
     moment.refuted_at[0] = 99s;
     CHECK_FALSE(moment.step(reference).changed);
   }
+  SECTION("it had moved since") {
+    Reference moving(model_with_growth());
+    moment.now = 100s;
+    moment.temps_degC = {20.0, 21.0};
+    REQUIRE(moment.step(moving).known);
+    moment.now = 130s;
+    moment.temps_degC[0] = 20.0 + Reference::provisional_K + 0.1;
+    CHECK_FALSE(moment.step(moving).changed);
+    moment.now = 200s;
+    moment.temps_degC[0] = 28.0;
+    moment.refuted_at[0] = 145s;
+    CHECK(moment.step(moving).temps_degC[0] == 20.0);
+  }
   SECTION("an operator had taken it") {
     reference.take(std::vector<double>{0.0, 21.0});
     moment.refuted_at[0] = 145s;

@@ -27,7 +27,7 @@ ScreeningConfig settling() {
 }
 
 bool look(Screening& screening, nanoseconds at, double temp_degC) {
-  return screening.look(at, {temp_degC, at, Fault::none});
+  return screening.step(at, {temp_degC, at, Fault::none});
 }
 
 /// Once per second in [from, to). @return number of confirmed values
@@ -42,7 +42,7 @@ int look_each_second(Screening& screening, std::chrono::seconds from, std::chron
 
 TEST_CASE("nothing is usable before the first good reading", "[screening]") {
   Screening screening(plain());
-  CHECK_FALSE(screening.look(0s, Reading{}));
+  CHECK_FALSE(screening.step(0s, Reading{}));
   CHECK_FALSE(screening.usable(0s));
   CHECK(screening.fault(0s) == Fault::never_read);
   CHECK(screening.rejected() == 0);
@@ -58,7 +58,7 @@ TEST_CASE("every fault of a driver refuses the reading; the next good one is acc
     CAPTURE(to_string(fault));
     Screening screening(plain());
     look(screening, 1s, 20.0);
-    CHECK_FALSE(screening.look(2s, {20.0, 2s, fault}));
+    CHECK_FALSE(screening.step(2s, {20.0, 2s, fault}));
     CHECK(screening.fault(2s) == fault);
     CHECK(screening.good_degC() == 20.0);
     CHECK(screening.good_at() == 1s);
@@ -90,8 +90,8 @@ TEST_CASE("a reading outside the range or not a number is refused", "[screening]
 TEST_CASE("a reading is judged once", "[screening]") {
   Screening screening(plain());
   CHECK(look(screening, 1s, 20.0));
-  CHECK_FALSE(screening.look(2s, {20.0, 1s, Fault::none}));
-  CHECK_FALSE(screening.look(3s, {55.0, 1s, Fault::none}));
+  CHECK_FALSE(screening.step(2s, {20.0, 1s, Fault::none}));
+  CHECK_FALSE(screening.step(3s, {55.0, 1s, Fault::none}));
   CHECK(screening.good_degC() == 20.0);
   CHECK(screening.rejected() == 0);
 }
@@ -111,19 +111,19 @@ TEST_CASE("a reading from the future is stale and does not block the following o
           "[screening]") {
   Screening screening(plain());
   look(screening, 1s, 20.0);
-  CHECK_FALSE(screening.look(2s, {20.0, 3600s, Fault::none}));
+  CHECK_FALSE(screening.step(2s, {20.0, 3600s, Fault::none}));
   CHECK(screening.fault(2s) == Fault::stale);
   CHECK(look(screening, 3s, 20.0));
-  CHECK_FALSE(screening.look(4s, {20.0, nanoseconds::max(), Fault::none}));
-  CHECK_FALSE(screening.look(4s, {20.0, nanoseconds::min(), Fault::none}));
+  CHECK_FALSE(screening.step(4s, {20.0, nanoseconds::max(), Fault::none}));
+  CHECK_FALSE(screening.step(4s, {20.0, nanoseconds::min(), Fault::none}));
   // Taken during the start of the cycle: slightly ahead is normal.
-  CHECK(screening.look(5s, {20.0, 5s + 1ms, Fault::none}));
+  CHECK(screening.step(5s, {20.0, 5s + 1ms, Fault::none}));
 }
 
 TEST_CASE("a reading out of order has no new information", "[screening]") {
   Screening screening(plain());
   look(screening, 3s, 20.0);
-  CHECK_FALSE(screening.look(4s, {20.9, 2s, Fault::none}));
+  CHECK_FALSE(screening.step(4s, {20.9, 2s, Fault::none}));
   CHECK(screening.fault(4s) == Fault::stale);
   CHECK(screening.good_degC() == 20.0);
   CHECK(look(screening, 5s, 20.2));

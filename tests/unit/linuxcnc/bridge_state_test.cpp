@@ -70,6 +70,18 @@ TEST_CASE("without answers the offset stays, is no longer fresh, and a warning i
   CHECK_FALSE(bench.answered(offsets(0.01), machine(0.01)).warning);
 }
 
+TEST_CASE("an axis without an offset for longer than an answer is fresh is not compensated",
+          "[linuxcnc]") {
+  const Answer not_driven{false, "compensating", {std::nullopt}, false};
+  Bench bench;
+  bench.answered(offsets(0.01), machine(0.01));
+  CHECK(bench.answered(not_driven, machine(0.01)).compensating);  // one late cycle
+  for (int i = 0; i < 20; ++i) bench.answered(not_driven, machine(0.01));
+  CHECK_FALSE(bench.answered(not_driven, machine(0.01)).compensating);
+  for (int i = 0; i < 60; ++i) bench.answered(not_driven, machine(0.01));
+  CHECK(bench.answered(not_driven, machine(0.01)).warning);
+}
+
 TEST_CASE("a new epoch starts from the applied offset", "[linuxcnc]") {
   Bench bench;
   CHECK(bench.answered(begin_anew, machine(0.03)).offset_mm[0] == 0.03);

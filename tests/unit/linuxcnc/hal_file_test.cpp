@@ -108,6 +108,31 @@ TEST_CASE("a pin already on a signal of the machine is read from that signal", "
   CHECK(signals.at("tc.offset-z.out") == "z-cmd");
 }
 
+TEST_CASE("a signal for a pin that the file does not connect is refused", "[linuxcnc]") {
+  for (const char* pin : {"motion.motion-enabld", "tc.offset-q.out", "joint.2.motor-pos-cmd"}) {
+    INFO(pin);
+    HalFileOptions made = options(Way::joint, "z=2");
+    made.signals = {{pin, "s"}};
+    CHECK_THROWS_AS(hal_file(made), BadOption);
+  }
+}
+
+TEST_CASE("limits are numbers in the machine's unit, which the bridge is told", "[linuxcnc]") {
+  HalFileOptions made = options(Way::external, "z=2");
+  CHECK(has(hal_file(made), "setp tc.limit-z.max 0.2"));
+  made.unit = "inch";
+  const std::string inch = hal_file(made);
+  CHECK(has(inch, "setp tc.limit-z.min -0.00787401575"));
+  CHECK(has(inch, "setp tc.limit-z.maxv 0.00196850394"));
+  CHECK(inch.find(" --units [TRAJ]LINEAR_UNITS --made-for inch") != std::string::npos);
+  // Commands for a running LinuxCNC are executed without its ini file.
+  CHECK(rejoin_file(made, "second").find(" --units inch --made-for inch") != std::string::npos);
+  made.unit = "cm";
+  CHECK_THROWS_AS(hal_file(made), BadOption);
+  CHECK(unit_mm("imperial") == 25.4);
+  CHECK(unit_mm("metric") == 1.0);
+}
+
 TEST_CASE("a killed bridge's signals are taken over, a bridge that ended is loaded again",
           "[linuxcnc]") {
   const std::string over = rejoin_file(options(Way::external, "x=0"), "second");
@@ -149,12 +174,17 @@ TEST_CASE("the command line is parsed, and an invalid one ends with status 2", "
     words.insert(words.begin(), "thermocomp-linuxcnc");
     return read_command_line(static_cast<int>(words.size()), words.data(), status);
   };
-  const auto bridge = read({"--name", "b", "--axes", "xz", "--socket", "/s", "--period-s", "0.1"});
+  const auto bridge = read({"--name", "b", "--axes", "xz", "--socket", "/s", "--period-s", "0.1",
+                            "--units", "inch", "--made-for", "imperial"});
   REQUIRE(bridge);
   CHECK_FALSE(bridge->print_hal);
   CHECK(bridge->bridge.name == "b");
   CHECK(bridge->bridge.axes == "xz");
   CHECK(bridge->bridge.period_s == 0.1);
+  CHECK(bridge->bridge.unit == "inch");
+  CHECK_THROWS_AS(read({"--units", "inch"}), BadOption);  // the HAL file was made for mm
+  CHECK_THROWS_AS(read({"--units", "cm"}), BadOption);
+  CHECK_FALSE(read({"--axes", "x"}));  // without units
   const auto hal = read({"hal", "--way", "external", "--axes", "x=0,z=2", "--signal", "a.b=c"});
   REQUIRE(hal);
   CHECK(hal->print_hal);

@@ -533,7 +533,7 @@ void CanController::publish(bool online, nanoseconds now) {
   state_.online = online;
   state_.written = gate_.written(now);
   state_.link_epoch = gate_.epoch();
-  state_.look = gate_.look();
+  state_.read_back_number = gate_.read_back_number();
   state_.taken_at = now;
   for (const Incoming& frame : incoming_)
     state_.taken_at = std::min(state_.taken_at, frame.received_at);

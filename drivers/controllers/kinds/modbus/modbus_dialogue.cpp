@@ -137,7 +137,7 @@ void ModbusDialogue::act() {
 }
 
 void ModbusDialogue::end() {
-  look_for_command();
+  take_command();
   if (gate_.verdict(connection_.now()) == SendVerdict::send) write_command();
 }
 
@@ -248,10 +248,27 @@ bool ModbusDialogue::has_restarted() {
   return false;
 }
 
+/// A controller whose program starts again may keep the link; its registers are then 0. One axis with
+/// an offset shows it.
+bool ModbusDialogue::is_cleared() {
+  for (const std::optional<WrittenOffsets>& written : written_) {
+    if (!written || !written->holds_an_offset()) continue;
+    const ReadRequest& request = written->request();
+    std::vector<std::uint16_t> words(request.count);
+    const Exchange exchange = connection_.read(config_.unit, request.table, request.address, words);
+    return exchange.ok() && written->is_cleared(words);
+  }
+  return false;
+}
+
 /// Done before the next write, since a controller's program may change a register at its next scan.
 /// @return false: the link is lost
 bool ModbusDialogue::compare_written() {
   if (!write_taken_) return true;
+  if (is_cleared()) {
+    lose(true);  // synchronise() finds that it has restarted
+    return false;
+  }
   const bool is_due = connection_.now() >= compare_at_;
   if (is_due) compare_at_ = connection_.now() + gate_.patience();
   bool held = true;
@@ -272,20 +289,20 @@ bool ModbusDialogue::compare_written() {
 }
 
 /// One period: reads, and writes only if the offsets written explain the read-back. So no command
-/// computed before a re-homing was seen is written after it (a command carries the look it was
+/// computed before a re-homing was seen is written after it (a command carries the number of the read-back it was
 /// computed from), and a slow controller still gets the newest command. A write without answer is
 /// not repeated before another read, since the controller can restart during the time-out. A
 /// refused write waits for the next period.
 void ModbusDialogue::exchange() {
   write_failed_ = false;
-  look_for_command();
+  take_command();
   for (int retries = config_.line.retries;; --retries) {
-    if (!look()) {
+    if (!read_and_judge()) {
       if (!ending_.load()) lose(refused_);
       return;
     }
     if (!shows_piezos()) return;
-    look_for_command();
+    take_command();
     const SendVerdict verdict = gate_.verdict(connection_.now());
     if (verdict == SendVerdict::resynchronise) lose(true);
     if (verdict != SendVerdict::send) return;
@@ -296,7 +313,7 @@ void ModbusDialogue::exchange() {
   }
 }
 
-bool ModbusDialogue::look() {
+bool ModbusDialogue::read_and_judge() {
   if (!read_all()) return false;
   show_piezos();
   if (!gate_.check_read_back(judged_um())) {
@@ -316,7 +333,7 @@ bool ModbusDialogue::shows_piezos() const noexcept {
   return true;
 }
 
-void ModbusDialogue::look_for_command() {
+void ModbusDialogue::take_command() {
   if (commands_.fresh()) gate_.offered(commands_.front().command, commands_.front().computed_at);
 }
 
@@ -531,7 +548,7 @@ void ModbusDialogue::publish(bool online) {
   state_.online = online;
   state_.written = gate_.written(connection_.now());
   state_.link_epoch = gate_.epoch();
-  state_.look = gate_.look();
+  state_.read_back_number = gate_.read_back_number();
   states_.back() = state_;
   states_.publish();
 }

@@ -76,9 +76,10 @@ class ModbusDialogue final : public LineUser {
   [[nodiscard]] bool compare_written();
   void exchange();
   /// Reads all; begins a new epoch if the read-back is unexplained. @return false if reading failed
-  bool look();
+  bool read_and_judge();
+  bool is_cleared();
   [[nodiscard]] bool shows_piezos() const noexcept;
-  void look_for_command();
+  void take_command();
   bool write_command();
   bool write(const WriteField& request);
   void note_confirmed(nanoseconds now);

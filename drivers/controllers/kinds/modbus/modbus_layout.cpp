@@ -173,6 +173,14 @@ ReadRequest request_of(const ModbusAxis& axis) {
 
 }  // namespace
 
+namespace {
+
+bool is_zero(std::span<const std::uint16_t> words) noexcept {
+  return std::all_of(words.begin(), words.end(), [](std::uint16_t word) { return word == 0; });
+}
+
+}  // namespace
+
 WrittenOffsets::WrittenOffsets(const ModbusAxis& axis) : axis_(axis), request_(request_of(axis)) {}
 
 std::vector<double> WrittenOffsets::decode(std::span<const std::uint16_t> words) const {
@@ -208,6 +216,14 @@ bool WrittenOffsets::is_one_written(std::span<const std::uint16_t> words) const 
          std::ranges::equal(words, taken_);
 }
 
+bool WrittenOffsets::holds_an_offset() const noexcept {
+  return holds_known_offset() && !is_zero(taken_);
+}
+
+bool WrittenOffsets::is_cleared(std::span<const std::uint16_t> words) const noexcept {
+  return is_zero(words) && !is_one_written(words);
+}
+
 void WrittenOffsets::left_out() {
   taken_.clear();
   words_.clear();
@@ -220,7 +236,7 @@ bool WrittenOffsets::is_to_be_compared(bool is_due) const noexcept {
   if (words_.empty() || held_ == Held::no) return false;
   if (held_ == Held::yes) return is_due;
   // Registers that hold nothing are also read as zeros.
-  return std::any_of(words_.begin(), words_.end(), [](std::uint16_t word) { return word != 0; });
+  return !is_zero(words_);
 }
 
 void WrittenOffsets::compare(std::span<const std::uint16_t> words) {

@@ -113,6 +113,10 @@ class WrittenOffsets {
   }
   /// True if the registers hold the newest offsets written or the newest ones answered.
   [[nodiscard]] bool is_one_written(std::span<const std::uint16_t> words) const noexcept;
+  /// True if the registers are known to hold offsets that are not all 0.
+  [[nodiscard]] bool holds_an_offset() const noexcept;
+  /// True if the registers held offsets and are all 0.
+  [[nodiscard]] bool is_cleared(std::span<const std::uint16_t> words) const noexcept;
   /// "-17.30 was written, -5.46 is read"; empty: writes are taken, or it is unknown.
   [[nodiscard]] const std::string& difference_text() const noexcept { return untaken_; }
 
