@@ -212,7 +212,14 @@ void HttpServer::Exchange::later(AnswerThread& answers, AnswerThread::Work work)
   result_ = MHD_YES;
 }
 
+/// Open pages leave a tenth of the connections to everything else: the metrics, new pages' files.
 void HttpServer::Exchange::stream(EventStreams& streams) {
+  const std::size_t most = server_.settings.connections_max;
+  if (streams.count() + std::max<std::size_t>(1, most / 10) >= most) {
+    result_ = server_.answer(connection_, MHD_HTTP_SERVICE_UNAVAILABLE, json_type,
+                             error_text("too many pages are open (connections_max)"));
+    return;
+  }
   server_.connections.is_at(socket_of(connection_), SlowConnections::Stage::stream,
                             SlowConnections::Clock::now());
   result_ = server_.queue(connection_, MHD_HTTP_OK, "text/event-stream", streams.open(connection_));

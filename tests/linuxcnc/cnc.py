@@ -4,6 +4,7 @@ import contextlib
 import json
 import os
 import pathlib
+import re
 import shutil
 import socket
 import subprocess
@@ -48,12 +49,23 @@ def hal_file(way, *options):
     return done.stdout
 
 
+def in_unit(ini, unit_mm):
+    """The mill's ini file for a machine in inches, or as it is."""
+    if unit_mm == 1.0:
+        return ini
+    lengths = "LIMIT|VELOCITY|ACCELERATION|SEARCH_VEL|LATCH_VEL|FERROR"
+    return re.sub(rf"^(\w*(?:{lengths}) = )(-?[\d.]+)$",
+                  lambda m: f"{m[1]}{float(m[2]) / unit_mm:.6f}",
+                  ini.replace("LINEAR_UNITS = mm", "LINEAR_UNITS = inch"), flags=re.MULTILINE)
+
+
 class LinuxCnc:
     """One run of LinuxCNC; methods of its operator are available on this object."""
 
-    def __init__(self, folder, way, daemon_socket):
+    def __init__(self, folder, way, daemon_socket, unit_mm=1.0):
         self.folder = folder
         self.way = way
+        self.unit_mm = unit_mm
         # 1 s: long enough to show that the warning comes, and that it does not come at once.
         self.bridge_arguments = f"--socket {daemon_socket} --mismatch-after-s 1.0"
         self.process = None
@@ -64,9 +76,10 @@ class LinuxCnc:
         ini = (EXAMPLE / f"{self.way}.ini").read_text()
         ini = ini.replace("DISPLAY = axis", "DISPLAY = ./machine_operator.py")
         ini = ini.replace("HALFILE = thermal.hal", "HALFILE = thermal.hal\nHALFILE = sampler.hal")
-        (self.folder / f"{self.way}.ini").write_text(ini)
+        (self.folder / f"{self.way}.ini").write_text(in_unit(ini, self.unit_mm))
         (self.folder / "thermal.hal").write_text(
-            hal_file(self.way, f"--arguments={self.bridge_arguments}"))
+            hal_file(self.way, f"--arguments={self.bridge_arguments}",
+                     *(["--units", "inch"] if self.unit_mm != 1.0 else [])))
         (self.folder / "sampler.hal").write_text(sampler_file())
         shutil.copy(HERE / "machine_operator.py", self.folder)
         for path in (self.folder, *self.folder.rglob("*")):

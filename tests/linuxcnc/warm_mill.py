@@ -124,7 +124,8 @@ def expected_um(axis):
 class WarmMill:
     """LinuxCNC, daemon and simulator. The daemon's socket is visible in LinuxCNC's namespaces."""
 
-    def __init__(self, way, machine, time_factor, rate_um_per_s, silent_after_s):
+    def __init__(self, way, machine, time_factor, rate_um_per_s, silent_after_s,
+                 unit_mm=1.0):
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="tc"))
         self.folder.chmod(0o755)
         (self.folder / "cnc").mkdir()
@@ -143,7 +144,7 @@ class WarmMill:
         # LinuxCNC runs as user nobody: only its group lets it report.
         with self.daemon.config.open("a") as config:
             config.write('bridge_group = "nogroup"\n')
-        self.cnc = LinuxCnc(self.folder / "cnc", way, "/mnt/run/status.sock")
+        self.cnc = LinuxCnc(self.folder / "cnc", way, "/mnt/run/status.sock", unit_mm)
 
     def close(self):
         try:
@@ -158,7 +159,8 @@ class WarmMill:
             shutil.rmtree(self.folder, ignore_errors=True)
 
     def drives_mm(self):
-        return dict(zip(AXES, self.cnc.pins(*(f"drive-{a}.out" for a in AXES))))
+        drives = self.cnc.pins(*(f"drive-{a}.out" for a in AXES))
+        return {a: self.cnc.unit_mm * at for a, at in zip(AXES, drives)}
 
     def settled(self, tolerance_um=0.2):
         """The status of the axes if the daemon compensates and LinuxCNC applies the wanted offsets,
@@ -176,7 +178,7 @@ class WarmMill:
     def errors_um(self, **target_mm):
         """Moves to an absolute position: drive less command less wanted offset per axis, and the
         axes' status."""
-        self.cnc.mdi("G53 G0 " + " ".join(f"{a.upper()}{mm}" for a, mm in target_mm.items()))
+        self.cnc.mdi("G21 G53 G0 " + " ".join(f"{a.upper()}{mm}" for a, mm in target_mm.items()))
         return self.errors_here_um(**target_mm)
 
     def errors_here_um(self, **target_mm):

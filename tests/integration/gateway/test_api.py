@@ -168,6 +168,16 @@ def test_a_page_of_a_machine_at_rest_uses_little_cpu(machine, gateway):
     assert len(whole) == 1 and later * 7200 < 2e6
 
 
+def test_open_pages_leave_a_connection_to_the_metrics(lab, machine):
+    gateway = lab.also_end(Gateway(lab, machine.daemon, "connections_max = 4")).start()
+    with contextlib.ExitStack() as pages:
+        for _ in range(3):
+            pages.enter_context(gateway.events())
+        status, _, body = gateway.ask("/api/events")
+        assert status == 503 and b"connections_max" in body
+        assert "thermocomp_up 1" in gateway.text("/metrics")
+
+
 def test_metrics_are_clean_and_have_every_sensor_axis_and_bus(machine, gateway):
     gateway.wait_for(lambda s: s["verdict"]["level"] == "good", "nothing is wrong")
     text = gateway.text("/metrics")
