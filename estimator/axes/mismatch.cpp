@@ -76,7 +76,7 @@ std::string likely_text(const Mismatch& mismatch) {
         return "reads back nothing of what is sent: not taken, or check scale";
       return "does not follow the offset sent: not taken (rejected, or stopped)";
     case MismatchCause::changes_alone:
-      return "changes by itself: another writer?";
+      return "changes by itself: another writer, a restart or a limit?";
     case MismatchCause::constant:
       std::snprintf(text.data(), text.size(), "constant %+.1f um: check the offset's zero",
                     mismatch.size);

@@ -183,7 +183,7 @@ TEST_CASE("the usual mistakes of commissioning are reported by name", "[axis]") 
   bench.obeys = false;
   bench.input.applied_um = 31.0;
   bench.steps(3, 10.0);
-  CHECK(cause_text(bench) == "changes by itself: another writer?");
+  CHECK(cause_text(bench) == "changes by itself: another writer, a restart or a limit?");
 }
 
 TEST_CASE("a controller that stops taking offsets is no other writer", "[axis]") {
