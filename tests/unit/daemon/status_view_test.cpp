@@ -22,9 +22,10 @@ TEST_CASE("values that are being confirmed after an outage are named, with the t
   }
   const ControllerState controller;
   const CycleTiming timing;
+  double uptime_s = 0.0;
   const auto confirming = [&] {
-    return status_of(
-               StatusView{config, report, controller, timing, {}, {}, {}, {}, {}, 0.0, false, {}})
+    return status_of(StatusView{
+                         config, report, controller, timing, {}, {}, {}, {}, {}, uptime_s, false, {}})
         .confirming;
   };
   REQUIRE(confirming().size() == 1);
@@ -37,8 +38,11 @@ TEST_CASE("values that are being confirmed after an outage are named, with the t
   report.sensors[0].fault = report.sensors[1].fault = Fault::no_answer;
   CHECK(confirming().empty());
   report.sensors[0].fault = Fault::unconfirmed;
-  report.mode = Mode::starting;  // normal there
+  report.mode = Mode::starting;  // normal there, unless it lasts
   CHECK(confirming().empty());
+  uptime_s = 20.0;
+  report.now = std::chrono::seconds(20);
+  CHECK(confirming().size() == 1);
 }
 
 }  // namespace
