@@ -1,7 +1,6 @@
 #include "cli/scan/scan_can.hpp"
 
 #include <algorithm>
-#include <cstdio>
 #include <map>
 #include <optional>
 #include <poll.h>
@@ -111,12 +110,12 @@ void add_id_hint(const CanSignal& signal, const ReceivedFrames& received, ScanCh
   constexpr std::uint32_t group = 0x03FFFF00;
   for (const auto& [id, count] : received.frames) {
     if (id.id == signal.id && id.extended != signal.extended_id)
-      result.hints.push_back(id_name(id) +
+      result.hints.push_back(to_string(id) +
                              " was received: extended_id = " + (id.extended ? "true" : "false"));
     if (!signal.extended_id || !id.extended || ((id.id ^ signal.id) & group) != 0) continue;
     if (id.id == signal.id) continue;
     result.hints.push_back(
-        id_name(id) +
+        to_string(id) +
         " was received, the same J1939 group from another address: give "
         "the sensor that id, or the message of the DBC file VFrameFormat J1939PG");
   }
@@ -140,7 +139,7 @@ void fill(const CanBusConfig& config, const ScanSensors& sensors, const Received
         judge_age(sensors.stale_after_s.at(channel.sensor), result);
       } else if (bus.error.empty()) {
         result.why = "no frame with identifier " +
-                     id_name({channel.signal.id, channel.signal.extended_id}) + " carried it";
+                     to_string({channel.signal.id, channel.signal.extended_id}) + " carried it";
         add_id_hint(channel.signal, received, result);
       }
     }
@@ -153,8 +152,8 @@ void take(const CanSignal& signal, const ReceivedFrames& received, std::size_t i
   const auto& frame = received.of_signal[index];
   if (!frame) {
     shown.why = received.frames.contains(id)
-                    ? "frames " + id_name(id) + " were received, but none has this value"
-                    : "no frame with identifier " + id_name(id) + " was received";
+                    ? "frames " + to_string(id) + " were received, but none has this value"
+                    : "no frame with identifier " + to_string(id) + " was received";
     return;
   }
   const auto payload = frame->payload();
@@ -175,20 +174,14 @@ std::string received_text(const FrameCounts& frames) {
     return "no frame was received: bit rate, termination (two of 120 Ohm), or no node sends";
   std::string text = "identifiers on the bus:";
   for (const auto& [id, count] : frames) {
-    text.append(" ").append(id_name(id)).append(" (").append(std::to_string(count)).append(")");
+    text.append(" ").append(to_string(id)).append(" (").append(std::to_string(count)).append(")");
     if (text.size() > text_max) return text + " ...";
   }
   return text;
 }
 
-std::string id_name(const CanId& id) {
-  char text[16];
-  std::snprintf(text, sizeof text, id.extended ? "0x%08X" : "0x%03X", id.id);
-  return text;
-}
-
 std::string place_name(const CanSignal& signal) {
-  std::string text = id_name({signal.id, signal.extended_id}) + " bit " +
+  std::string text = to_string({signal.id, signal.extended_id}) + " bit " +
                      std::to_string(signal.start_bit) + " length " +
                      std::to_string(signal.length_bits);
   text += signal.byte_order == ByteOrder::little_endian ? " little_endian" : " big_endian";
