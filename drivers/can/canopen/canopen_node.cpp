@@ -335,8 +335,7 @@ void CanopenNode::take_heartbeat(std::span<const std::uint8_t> data, nanoseconds
     // Mapping and settings may have been changed meanwhile.
     if (left_) return begin_setup(at);
     if (config_.pdo_on_change) renew_pdos(at);
-  } else if (state_ == state_operational &&
-             !(writes_.empty() && config_.mappings_read.empty())) {
+  } else if (state_ == state_operational && !(writes_.empty() && config_.mappings_read.empty())) {
     left_ = true;
     stop_reading(at);
   }

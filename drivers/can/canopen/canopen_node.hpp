@@ -66,8 +66,8 @@ std::vector<std::size_t> place_channels(const CanopenMapping& mapping,
                                         std::vector<CanopenChannel>& channels);
 
 /// States of a node: pre-operational during set-up (writes, each verified; COB-IDs and mappings
-/// read), then started, then read. A reboot, a lost heartbeat or a lost bus restarts the set-up, and
-/// so does the return to operational of a node that left it without our command. Readings are
+/// read), then started, then read. A reboot, a lost heartbeat or a lost bus restarts the set-up,
+/// and so does the return to operational of a node that left it without our command. Readings are
 /// no_answer until it is complete, and device_error if the set-up was refused, two nodes send the
 /// same COB-ID, or the error register shows an emergency that was not heard.
 class CanopenNode {

@@ -170,8 +170,7 @@ void J1939Line::take_claim_of_ours(std::uint64_t name) {
     claim(*own_address_);
     return;
   }
-  own_error_ =
-      "our " + address_text(*own_address_) + " was claimed by " + name_text(name);
+  own_error_ = "our " + address_text(*own_address_) + " was claimed by " + name_text(name);
   own_address_.reset();
   transport_.set_address(std::nullopt);
   claim(address_null);

@@ -271,8 +271,8 @@ TEST_CASE("RTS and CTS: a message sent to us is granted, received and acknowledg
   config.own_address = 0xF9;
   config.own_name = name_b;
   Bus bus(config);
-  CHECK(bus.sent() == std::vector<Sent>{{0x18EEFFF9, name_bytes(name_b)},
-                                        {0x18EAFFF9, ask_for_names.bytes}});
+  CHECK(bus.sent() ==
+        std::vector<Sent>{{0x18EEFFF9, name_bytes(name_b)}, {0x18EAFFF9, ask_for_names.bytes}});
   // 17 bytes in 3 packets, at most 2 per grant.
   bus.put(0x1CECF980, {16, 17, 0, 3, 2, 0x00, 0xEF, 0x00});
   CHECK(bus.sent() == std::vector<Sent>{{0x1CEC80F9, {17, 2, 1, 0xFF, 0xFF, 0x00, 0xEF, 0x00}}});
@@ -370,9 +370,8 @@ TEST_CASE("two NAMEs in turn on one address are two senders", "[j1939][claim]") 
   };
   send(60);
   CHECK(bus.reading().fault == Fault::device_error);
-  CHECK_THAT(bus.error(),
-             Catch::StartsWith("address 0x80 is claimed by 0x8000FF0087654321 and "
-                               "0x8000FF0012345678"));
+  CHECK_THAT(bus.error(), Catch::StartsWith("address 0x80 is claimed by 0x8000FF0087654321 and "
+                                            "0x8000FF0012345678"));
   SECTION("until one of them claims another address") {
     bus.put(0x18EEFF81, name_bytes(name_b));
   }
