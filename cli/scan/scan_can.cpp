@@ -20,6 +20,7 @@ namespace {
 struct ReceivedFrames {
   FrameCounts frames;
   std::vector<std::optional<CanFrame>> of_signal;  ///< newest frame with the signal
+  std::vector<std::vector<double>> values;         ///< by signal
 };
 
 std::vector<const CanSignal*> signals_of(const CanBusConfig& config) {
@@ -35,6 +36,7 @@ ReceivedFrames listen(CanSocket& socket, const std::vector<const CanSignal*>& si
                       double listen_s, const std::vector<double>& stale_after_s) {
   ReceivedFrames received;
   received.of_signal.resize(signals.size());
+  received.values.resize(signals.size());
   const nanoseconds end = monotonic_now() + from_seconds(listen_s);
   const auto may_continue = [&](nanoseconds now) {
     for (std::size_t i = 0; i < stale_after_s.size(); ++i) {
@@ -52,7 +54,10 @@ ReceivedFrames listen(CanSocket& socket, const std::vector<const CanSignal*>& si
       for (std::size_t i = 0; i < signals.size(); ++i) {
         const CanSignal& signal = *signals[i];
         if (!matches(frame.id, signal)) continue;
-        if (carries(frame.payload(), signal)) received.of_signal[i] = frame;
+        if (!carries(frame.payload(), signal)) continue;
+        received.of_signal[i] = frame;
+        const CanValue decoded = decode(frame.payload(), signal);
+        if (decoded.fault == Fault::none) received.values[i].push_back(decoded.value);
       }
     }
   }
@@ -132,16 +137,18 @@ void fill(const CanBusConfig& config, const ScanSensors& sensors, const Received
       result.sensor = sensors.names.at(channel.sensor);
       result.place = place_name(channel.signal);
       result.fault = Fault::never_read;
-      const auto& frame = received.of_signal[index++];
+      const auto& frame = received.of_signal[index];
       if (frame) {
         shown.answers = true;
         judge(channel.signal, *frame, sensors.ranges.at(channel.sensor), result);
         judge_age(sensors.stale_after_s.at(channel.sensor), result);
+        judge_turns(received.values[index], result);
       } else if (bus.error.empty()) {
         result.why = "no frame with identifier " +
                      to_string({channel.signal.id, channel.signal.extended_id}) + " carried it";
         add_id_hint(channel.signal, received, result);
       }
+      ++index;
     }
   }
 }
@@ -171,7 +178,8 @@ void take(const CanSignal& signal, const ReceivedFrames& received, std::size_t i
 std::string received_text(const FrameCounts& frames) {
   constexpr std::size_t text_max = 200;
   if (frames.empty())
-    return "no frame was received: bit rate, termination (two of 120 Ohm), or no node sends";
+    return "no frame was received: bit rate, termination (two of 120 Ohm), or no node sends by "
+           "itself (remote requests are not sent)";
   std::string text = "identifiers on the bus:";
   for (const auto& [id, count] : frames) {
     text.append(" ").append(to_string(id)).append(" (").append(std::to_string(count)).append(")");
@@ -213,9 +221,6 @@ ScanBus scan_bus(const CanBusConfig& config, const ScanSensors& sensors, const S
     received = listen(socket, signals, task.listen_s, stale_after_s);
     if (!socket.error().empty()) bus.error = socket.error();
     bus.note = received_text(received.frames);
-    if (received.frames.empty() && bus.error.empty()) {
-      bus.note = "no frame was received: bit rate, termination (two of 120 Ohm), or no node sends";
-    }
   }
   fill(config, sensors, received, bus);
   return bus;
