@@ -30,6 +30,7 @@ constexpr int mapped_max = 64;
 constexpr nanoseconds first_pause = 1s;
 constexpr nanoseconds longest_pause = 10s;
 constexpr nanoseconds start_again_every = 1s;
+constexpr nanoseconds other_master_lasts = 5s;  // its work on the node
 constexpr nanoseconds second_answer_lasts = 5s;
 
 std::uint16_t pdo_object(std::uint16_t first, std::size_t number) {
@@ -337,6 +338,7 @@ void CanopenNode::take_heartbeat(std::span<const std::uint8_t> data, nanoseconds
     if (config_.pdo_on_change) renew_pdos(at);
   } else if (state_ == state_operational && !(writes_.empty() && config_.mappings_read.empty())) {
     left_ = true;
+    start_again_at_ = at + other_master_lasts;
     stop_reading(at);
   }
   state_ = state;

@@ -74,7 +74,7 @@ TEST_CASE("a channel that jumps between two values in turn has two senders", "[c
   };
   CHECK(fault_of({21.5, 35.25, 21.5, 35.25, 21.5, 35.25}) == Fault::device_error);
   CHECK(fault_of({21.5, 22.2, 21.5, 22.2, 21.6, 22.2, 21.6, 22.3}) == Fault::device_error);
-  CHECK(fault_of({21.5, 22.2, 21.5, 22.2}) == Fault::none);            // too few
+  CHECK(fault_of({21.5, 22.2, 21.5, 22.2}) == Fault::none);              // too few
   CHECK(fault_of({21.5, 21.6, 21.5, 21.6, 21.5, 21.6}) == Fault::none);  // its last digit
   CHECK(fault_of({20, 21, 22, 23, 24, 25, 26}) == Fault::none);
   CHECK(fault_of({21, 22, 22, 21, 22, 21, 21, 22}) == Fault::none);
