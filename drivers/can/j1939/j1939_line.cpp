@@ -185,6 +185,8 @@ void J1939Line::take_claim(std::uint8_t source, std::span<const std::uint8_t> da
     move_node(i, source, name, at);
     note_rivals(i, source, name, at);
   }
+  for (std::optional<Claim>& each : claims_)
+    if (each && each->name == name) each->at = {};  // it has left that address
   claims_[source] = {name, at};
 }
 

@@ -358,6 +358,15 @@ TEST_CASE("a new NAME at a known address is reported", "[j1939][claim]") {
   CHECK(bus.reading().temp_degC == Approx(23.0));
 }
 
+TEST_CASE("a NAME that has left an address is no second sender", "[j1939][claim]") {
+  Bus bus(bus_of(oil()));
+  bus.put(0x18EEFF80, name_bytes(name_b));
+  bus.put(0x18EEFFFE, name_bytes(name_b));
+  bus.put(0x18EEFF80, name_bytes(name_a));
+  bus.put(0x18FEEE80, oil_bytes(0x2500));
+  CHECK(bus.reading().temp_degC == Approx(23.0));
+}
+
 TEST_CASE("two NAMEs in turn on one address are two senders", "[j1939][claim]") {
   Bus bus(bus_of(oil()));
   bus.put(0x18EEFF80, name_bytes(name_b));
