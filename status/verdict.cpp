@@ -89,7 +89,8 @@ class Causes {
       case Reason::block_lost:
       case Reason::block_estimated:
         return !named_inputs_.empty() || only_settles() || !status_.confirming.empty();
-      case Reason::signal_lost:  // signals come from the controller
+      case Reason::signal_lost:  // signals and applied offsets come from the controller
+      case Reason::not_synced:
         return has_reason(status_.reasons, Reason::controller_offline);
       case Reason::sensor_suspected:
         return !status_.sensors_suspected.empty();

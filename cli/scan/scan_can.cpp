@@ -1,7 +1,6 @@
 #include "cli/scan/scan_can.hpp"
 
 #include <algorithm>
-#include <cstdio>
 #include <map>
 #include <optional>
 #include <poll.h>
@@ -21,6 +20,7 @@ namespace {
 struct ReceivedFrames {
   FrameCounts frames;
   std::vector<std::optional<CanFrame>> of_signal;  ///< newest frame with the signal
+  std::vector<std::vector<double>> values;         ///< by signal
 };
 
 std::vector<const CanSignal*> signals_of(const CanBusConfig& config) {
@@ -36,6 +36,7 @@ ReceivedFrames listen(CanSocket& socket, const std::vector<const CanSignal*>& si
                       double listen_s, const std::vector<double>& stale_after_s) {
   ReceivedFrames received;
   received.of_signal.resize(signals.size());
+  received.values.resize(signals.size());
   const nanoseconds end = monotonic_now() + from_seconds(listen_s);
   const auto may_continue = [&](nanoseconds now) {
     for (std::size_t i = 0; i < stale_after_s.size(); ++i) {
@@ -53,7 +54,10 @@ ReceivedFrames listen(CanSocket& socket, const std::vector<const CanSignal*>& si
       for (std::size_t i = 0; i < signals.size(); ++i) {
         const CanSignal& signal = *signals[i];
         if (!matches(frame.id, signal)) continue;
-        if (carries(frame.payload(), signal)) received.of_signal[i] = frame;
+        if (!carries(frame.payload(), signal)) continue;
+        received.of_signal[i] = frame;
+        const CanValue decoded = decode(frame.payload(), signal);
+        if (decoded.fault == Fault::none) received.values[i].push_back(decoded.value);
       }
     }
   }
@@ -111,12 +115,12 @@ void add_id_hint(const CanSignal& signal, const ReceivedFrames& received, ScanCh
   constexpr std::uint32_t group = 0x03FFFF00;
   for (const auto& [id, count] : received.frames) {
     if (id.id == signal.id && id.extended != signal.extended_id)
-      result.hints.push_back(id_name(id) +
+      result.hints.push_back(to_string(id) +
                              " was received: extended_id = " + (id.extended ? "true" : "false"));
     if (!signal.extended_id || !id.extended || ((id.id ^ signal.id) & group) != 0) continue;
     if (id.id == signal.id) continue;
     result.hints.push_back(
-        id_name(id) +
+        to_string(id) +
         " was received, the same J1939 group from another address: give "
         "the sensor that id, or the message of the DBC file VFrameFormat J1939PG");
   }
@@ -133,16 +137,18 @@ void fill(const CanBusConfig& config, const ScanSensors& sensors, const Received
       result.sensor = sensors.names.at(channel.sensor);
       result.place = place_name(channel.signal);
       result.fault = Fault::never_read;
-      const auto& frame = received.of_signal[index++];
+      const auto& frame = received.of_signal[index];
       if (frame) {
         shown.answers = true;
         judge(channel.signal, *frame, sensors.ranges.at(channel.sensor), result);
         judge_age(sensors.stale_after_s.at(channel.sensor), result);
+        judge_turns(received.values[index], result);
       } else if (bus.error.empty()) {
         result.why = "no frame with identifier " +
-                     id_name({channel.signal.id, channel.signal.extended_id}) + " carried it";
+                     to_string({channel.signal.id, channel.signal.extended_id}) + " carried it";
         add_id_hint(channel.signal, received, result);
       }
+      ++index;
     }
   }
 }
@@ -153,8 +159,8 @@ void take(const CanSignal& signal, const ReceivedFrames& received, std::size_t i
   const auto& frame = received.of_signal[index];
   if (!frame) {
     shown.why = received.frames.contains(id)
-                    ? "frames " + id_name(id) + " were received, but none has this value"
-                    : "no frame with identifier " + id_name(id) + " was received";
+                    ? "frames " + to_string(id) + " were received, but none has this value"
+                    : "no frame with identifier " + to_string(id) + " was received";
     return;
   }
   const auto payload = frame->payload();
@@ -172,23 +178,18 @@ void take(const CanSignal& signal, const ReceivedFrames& received, std::size_t i
 std::string received_text(const FrameCounts& frames) {
   constexpr std::size_t text_max = 200;
   if (frames.empty())
-    return "no frame was received: bit rate, termination (two of 120 Ohm), or no node sends";
+    return "no frame was received: bit rate, termination (two of 120 Ohm), or no node sends by "
+           "itself (remote requests are not sent)";
   std::string text = "identifiers on the bus:";
   for (const auto& [id, count] : frames) {
-    text.append(" ").append(id_name(id)).append(" (").append(std::to_string(count)).append(")");
+    text.append(" ").append(to_string(id)).append(" (").append(std::to_string(count)).append(")");
     if (text.size() > text_max) return text + " ...";
   }
   return text;
 }
 
-std::string id_name(const CanId& id) {
-  char text[16];
-  std::snprintf(text, sizeof text, id.extended ? "0x%08X" : "0x%03X", id.id);
-  return text;
-}
-
 std::string place_name(const CanSignal& signal) {
-  std::string text = id_name({signal.id, signal.extended_id}) + " bit " +
+  std::string text = to_string({signal.id, signal.extended_id}) + " bit " +
                      std::to_string(signal.start_bit) + " length " +
                      std::to_string(signal.length_bits);
   text += signal.byte_order == ByteOrder::little_endian ? " little_endian" : " big_endian";
@@ -220,9 +221,6 @@ ScanBus scan_bus(const CanBusConfig& config, const ScanSensors& sensors, const S
     received = listen(socket, signals, task.listen_s, stale_after_s);
     if (!socket.error().empty()) bus.error = socket.error();
     bus.note = received_text(received.frames);
-    if (received.frames.empty() && bus.error.empty()) {
-      bus.note = "no frame was received: bit rate, termination (two of 120 Ohm), or no node sends";
-    }
   }
   fill(config, sensors, received, bus);
   return bus;

@@ -15,8 +15,6 @@ namespace thermocomp::cli {
 using FrameCounts = std::map<CanId, std::size_t>;
 /// "identifiers on the bus: 0x281 (5) ..."
 [[nodiscard]] std::string received_text(const FrameCounts& frames);
-/// "0x281"
-[[nodiscard]] std::string id_name(const CanId& id);
 /// "0x281 bit 7 length 16 big_endian x 0.01"
 [[nodiscard]] std::string place_name(const CanSignal& signal);
 

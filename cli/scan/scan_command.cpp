@@ -69,6 +69,8 @@ ScanReport scan(const DaemonConfig& config, const ScanOptions& options) {
 int run_scan(ScanOptions options) {
   read_units(options.units, options.search);
   const DaemonConfig config = load_daemon_config(options.file);
+  for (const std::string& remark : config.remarks)
+    std::fprintf(stderr, "warning: %s\n", remark.c_str());
   ScanReport report = scan(config, options);
   note_fahrenheit(report);
   if (options.as_json) {

@@ -22,6 +22,8 @@ std::string why_not(const J1939Parameter& parameter, Fault fault, const RawReadi
       raw.value.size() <= frame_bytes) {
     place.start_byte = 0;  // a longer group's reading holds only its own bytes
   }
+  if (decode(raw.value, place).fault == Fault::none)
+    return "the bytes would be a value, but the device is in trouble, see above";
   const std::uint64_t number = extract_raw(raw.value, place);
   if (has_code(place.sentinels, static_cast<std::int64_t>(number))) return its_code;
   constexpr std::uint64_t not_available = 0xFF;
@@ -47,7 +49,8 @@ ScanBus scan_bus(const J1939BusConfig& config, const ScanSensors& sensors, const
                             }});
     }
     const std::string address =
-        node.address ? "address " + std::to_string(*node.address) : "by its NAME";
+        node.address ? hexadecimal("address ", static_cast<std::uint32_t>(*node.address), 2)
+                     : "by its NAME";
     bus.devices.push_back({node.name, address, false, "", {}});
   }
   J1939Line line(config);

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <map>
 #include <poll.h>
+#include <utility>
 
 #include "drivers/bus_thread.hpp"
 
@@ -13,6 +14,7 @@ namespace {
 struct Worked {
   std::vector<Reading> readings;
   std::vector<RawReading> raw;
+  std::vector<std::vector<double>> values;  ///< by reading
   std::vector<UnitHealth> units;
   FrameCounts frames;
   nanoseconds ended_at{};
@@ -33,6 +35,15 @@ Worked work(CanProtocol& protocol, CanSocket& socket, double listen_s, const Sca
     }
     return now < end;
   };
+  worked.values.resize(order.size());
+  std::vector<nanoseconds> taken_at(order.size());
+  const auto note_values = [&] {
+    for (std::size_t i = 0; i < order.size(); ++i) {
+      const Reading& reading = protocol.readings()[i];
+      if (reading.taken_at == std::exchange(taken_at[i], reading.taken_at)) continue;
+      if (reading.fault == Fault::none) worked.values[i].push_back(reading.temp_degC);
+    }
+  };
   protocol.opened(monotonic_now());
   while (socket.is_open() && may_continue(monotonic_now())) {
     pollfd wait{socket.descriptor(), POLLIN, 0};
@@ -41,6 +52,7 @@ Worked work(CanProtocol& protocol, CanSocket& socket, double listen_s, const Sca
     for (const CanFrame& frame : socket.receive()) {
       ++worked.frames[frame.id];
       protocol.take(frame);
+      note_values();
     }
     protocol.advance(monotonic_now());
     while (const auto frame = protocol.next_frame()) {
@@ -129,6 +141,7 @@ ScanBus scan_protocol(ProtocolBus what, CanProtocol& protocol, const ScanSensors
     ScanChannel shown =
         show(reading, raw, place.why, worked.ended_at, sensors.ranges.at(place.sensor));
     judge_age(sensors.stale_after_s.at(place.sensor), shown);
+    if (at < worked.values.size()) judge_turns(worked.values[at], shown);
     shown.sensor = sensors.names.at(place.sensor);
     shown.place = place.text;
     what.devices[place.device].channels.push_back(std::move(shown));

@@ -170,6 +170,24 @@ ordered_json json_of(const ScanController& controller) {
 
 }  // namespace
 
+void judge_turns(std::span<const double> temps_degC, ScanChannel& result) {
+  constexpr std::size_t values_min = 6;
+  constexpr double jump_K_min = 0.25;
+  const std::size_t count = temps_degC.size();
+  if (result.fault != Fault::none || count < values_min) return;
+  std::size_t others = 0;
+  for (std::size_t i = 2; i < count; ++i) {
+    const double jump_K = std::abs(temps_degC[i] - temps_degC[i - 1]);
+    const double change_K = std::abs(temps_degC[i] - temps_degC[i - 2]);
+    if (!(jump_K >= jump_K_min && 4.0 * change_K < jump_K)) ++others;
+  }
+  if (10 * others > count) return;
+  result.fault = Fault::device_error;
+  result.why = "jumps between " + fixed(temps_degC[count - 2], 2) + " and " +
+               fixed(temps_degC[count - 1], 2) +
+               " degC in turn: two senders? Give one of them another identifier";
+}
+
 std::size_t count_channels(const ScanReport& report) {
   std::size_t count = 0;
   for (const ScanBus& bus : report.buses) {

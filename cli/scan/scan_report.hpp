@@ -81,6 +81,10 @@ struct ScanReport {
   std::optional<ScanController> controller{};  ///< none: not scanned
 };
 
+/// Marks a channel whose values alternate between two levels: two senders.
+/// @param temps_degC  in the order of their arrival
+void judge_turns(std::span<const double> temps_degC, ScanChannel& result);
+
 [[nodiscard]] std::size_t count_channels(const ScanReport& report);
 [[nodiscard]] std::size_t count_good(const ScanReport& report);
 /// Notes devices whose temperatures are those of a room in degF.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <map>
 #include <set>
 #include <utility>
@@ -20,20 +21,21 @@ constexpr std::size_t classic_bytes_max = 8;
 constexpr std::size_t message_signals_max = 4096;  // per message
 constexpr std::string_view no_message = "VECTOR__INDEPENDENT_SIG_MSG";
 constexpr std::string_view frame_format = "VFrameFormat";
+constexpr std::string_view cycle_time = "GenMsgCycleTime";
 constexpr std::string_view long_signal = "SystemSignalLongSymbol";
 constexpr std::string_view long_message = "SystemMessageLongSymbol";
 
 /// Skipped statements; each ends with a semicolon.
-constexpr std::array<std::string_view, 25> passed_over{
+constexpr std::array<std::string_view, 24> passed_over{
     "VAL_TABLE_",    "BO_TX_BU_",        "EV_",         "ENVVAR_DATA_",
     "EV_DATA_",      "SGTYPE_",          "SGTYPE_VAL_", "SIG_GROUP_",
     "CM_",           "BA_DEF_REL_",      "BA_REL_",     "BA_DEF_SGTYPE_",
     "BA_SGTYPE_",    "BA_DEF_DEF_REL_",  "BU_SG_REL_",  "BU_EV_REL_",
     "BU_BO_REL_",    "CAT_DEF_",         "CAT_",        "FILTER",
-    "SIG_TYPE_REF_", "SIGTYPE_VALTYPE_", "VAL_",        "NS_DESC_",
-    "SIG_TYPE_"};
-constexpr std::array<std::string_view, 10> understood{
-    "VERSION", "NS_", "BS_", "BU_", "BO_", "SG_", "SIG_VALTYPE_", "SG_MUL_VAL_", "BA_DEF_", "BA_"};
+    "SIG_TYPE_REF_", "SIGTYPE_VALTYPE_", "NS_DESC_",    "SIG_TYPE_"};
+constexpr std::array<std::string_view, 11> understood{
+    "VERSION",      "NS_",         "BS_",     "BU_", "BO_", "SG_",
+    "SIG_VALTYPE_", "SG_MUL_VAL_", "BA_DEF_", "BA_", "VAL_"};
 
 bool is_keyword(std::string_view word) {
   const auto in = [word](const auto& list) {
@@ -72,6 +74,9 @@ struct FormatRemark : Remark {
 };
 struct NameRemark : Remark {
   std::string name;
+};
+struct ValueRemark : Remark {
+  std::vector<std::pair<std::int64_t, std::string>> names;
 };
 
 /// The bits of an identifier that define a J1939 group: page, format and, for a broadcast, group
@@ -189,6 +194,8 @@ class DbcReader {
       read_value_type(line);
     } else if (keyword == "SG_MUL_VAL_") {
       read_pages(line);
+    } else if (keyword == "VAL_") {
+      read_value_names(line);
     } else if (keyword == "BA_DEF_") {
       read_attribute_definition();
     } else if (keyword == "BA_DEF_DEF_") {
@@ -268,7 +275,7 @@ class DbcReader {
       scan_.word("a multiplexing");
     }
     scan_.expect(':');
-    const bool has_scale = read_place(signal.place);
+    const bool has_scale = read_place(signal);
     signal.unit = scan_.text("a unit");
     read_receivers();
     signal.place.id = draft.message.id;
@@ -280,7 +287,8 @@ class DbcReader {
 
   /// Parses `start|length@order sign (factor,offset) [min|max]`.
   /// @return whether the factor is valid
-  bool read_place(CanSignal& place) {
+  bool read_place(DbcSignal& signal) {
+    CanSignal& place = signal.place;
     place.start_bit = static_cast<int>(scan_.integer("a start bit", 8 * message_bytes_max));
     scan_.expect('|');
     place.length_bits = static_cast<int>(scan_.integer("a number of bits", 8 * message_bytes_max));
@@ -295,7 +303,9 @@ class DbcReader {
     place.offset = scan_.real("an offset");
     scan_.expect(')');
     scan_.expect('[');
-    scan_.skip_behind(']');  // minimum and maximum are not used
+    signal.min = scan_.accept_real().value_or(0.0);
+    signal.max = scan_.accept('|') ? scan_.accept_real().value_or(signal.min) : signal.min;
+    scan_.skip_behind(']');
     return place.scale != 0.0;
   }
 
@@ -370,6 +380,20 @@ class DbcReader {
     pages_.push_back(std::move(remark));
   }
 
+  void read_value_names(int line) {
+    constexpr std::size_t names_max = 4096;
+    if (!scan_.next_word().empty()) return scan_.skip_statement();  // of an environment variable
+    ValueRemark remark{read_signal_remark(line), {}};
+    std::optional<double> code;
+    while (remark.names.size() < names_max && (code = scan_.accept_real()) && scan_.next_is('"')) {
+      std::string name = printable(scan_.text("a value's name"));
+      if (*code == std::floor(*code) && std::abs(*code) < 0x1p53)
+        remark.names.emplace_back(static_cast<std::int64_t>(*code), std::move(name));
+    }
+    scan_.skip_statement();
+    value_names_.push_back(std::move(remark));
+  }
+
   void read_attribute_definition() {
     const bool of_message = scan_.next_word() == "BO_";
     if (!scan_.next_word().empty()) scan_.word("an object");
@@ -403,6 +427,12 @@ class DbcReader {
       scan_.word("BO_");
       NameRemark remark{read_remark(line), scan_.text("a name")};
       long_names_.push_back(std::move(remark));
+    } else if (attribute == cycle_time && scan_.next_word() == "BO_") {
+      scan_.word("BO_");
+      const Remark remark = read_remark(line);
+      const auto found = by_id_.find(remark.message);
+      const double cycle_s = scan_.accept_real().value_or(0.0) * 1e-3;
+      if (found != by_id_.end()) drafts_[found->second].message.cycle_s = cycle_s;
     } else if (attribute == frame_format) {
       if (scan_.word("BO_") != "BO_") {
         throw DbcSyntaxError{line, std::string(frame_format),
@@ -430,6 +460,7 @@ class DbcReader {
     resolve_formats();
     for (const FloatRemark& remark : floats_) apply(remark);
     for (const NameRemark& remark : long_names_) apply(remark);
+    for (ValueRemark& remark : value_names_) apply(remark);
     std::map<std::pair<std::size_t, std::size_t>, const PageRemark*> pages;
     for (const PageRemark& remark : pages_) {
       const auto [draft, index] = find(remark);
@@ -540,6 +571,14 @@ class DbcReader {
          {draft->message.name, remark.name});
   }
 
+  void apply(ValueRemark& remark) {
+    const auto found = by_id_.find(remark.message);
+    if (found == by_id_.end()) return;
+    Draft& draft = drafts_[found->second];
+    if (const auto index = index_of(draft, remark.signal))
+      draft.message.signals[*index].value_names = std::move(remark.names);
+  }
+
   void apply(const FloatRemark& remark) {
     const auto [draft, index] = find(remark);
     if (draft == nullptr || remark.type == 0) return;
@@ -635,53 +674,13 @@ class DbcReader {
   std::vector<PageRemark> pages_;
   std::vector<FormatRemark> format_remarks_;
   std::vector<NameRemark> long_names_;
+  std::vector<ValueRemark> value_names_;
   std::set<std::pair<std::string, std::string>> long_seen_;  ///< of messages
   std::vector<std::string> formats_;
   std::optional<FormatRemark> default_format_;
 };
 
-/// Finds by name, else by long name.
-template <class Entries>
-auto* find_by_name(Entries& entries, std::string_view name) noexcept {
-  auto found = std::find_if(entries.begin(), entries.end(),
-                            [name](const auto& entry) { return entry.name == name; });
-  if (found == entries.end() && !name.empty()) {
-    found = std::find_if(entries.begin(), entries.end(),
-                         [name](const auto& entry) { return entry.long_name == name; });
-  }
-  return found == entries.end() ? nullptr : &*found;
-}
-
-std::vector<std::string> names_in(const auto& entries) {
-  std::vector<std::string> names;
-  for (const auto& entry : entries) {
-    names.push_back(entry.name);
-    if (!entry.long_name.empty()) names.push_back(entry.long_name);
-  }
-  return names;
-}
-
 }  // namespace
-
-const DbcSignal* DbcMessage::find(std::string_view signal) const noexcept {
-  return find_by_name(signals, signal);
-}
-
-std::vector<std::string> DbcMessage::signal_names() const {
-  return names_in(signals);
-}
-
-const DbcMessage* DbcFile::find(std::string_view message,
-                                std::optional<std::uint32_t> id) const noexcept {
-  const auto numbered = std::find_if(messages.begin(), messages.end(), [&](const DbcMessage& each) {
-    return each.id == id && (each.name == message || each.long_name == message);
-  });
-  return numbered == messages.end() ? find_by_name(messages, message) : &*numbered;
-}
-
-std::vector<std::string> DbcFile::message_names() const {
-  return names_in(messages);
-}
 
 DbcFile read_dbc_text(std::string_view text, const std::string& name) {
   return DbcReader(text, name).read();

@@ -2,14 +2,15 @@
 ///
 /// A statement that breaks the grammar, has an invalid reference or does not fit into a frame is a
 /// flaw of its message or signal, with file, line and rule; the others are read. Only the syntax of
-/// comments, nodes, value tables, environment variables and attributes is checked, except for
-/// VFrameFormat and long names.
+/// comments, nodes, environment variables and attributes is checked, except for VFrameFormat, the
+/// cycle time and long names. Ranges and value tables are read as far as they can be.
 #pragma once
 
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "config/text/problems.hpp"
@@ -22,6 +23,9 @@ struct DbcSignal {
   std::string long_name;  ///< if `name` had to be shortened; else empty
   std::string unit;       ///< bytes as in the file; often not UTF-8
   CanSignal place;        ///< with multiplexors; sentinels empty
+  double min{0.0};        ///< of the value in `unit`
+  double max{0.0};        ///< not above `min`: not given
+  std::vector<std::pair<std::int64_t, std::string>> value_names{};  ///< by raw value
   int line{0};
 };
 
@@ -32,6 +36,7 @@ struct DbcMessage {
   bool extended{false};
   std::uint64_t bytes{0};           ///< above 64: sent in several frames by a transport protocol
   std::optional<bool> declared_fd;  ///< from VFrameFormat; none: not given
+  double cycle_s{0.0};              ///< from GenMsgCycleTime; 0: not given
   /// The message is a J1939 group from any sender: see id_mask of the signals.
   bool is_group{false};
   std::vector<DbcSignal> signals;

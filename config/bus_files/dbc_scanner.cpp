@@ -120,15 +120,20 @@ void DbcScanner::skip_line() noexcept {
 
 double DbcScanner::real(std::string_view what) {
   if (at_end()) fail(std::string("must be ").append(what));
+  const std::optional<double> value = accept_real();
+  if (!value) fail(std::string("must be ").append(what).append(", a number"));
+  return *value;
+}
+
+std::optional<double> DbcScanner::accept_real() {
+  if (at_end()) return std::nullopt;
   std::string_view number = rest();
   if (number.front() == '+') number.remove_prefix(1);
   const std::string_view digits = number.substr(number.starts_with('-') ? 1 : 0);
   const bool is_number = !digits.empty() && (is_digit(digits.front()) || digits.front() == '.');
   double value = 0.0;
   const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), value);
-  if (!is_number || error != std::errc{} || !std::isfinite(value)) {
-    fail(std::string("must be ").append(what).append(", a number"));
-  }
+  if (!is_number || error != std::errc{} || !std::isfinite(value)) return std::nullopt;
   at_ = static_cast<std::size_t>(end - text_.data());
   return value;
 }

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -36,6 +37,7 @@ class DbcScanner {
   std::string_view name(std::string_view what);
   [[nodiscard]] bool next_is(char symbol);
   double real(std::string_view what);
+  [[nodiscard]] std::optional<double> accept_real();
   std::uint64_t integer(std::string_view what, std::uint64_t max);
   /// A string without its quotes; `\"` is a quote in it.
   std::string text(std::string_view what);

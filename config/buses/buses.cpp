@@ -160,9 +160,23 @@ void ChannelTables::check_period(double period_s, const std::string& period) con
 void BusFiles::note_place(const ChannelTables& tables, const std::string& place) {
   const std::string name = tables.own.text("name", "");
   const auto [found, is_new] = places.emplace(place, name);
-  if (is_new) return;
-  remarks.push_back({"", tables.own.line(), tables.own.path(), "",
-                     "reads the same value as sensor[" + found->second + "]"});
+  if (!is_new) warn(tables, "reads the same value as sensor[" + found->second + "]");
+}
+
+void BusFiles::note_bits(const ChannelTables& tables, const std::string& frame,
+                         const FrameBits& bits) {
+  auto& known = frames[frame];
+  for (const auto& [sensor, taken] : known) {
+    if ((taken & bits).none()) continue;
+    const std::string what = taken == bits ? "reads the same value as" : "shares bits with";
+    warn(tables, what + " sensor[" + sensor + "]");
+    break;
+  }
+  known.emplace_back(tables.own.text("name", ""), bits);
+}
+
+void BusFiles::warn(const ChannelTables& tables, const std::string& text) {
+  remarks.push_back({"", tables.own.line(), tables.own.path(), "", text});
 }
 
 const std::vector<BusKind>& bus_kinds() {

@@ -11,6 +11,7 @@
 
 #include "config/buses/database_files.hpp"
 #include "config/buses/presets.hpp"
+#include "config/sections/can_signals.hpp"
 #include "config/toml/toml_reader.hpp"
 #include "drivers/sensors/bus_config.hpp"
 #include "estimator/estimator_config.hpp"
@@ -37,9 +38,14 @@ struct BusFiles {
   std::map<std::string, ModbusRtu> serial_lines;  ///< shared with a controller on the same line
   std::vector<Problem> remarks;                   ///< warnings, without the file's name
   std::map<std::string, std::string> places;      ///< by place: the first sensor, see note_place()
+  /// By frame: its sensors, see note_bits().
+  std::map<std::string, std::vector<std::pair<std::string, FrameBits>>> frames;
 
+  void warn(const ChannelTables& tables, const std::string& text);
   /// Warns if two sensors read the same place. @param place  bus, device and number on it
   void note_place(const ChannelTables& tables, const std::string& place);
+  /// Warns if two sensors share bits. @param frame  bus, identifier, page
+  void note_bits(const ChannelTables& tables, const std::string& frame, const FrameBits& bits);
 };
 
 class BusSection {

@@ -5,14 +5,12 @@
 namespace thermocomp::sections {
 namespace {
 
-/// The place of the value as text.
-std::string place_of(const std::string& interface, const CanSignal& signal) {
+/// The frame of the value, with its page, as text.
+std::string frame_of(const std::string& interface, const CanSignal& signal) {
   std::string place = interface;
   const auto add = [&place](auto number) { place.append(" ").append(std::to_string(number)); };
   add(signal.id);
   add(signal.extended_id ? 1 : 0);
-  add(signal.start_bit);
-  add(signal.byte_order == ByteOrder::little_endian ? 1 : 0);
   for (const CanSelector& selector : signal.selectors) {
     add(selector.field.start_bit);
     add(selector.pages.front().first);
@@ -45,9 +43,12 @@ class CanSection final : public BusSection {
   void read_channel(const ChannelTables& tables, std::size_t device) override {
     refuse_all(tables.sensor, {"table", "address", "encoding", "word_order"},
                "does not apply on a CAN bus");
-    CanChannel channel = read_can_channel(tables.sensor, tables.device, database_);
+    std::vector<std::string> warnings;
+    CanChannel channel =
+        read_can_channel(tables.sensor, tables.device, database_, tables.stale_after_s, warnings);
+    for (const std::string& text : warnings) files_.warn(tables, text);
     channel.sensor = tables.index;
-    files_.note_place(tables, place_of(bus_.interface, channel.signal));
+    files_.note_bits(tables, frame_of(bus_.interface, channel.signal), frame_bits(channel.signal));
     bus_.devices[device].channels.push_back(std::move(channel));
   }
 

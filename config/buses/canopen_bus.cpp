@@ -391,12 +391,13 @@ class CanopenSection final : public BusSection {
     auto channel = read_canopen_channel(tables.sensor, tables.device, devices_[device], files_.eds);
     if (!channel) return;
     channel->sensor = tables.index;
-    std::string place = bus_.nodes[device].name;
-    const bool is_bits = channel->way == CanopenWay::pdo_bits;
-    const std::uint32_t index = is_bits ? channel->signal.id : channel->object.index;
-    const int sub = is_bits ? channel->signal.start_bit : channel->object.sub;
-    place.append(" ").append(std::to_string(index)).append(" ").append(std::to_string(sub));
-    files_.note_place(tables, place);
+    const std::string place = bus_.nodes[device].name + ' ';
+    if (channel->way == CanopenWay::pdo_bits)
+      files_.note_bits(tables, place + std::to_string(channel->signal.id),
+                       frame_bits(channel->signal));
+    else
+      files_.note_place(tables, place + std::to_string(channel->object.index) + ' ' +
+                                    std::to_string(channel->object.sub));
     check_canopen_channel(tables.sensor, bus_, device, *channel);
     if (channel->way == CanopenWay::sdo) tables.check_period(channel->poll_s, "poll_s");
     bus_.nodes[device].channels.push_back(std::move(*channel));

@@ -8,6 +8,7 @@
 #include "config/run_forms/spelled_unit.hpp"
 #include "config/sections/can_signals.hpp"
 #include "config/sections/common.hpp"
+#include "config/text/printable_text.hpp"
 #include "config/toml/toml_reader.hpp"
 
 namespace thermocomp::sections {
@@ -155,7 +156,37 @@ void add_group_codes(CanSignal& signal) {
   if (bits == 8) signal.sentinels.push_back({all_ones - 1, Fault::device_error});
 }
 
-CanChannel read_by_name(const TomlTable& own, const TomlTable& base, const CanDatabase& database) {
+/// Named values outside of the file's range are no temperatures: error codes. Those inside may be.
+void add_named_codes(const DbcSignal& signal, CanSignal& place,
+                     std::vector<std::string>& warnings) {
+  constexpr std::size_t listed_max = 4;
+  std::string listed;
+  std::string codes;
+  std::size_t count = 0;
+  for (const auto& [code, name] : signal.value_names) {
+    const auto is_same = [code = code](const Sentinel& each) { return each.code == code; };
+    if (std::any_of(place.sentinels.begin(), place.sentinels.end(), is_same)) continue;
+    const double value = static_cast<double>(code) * signal.place.scale + signal.place.offset;
+    if (signal.min < signal.max && !(value >= signal.min && value <= signal.max)) {
+      place.sentinels.push_back({code, Fault::device_error});
+      continue;
+    }
+    if (++count > listed_max) continue;
+    const double temp_degC = static_cast<double>(code) * place.scale + place.offset;
+    const std::string separator = count == 1 ? "" : ", ";
+    listed += separator + std::to_string(code) + " \"" + name + "\" (" + number_text(temp_degC) +
+              " degC)";
+    codes += separator + std::to_string(code);
+  }
+  if (count > listed_max) listed += " and " + std::to_string(count - listed_max) + " more";
+  if (count != 0)
+    warnings.push_back("the DBC file names values of " + signal.name + ": " + listed +
+                       "; one that is a fault is a temperature until it is in error_codes = [" +
+                       codes + "]");
+}
+
+CanChannel read_by_name(const TomlTable& own, const TomlTable& base, const CanDatabase& database,
+                        double stale_after_s, std::vector<std::string>& warnings) {
   for (const TomlTable& table : {own, base}) {
     refuse_all(table, {"multiplexor", "multiplexor_value"}, "is given by the DBC file");
   }
@@ -174,6 +205,11 @@ CanChannel read_by_name(const TomlTable& own, const TomlTable& base, const CanDa
   channel.signal = read_can_signal(own, base, CanUse::temperature, &signal->place);
   to_degC(own, base, signal->unit, channel.signal);
   if (message->is_group) add_group_codes(channel.signal);
+  add_named_codes(*signal, channel.signal, warnings);
+  if (message->cycle_s >= stale_after_s)
+    warnings.push_back("the DBC file gives " + message->name + " a cycle of " +
+                       number_text(message->cycle_s) + " s: its readings are stale after " +
+                       number_text(stale_after_s) + " s (screening.stale_after_s)");
   channel.counter = counter_of(own, base, *message, *database.file, channel.signal.fd);
   return channel;
 }
@@ -199,8 +235,9 @@ CanDatabase DbcFiles::read(const TomlTable& bus) {
 }
 
 CanChannel read_can_channel(const TomlTable& own, const TomlTable& base,
-                            const CanDatabase& database) {
-  if (own.has("signal")) return read_by_name(own, base, database);
+                            const CanDatabase& database, double stale_after_s,
+                            std::vector<std::string>& warnings) {
+  if (own.has("signal")) return read_by_name(own, base, database, stale_after_s, warnings);
   refuse_all(own, {"message"}, "does not apply without the signal's name (signal)");
   CanChannel channel;
   channel.signal = read_can_signal(own, base, CanUse::temperature);

@@ -69,7 +69,10 @@ class DbcFiles {
 
 /// A sensor's value: with the key `signal` by its name, else by its place. Missing keys are taken
 /// from `base`, for a named signal then from the file.
+/// @param stale_after_s  of the sensor
+/// @param warnings  about what the file says of the signal
 [[nodiscard]] CanChannel read_can_channel(const TomlTable& own, const TomlTable& base,
-                                          const CanDatabase& database);
+                                          const CanDatabase& database, double stale_after_s,
+                                          std::vector<std::string>& warnings);
 
 }  // namespace thermocomp::sections

@@ -134,11 +134,14 @@ class J1939Section final : public BusSection {
     J1939Channel channel = read_j1939_channel(tables.sensor, tables.device);
     channel.sensor = tables.index;
     const J1939Parameter& place = channel.parameter;
-    std::string text = bus_.nodes[device].name;
-    for (const int number : {static_cast<int>(place.pgn), place.start_byte, place.start_bit}) {
-      text.append(" ").append(std::to_string(number));
-    }
-    files_.note_place(tables, text);
+    const auto first = static_cast<std::size_t>(8 * place.start_byte + place.start_bit);
+    FrameBits bits;  // of a part of the group
+    for (std::size_t i = first % bits.size(); i < bits.size(); ++i)
+      bits.set(i, i < first % bits.size() + static_cast<std::size_t>(place.length_bits));
+    files_.note_bits(tables,
+                     bus_.nodes[device].name + ' ' + std::to_string(place.pgn) + ' ' +
+                         std::to_string(first / bits.size()),
+                     bits);
     bus_.nodes[device].channels.push_back(std::move(channel));
   }
 

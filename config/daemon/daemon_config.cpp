@@ -189,6 +189,37 @@ void note_raw_zeros(DaemonConfig& config) {
   }
 }
 
+/// Sensors and frames of buses on this interface.
+std::vector<std::pair<std::size_t, CanSignal>> received_on(const std::string& interface,
+                                                           const std::vector<BusConfig>& buses) {
+  std::vector<std::pair<std::size_t, CanSignal>> received;
+  for (const BusConfig& bus : buses) {
+    if (const auto* can = std::get_if<CanBusConfig>(&bus); can && can->interface == interface)
+      for (const CanDeviceConfig& device : can->devices)
+        for (const CanChannel& channel : device.channels)
+          received.emplace_back(channel.sensor, channel.signal);
+    if (const auto* open = std::get_if<CanopenBusConfig>(&bus);
+        open && open->interface == interface)
+      for (const CanopenNodeConfig& node : open->nodes)
+        for (const CanopenChannel& channel : node.channels)
+          if (channel.way == CanopenWay::pdo_bits)
+            received.emplace_back(channel.sensor, channel.signal);
+  }
+  return received;
+}
+
+/// Refuses sensors in a frame that the daemon sends: it would measure its own offset.
+void check_own_frames(const std::vector<TomlTable>& sensors, const std::vector<BusConfig>& buses,
+                      const sections::ControllerReading& controller) {
+  const auto* const can = std::get_if<CanControllerConfig>(&controller.config);
+  if (can == nullptr) return;
+  for (const auto& [sensor, signal] : received_on(can->interface, buses))
+    if (controller.can_sent.has_frame_of(signal))
+      sensors[sensor].problem("name",
+                              "is in a frame that the daemon itself sends to the controller: give "
+                              "the identifier of the module's frame");
+}
+
 void check_controller_period(const TomlTable& compensation, const DaemonConfig& config,
                              double period_s) {
   if (config.estimator.compensation.controller_stale_after_s > period_s) return;
@@ -226,6 +257,7 @@ sections::BindingTables read_daemon(const TomlTable& root, const fs::path& folde
 
   sections::ControllerReading controller = sections::read_controller(
       root.table("controller"), tables.axes, config.estimator.axes, bus_files.serial_lines);
+  check_own_frames(sensors, config.buses, controller);
   config.controller = std::move(controller.config);
   config.estimator.signals = std::move(controller.signals);
   config.dry_run = controller.dry_run;
@@ -351,7 +383,7 @@ DaemonConfig build(const TomlDocument& document, const fs::path& folder, Files f
   const TomlTable model_table = root.table("model");
   config.model_file = read_path(model_table, "file", "model.toml", folder);
   if (!model_table.has("file")) model_table.problem("file", "must be given");
-  sections::BusFiles bus_files{dbc_files, eds_files, {}, {}, {}};
+  sections::BusFiles bus_files{dbc_files, eds_files, {}, {}, {}, {}};
   const sections::BindingTables tables = read_daemon(root, folder, presets, bus_files, config);
   if (files == Files::opened) {
     check_files(root, config, folder);

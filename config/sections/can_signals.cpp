@@ -219,7 +219,10 @@ void TakenBits::add(const TomlTable& table, std::string_view key, const CanSigna
 }
 
 bool TakenBits::has_frame_of(const CanSignal& signal) const {
-  return used_.contains({signal.id, signal.extended_id});
+  return std::any_of(used_.begin(), used_.end(), [&](const auto& frame) {
+    const auto& [id, is_extended] = frame.first;
+    return is_extended == signal.extended_id && ((id ^ signal.id) & signal.id_mask) == 0;
+  });
 }
 
 double count_of(const CanSignal& signal) {

@@ -59,7 +59,7 @@ using FrameBits = std::bitset<512>;
 class TakenBits {
  public:
   void add(const TomlTable& table, std::string_view key, const CanSignal& signal);
-  /// Whether the signal's frame has any value.
+  /// Whether the signal's frame, or one of its group, has any value.
   [[nodiscard]] bool has_frame_of(const CanSignal& signal) const;
 
  private:

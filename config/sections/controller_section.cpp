@@ -364,7 +364,7 @@ class ControllerReader {
     std::vector<std::optional<CanTravelSection>> travels;
     for (std::size_t i = 0; i < axes_.size(); ++i) {
       travels.push_back(read_can_travel(i, sent));
-      config.axes.emplace_back();
+      config.axes.emplace_back().name = axes_[i].name;
       if (!travels[i]) config.axes[i].offset = read_can_offset(i, sent);
     }
     for (const auto& [key, place] :
@@ -386,13 +386,15 @@ class ControllerReader {
     }
     check_read_back();
     read_signals([&](const TomlTable& table, std::size_t index) {
-      config.signals.push_back({index, read_can_signal(table, table, CanUse::signal)});
+      config.signals.push_back(
+          {index, read_can_signal(table, table, CanUse::signal), table.text("name", "")});
       refuse_sent(table, "id", config.signals.back().value, sent);
       const bool is_switch = unit_of(table.text("name", "")).suffix == "_on";
       if (is_switch && !reach(config.signals.back().value).contains(1.0)) {
         table.problem("signed", "must be false: one bit with a sign is 0 or -1, not 0 or 1");
       }
     });
+    result_.can_sent = std::move(sent);
     result_.period_s = config.period_s;
     result_.config = std::move(config);
   }

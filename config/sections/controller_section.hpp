@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "config/sections/can_signals.hpp"
 #include "config/toml/toml_reader.hpp"
 #include "drivers/controllers/controller_config.hpp"
 #include "estimator/estimator_config.hpp"
@@ -17,6 +18,7 @@ struct ControllerReading {
   bool reads_back{true};
   double period_s{0.0};  ///< of the exchange; 0: no exchange
   bool dry_run{false};   ///< nothing is written
+  TakenBits can_sent;    ///< frames that are sent to a controller on CAN
 };
 
 /// @param axis_tables  the [[axis]] tables, in the order of `axes`; for a travel of all its nodes

@@ -1,7 +1,9 @@
 #include "drivers/can/can_socket.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
 #include <ctime>
 #include <iterator>
@@ -84,6 +86,12 @@ struct CanSocket::Buffers {
     used = 0;
   }
 };
+
+std::string to_string(const CanId& id) {
+  std::array<char, 16> text{};
+  std::snprintf(text.data(), text.size(), id.extended ? "0x%08X" : "0x%03X", id.id);
+  return text.data();
+}
 
 std::string_view to_string(CanState state) noexcept {
   switch (state) {

@@ -26,6 +26,8 @@ struct CanId {
   // NOLINTNEXTLINE(modernize-use-nullptr): clang-tidy 14 sees a null pointer in every default <=>
   auto operator<=>(const CanId&) const = default;
 };
+/// "0x281", "0x18FF2F31"
+[[nodiscard]] std::string to_string(const CanId& id);
 
 /// True if frames with this identifier carry the signal.
 [[nodiscard]] inline bool matches(const CanId& id, const CanSignal& signal) noexcept {

@@ -176,6 +176,7 @@ struct CanAxis {
   CanSignal offset;                   ///< in a frame we send
   std::optional<CanSignal> applied;   ///< in a frame the controller sends
   std::optional<CanTravel> travel{};  ///< replaces `offset` and `applied`
+  std::string name{};                 ///< for messages
 
   /// Number of offsets of this axis in the command.
   [[nodiscard]] std::size_t offsets() const noexcept {
@@ -189,6 +190,7 @@ struct CanAxis {
 struct CanControllerSignal {
   std::size_t signal{0};
   CanSignal value;
+  std::string name{};  ///< for messages
   bool operator==(const CanControllerSignal&) const = default;
 };
 struct CanControllerConfig {

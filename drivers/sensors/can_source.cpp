@@ -1,8 +1,6 @@
 #include "drivers/sensors/can_source.hpp"
 
 #include <algorithm>
-#include <array>
-#include <cstdio>
 #include <string>
 
 #include "drivers/bus_thread.hpp"
@@ -35,12 +33,6 @@ std::vector<CanId> identifiers(const CanBusConfig& config) {
     }
   }
   return ids;
-}
-
-std::string hexadecimal(const CanId& id) {
-  std::array<char, 16> text{};
-  std::snprintf(text.data(), text.size(), id.extended ? "0x%08X" : "0x%03X", id.id);
-  return text.data();
 }
 
 std::vector<UnitHealth> units_of(const CanBusConfig& config) {
@@ -130,7 +122,7 @@ std::vector<UnitHealth> CanSource::units(nanoseconds now) {
     UnitHealth& unit = units_[channel.device];
     if (!usable() || unit.answers != 0 || !unit.last_error.empty()) continue;
     if (now - opened_at_ < silent_after) continue;
-    unit.last_error = "no frame with identifier " + hexadecimal(channel.id) + " received";
+    unit.last_error = "no frame with identifier " + to_string(channel.id) + " received";
   }
   return units_;
 }
@@ -174,7 +166,7 @@ std::string CanSource::contest(const CanFrame& frame, Channel& channel) {
   channel.last_frame = at;
   if (at >= channel.contested_until) return {};
   const auto [low, high] = std::minmax(*channel.rival, frame.id);
-  return hexadecimal(low) + " and " + hexadecimal(high) +
+  return to_string(low) + " and " + to_string(high) +
          " send the same group: choose one by the sensor's key id";
 }
 

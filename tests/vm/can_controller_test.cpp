@@ -45,6 +45,9 @@ CanControllerConfig two_axes(const std::string& interface) {
                  {place(0x100, 16, 16, 0.01), place(0x200, 16, 16, 0.01)}};
   config.signals = {{4, place(0x201, 0, 16)}};
   config.signals[0].value.is_signed = false;
+  config.signals[0].name = "spindle_rpm";
+  config.axes[0].name = "z";
+  config.axes[1].name = "x";
   config.valid_bits = place(0x100, 32, 8);
   config.heartbeat = place(0x100, 40, 16);
   return config;
@@ -144,8 +147,13 @@ TEST_CASE("no offset is sent before the CAN controller has reported everything",
   CHECK_FALSE(cycle.state().online);
   CHECK(dump.text().empty());
   CHECK(link.health().writes == 0);
+  const auto says = [&](const std::string& text) { return link.health().last_error == text; };
+  CHECK(eventually([&] { return says("frame 0x201 (spindle_rpm) is not received"); }));
+  RawSender("vcan0").send(0x201, {0xE0});
+  CHECK(eventually([&] { return says("frame 0x201 (spindle_rpm) has too few bytes: 1"); }));
   machine.sends_speed = true;
   REQUIRE(eventually([&] { return dump.shows("100   [7]  64 00"); }));
+  CHECK(eventually([&] { return says(""); }));
 }
 
 TEST_CASE("a silent CAN controller is offline, and its return is a new epoch", "[vm][controller]") {
@@ -158,7 +166,7 @@ TEST_CASE("a silent CAN controller is offline, and its return is a new epoch", "
   cycle.fixed_epoch = epoch;
   machine.sends_applied = false;  // the speed frames continue
   REQUIRE(eventually([&] { return !cycle.state().online; }));
-  const std::string silent = "the controller is silent";
+  const std::string silent = "frame 0x200 (applied of axis z, applied of axis x) is not received";
   REQUIRE(eventually([&] { return link.health().last_error == silent; }));
   const std::uint64_t frames = link.health().reads;
   REQUIRE(eventually([&] { return link.health().reads > frames + 5; }));

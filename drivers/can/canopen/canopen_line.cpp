@@ -144,7 +144,7 @@ void CanopenLine::look_for_conflicts(nanoseconds now) {
     if (claimed_by.size() < 2) continue;
     for (const std::size_t i : claimed_by) {
       const std::size_t other = claimed_by[0] == i ? claimed_by[1] : claimed_by[0];
-      reasons[i] = "COB-ID " + std::to_string(cob_id) + " is sent by node " +
+      reasons[i] = "COB-ID " + to_string(CanId{cob_id, false}) + " is sent by node " +
                    std::to_string(config_.nodes[other].node) + " (" + config_.nodes[other].name +
                    ") too";
     }

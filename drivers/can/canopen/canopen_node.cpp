@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include "drivers/bus_thread.hpp"
 #include "drivers/can/signal_codec.hpp"
@@ -29,8 +30,8 @@ constexpr int mapped_max = 64;
 constexpr nanoseconds first_pause = 1s;
 constexpr nanoseconds longest_pause = 10s;
 constexpr nanoseconds start_again_every = 1s;
+constexpr nanoseconds other_master_lasts = 5s;  // its work on the node
 constexpr nanoseconds second_answer_lasts = 5s;
-constexpr nanoseconds silent_after = 5s;
 
 std::uint16_t pdo_object(std::uint16_t first, std::size_t number) {
   return static_cast<std::uint16_t>(first + number - 1);
@@ -43,6 +44,13 @@ std::span<const std::uint8_t> bytes_of(std::span<const std::uint8_t> data,
   if (channel.way == CanopenWay::pdo_bits || first >= data.size()) return data;
   const auto bytes = static_cast<std::size_t>((channel.signal.length_bits + 7) / 8);
   return data.subspan(first, std::min(bytes, data.size() - first));
+}
+
+std::string unheard_text(std::uint64_t error_register) {
+  std::array<char, 8> number{};
+  std::snprintf(number.data(), number.size(), "0x%02X", static_cast<unsigned>(error_register));
+  return std::string("error register 1001:00 is ") + number.data() +
+         ": an emergency was sent unheard; mend its cause, or switch the node off and on";
 }
 
 }  // namespace
@@ -88,10 +96,7 @@ CanopenNode::CanopenNode(const CanopenNodeConfig& config, const CanopenBusConfig
     writes_.push_back(std::move(write));
   }
   counters_.name = config_.name;
-  for (CanopenChannel& channel : channels_) {
-    if (channel.way != CanopenWay::pdo_bits) channel.signal.id = 0;
-  }
-  for (const CanopenMapping& mapping : config_.mappings) place_channels(mapping, channels_);
+  place_configured();
 }
 
 // -------------------------------------------------------------------- set-up
@@ -102,25 +107,30 @@ void CanopenNode::opened(nanoseconds now) {
 }
 
 void CanopenNode::closed(nanoseconds now) {
-  client_.cancel();
-  forget_poll();
+  stop_reading(now);
   frames_.clear();
   jobs_.clear();
   phase_ = Phase::closed;
   heartbeats_.forget();
   for (Watched& each : watched_) each.rate.forget();
-  lose_all(Fault::no_answer, now);
+}
+
+/// Forgets the mappings that were read.
+void CanopenNode::place_configured() {
+  for (CanopenChannel& channel : channels_) {
+    if (channel.way != CanopenWay::pdo_bits) channel.signal.id = 0;
+  }
+  for (const CanopenMapping& mapping : config_.mappings) place_channels(mapping, channels_);
 }
 
 void CanopenNode::begin_setup(nanoseconds now) {
-  client_.cancel();
-  forget_poll();
+  stop_reading(now);
+  place_configured();
   poll_error_.clear();
   refused_.clear();
   cob_ids_reported_.clear();
-  lost_ = false;
+  lost_ = left_ = false;
   received_at_ = now;
-  lose_all(Fault::no_answer, now);
   jobs_.clear();
   for (std::size_t i = 0; i < writes_.size(); ++i) {
     jobs_.push_back({Work::write, i, 0});
@@ -130,8 +140,12 @@ void CanopenNode::begin_setup(nanoseconds now) {
     jobs_.push_back({Work::ask_cob_id, static_cast<std::size_t>(number), 0});
     jobs_.push_back({Work::ask_count, static_cast<std::size_t>(number), 0});
   }
-  // Errors may have been reset unnoticed.
-  if (supports_emergencies()) jobs_.push_back({Work::ask_errors, 0, 0});
+  // Emergencies and their resets may have been sent unheard.
+  for (std::size_t i = 0; i < channels_.size(); ++i) {
+    if (!supports_emergencies(i)) continue;
+    jobs_.push_back({Work::ask_errors, 0, 0});
+    break;
+  }
   phase_ = Phase::setting_up;
   // Some nodes refuse settings while operational.
   if (!writes_.empty() && starts_) command(command_pre_operational);
@@ -185,7 +199,9 @@ void CanopenNode::take_answer(const Job& job, std::span<const std::uint8_t> byte
                               nanoseconds now) {
   if (job.work == Work::write) return;
   if (job.work == Work::ask_errors) {
-    if (little_endian(bytes, 0, 1) == 0) forget_emergencies();
+    errors_unheard_ = little_endian(bytes, 0, 1);
+    if (errors_unheard_ == 0) return forget_emergencies();
+    if (emergency_text_.empty()) emergency_text_ = unheard_text(errors_unheard_);
     return;
   }
   if (job.work != Work::verify) return take_mapping_answer(job, bytes, now);
@@ -254,6 +270,7 @@ void CanopenNode::setup_done(nanoseconds now) {
   setup_error_.clear();
   retry_pause_ = first_pause;
   received_at_ = now;
+  state_.reset();
   start_again_at_ = now + start_again_every;
   if (starts_) command(command_start);
   watched_.clear();
@@ -274,13 +291,13 @@ void CanopenNode::setup_done(nanoseconds now) {
   }
 }
 
-bool CanopenNode::supports_emergencies() const {
-  return std::any_of(channels_.begin(), channels_.end(), [](const CanopenChannel& channel) {
-    return channel.emergency_channel != 0 || !channel.emergency_codes.empty();
-  });
+bool CanopenNode::supports_emergencies(std::size_t channel) const {
+  const CanopenChannel& asked = channels_[channel];
+  return asked.emergency_channel != 0 || !asked.emergency_codes.empty();
 }
 
 void CanopenNode::forget_emergencies() {
+  errors_unheard_ = 0;
   emergencies_.assign(emergencies_.size(), std::nullopt);
   emergency_text_.clear();
 }
@@ -313,15 +330,22 @@ void CanopenNode::take_heartbeat(std::span<const std::uint8_t> data, nanoseconds
     return;
   }
   heartbeats_.arrived(at);
-  if (lost_) {
-    begin_setup(at);
-  } else if (phase_ == Phase::running && starts_ && state != state_operational &&
-             at >= start_again_at_) {
+  if (lost_) return begin_setup(at);
+  if (phase_ != Phase::running) return;
+  if (state == state_operational) {
+    // Mapping and settings may have been changed meanwhile.
+    if (left_) return begin_setup(at);
+    if (config_.pdo_on_change) renew_pdos(at);
+  } else if (state_ == state_operational && !(writes_.empty() && config_.mappings_read.empty())) {
+    left_ = true;
+    start_again_at_ = at + other_master_lasts;
+    stop_reading(at);
+  }
+  state_ = state;
+  if (state != state_operational && starts_ && at >= start_again_at_) {
     // The node was stopped, or the command was lost.
     start_again_at_ = at + start_again_every;
     command(command_start);
-  } else if (phase_ == Phase::running && state == state_operational && config_.pdo_on_change) {
-    renew_pdos(at);
   }
 }
 
@@ -343,6 +367,7 @@ void CanopenNode::take_emergency(std::span<const std::uint8_t> data, nanoseconds
     ++counters_.exceptions;
     emergency_text_ = "emergency " + to_string(*emergency);
   } else if (emergency->error_register == 0) {
+    errors_unheard_ = 0;
     emergency_text_.clear();
   }
   for (std::size_t i = 0; i < channels_.size(); ++i) {
@@ -383,7 +408,7 @@ bool CanopenNode::take_pdo(std::uint32_t cob_id, std::span<const std::uint8_t> d
     has_channel = true;
     const CanValue decoded = decode(data, channel.signal);
     is_short = is_short || decoded.fault == Fault::bad_frame;
-    if (lost_) continue;
+    if (!running()) continue;
     const auto shown = bytes_of(data, channel);
     raw_[i].value.assign(shown.begin(), shown.end());
     show(i, decoded, at);
@@ -399,7 +424,8 @@ bool CanopenNode::take_pdo(std::uint32_t cob_id, std::span<const std::uint8_t> d
 /// Publishes a value unless an emergency or a second sender makes it invalid.
 void CanopenNode::show(std::size_t channel, const CanValue& decoded, nanoseconds at) {
   if (emergencies_[channel]) return lose(channel, *emergencies_[channel], at);
-  if (is_doubtful(channel)) return lose(channel, Fault::device_error, at);
+  const bool is_unheard = errors_unheard_ != 0 && supports_emergencies(channel);
+  if (is_unheard || is_doubtful(channel)) return lose(channel, Fault::device_error, at);
   readings_[channel] = {decoded.value, at, decoded.fault};
 }
 
@@ -505,6 +531,10 @@ void CanopenNode::watch_heartbeat(nanoseconds now) {
   if (timeout == nanoseconds{0} || lost_ || phase_ != Phase::running) return;
   if (now - received_at_ <= timeout) return;
   lost_ = true;
+  stop_reading(now);
+}
+
+void CanopenNode::stop_reading(nanoseconds now) {
   client_.cancel();
   forget_poll();
   lose_all(Fault::no_answer, now);
@@ -554,38 +584,6 @@ std::optional<CanFrame> CanopenNode::next_frame() {
     return frame;
   }
   return client_.next_frame();
-}
-
-// -------------------------------------------------------------------- health
-
-std::string CanopenNode::trouble(nanoseconds now) const {
-  if (!conflict_.empty()) return conflict_;
-  if (heartbeats_.too_often() || second_answer_until_ != nanoseconds{0}) {
-    return "two nodes answer as node " + std::to_string(config_.node);
-  }
-  for (const Watched& each : watched_) {
-    if (!each.rate.too_often()) continue;
-    return "COB-ID " + std::to_string(each.cob_id) +
-           " is received too often: two nodes send it, or pdo_period_s is wrong";
-  }
-  if (phase_ == Phase::closed) return {};
-  if (lost_) return "no heartbeat";
-  if (!setup_error_.empty()) return setup_error_;
-  if (!emergency_text_.empty()) return emergency_text_;
-  for (const Watched& each : watched_) {
-    if (phase_ != Phase::running || each.cob_id == 0 || now < each.due_by) continue;
-    return "COB-ID " + std::to_string(each.cob_id) +
-           " is not received, though the node is alive: a TPDO on change needs an event timer "
-           "(object 1800 and following, sub 5) or pdo_on_change";
-  }
-  return poll_error_;
-}
-
-UnitHealth CanopenNode::health(nanoseconds now) const {
-  UnitHealth health = counters_;
-  health.answering = good_at_ != nanoseconds{0} && now - good_at_ < silent_after;
-  health.last_error = trouble(now);
-  return health;
 }
 
 }  // namespace thermocomp

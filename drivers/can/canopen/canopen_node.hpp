@@ -20,7 +20,7 @@
 
 namespace thermocomp {
 
-/// State of a node, and the command that demands it, CiA 301.
+/// State of a node, CiA 301.
 inline constexpr std::uint8_t state_operational = 0x05;
 
 using std::chrono::nanoseconds;
@@ -66,11 +66,15 @@ std::vector<std::size_t> place_channels(const CanopenMapping& mapping,
                                         std::vector<CanopenChannel>& channels);
 
 /// States of a node: pre-operational during set-up (writes, each verified; COB-IDs and mappings
-/// read), then started, then read. A reboot, a lost heartbeat or a lost bus restarts the set-up.
-/// Readings are no_answer until it is complete, and device_error if the set-up was refused or two
-/// nodes send the same COB-ID.
+/// read), then started, then read. A reboot, a lost heartbeat or a lost bus restarts the set-up,
+/// and so does the return to operational of a node that left it without our command. Readings are
+/// no_answer until it is complete, and device_error if the set-up was refused, two nodes send the
+/// same COB-ID, or the error register shows an emergency that was not heard.
 class CanopenNode {
  public:
+  /// A node silent for longer is shown as not answering, a missing TPDO is reported.
+  static constexpr nanoseconds silent_after = std::chrono::seconds{5};
+
   CanopenNode(const CanopenNodeConfig& config, const CanopenBusConfig& bus);
 
   void opened(nanoseconds now);
@@ -97,7 +101,9 @@ class CanopenNode {
   /// Call when another node reports this node's TPDO as its own; empty: none does.
   void claim_conflict(const std::string& reason, nanoseconds now);
 
-  [[nodiscard]] bool running() const noexcept { return phase_ == Phase::running && !lost_; }
+  [[nodiscard]] bool running() const noexcept {
+    return phase_ == Phase::running && !lost_ && !left_;
+  }
   /// Counters and present error.
   [[nodiscard]] UnitHealth health(nanoseconds now) const;
 
@@ -115,6 +121,7 @@ class CanopenNode {
     nanoseconds due_by{};  ///< time after which a missing TPDO is reported
   };
 
+  void place_configured();
   void begin_setup(nanoseconds now);
   void next_job(nanoseconds now);
   void start_job(const Job& job, nanoseconds now);
@@ -130,15 +137,17 @@ class CanopenNode {
   void forget_poll() noexcept;
   void take_result(nanoseconds now);
   void watch_heartbeat(nanoseconds now);
+  void stop_reading(nanoseconds now);
   void watch_duplicates(nanoseconds now);
   void renew_pdos(nanoseconds at);
   void command(std::uint8_t what);
-  [[nodiscard]] bool supports_emergencies() const;
+  [[nodiscard]] bool supports_emergencies(std::size_t channel) const;
   void forget_emergencies();
   void show(std::size_t channel, const CanValue& decoded, nanoseconds at);
   void lose(std::size_t channel, Fault fault, nanoseconds at);
   void lose_all(Fault fault, nanoseconds at);
   [[nodiscard]] bool is_doubtful(std::size_t channel) const noexcept;
+  [[nodiscard]] std::string state_text() const;
   [[nodiscard]] std::string trouble(nanoseconds now) const;
 
   const CanopenNodeConfig config_;
@@ -166,6 +175,8 @@ class CanopenNode {
   nanoseconds received_at_{};  ///< last heartbeat, or start of the wait for it
   nanoseconds start_again_at_{};
   bool lost_{false};
+  std::optional<std::uint8_t> state_;  ///< of the last heartbeat since the set-up
+  bool left_{false};                   ///< it was operational, and is not
   RateWatch heartbeats_;
   std::uint64_t second_answers_seen_{0};
   nanoseconds second_answer_until_{};  ///< until then a second node is assumed
@@ -173,7 +184,8 @@ class CanopenNode {
   std::string refused_;  ///< setting that the node refused, being read back
   std::string setup_error_;
   std::string poll_error_;
-  std::string emergency_text_;  ///< of the last emergency, until the errors are reset
+  std::uint64_t errors_unheard_{0};  ///< error register at the set-up, until it is empty
+  std::string emergency_text_;       ///< of the last emergency, until the errors are reset
   std::deque<CanFrame> frames_;
   UnitHealth counters_;
   nanoseconds good_at_{};  ///< last good answer or TPDO

@@ -12,6 +12,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr nanoseconds silent_after = 5s;
+constexpr nanoseconds rivals_gone_after = 30s;
 constexpr std::size_t name_bytes = 8;
 constexpr std::size_t request_bytes = 3;
 constexpr std::uint32_t any_specific = 0x03FF0000;  // mask for the group only, of an addressed one
@@ -25,10 +26,19 @@ std::vector<std::uint32_t> groups(const J1939BusConfig& config) {
   return pgns;
 }
 
-std::string hexadecimal(std::uint64_t name) {
+std::string hexadecimal(std::uint64_t number, int digits) {
   std::array<char, 20> text{};
-  std::snprintf(text.data(), text.size(), "0x%016llX", static_cast<unsigned long long>(name));
+  std::snprintf(text.data(), text.size(), "0x%0*llX", digits,
+                static_cast<unsigned long long>(number));
   return text.data();
+}
+
+std::string name_text(std::uint64_t name) {
+  return hexadecimal(name, 16);
+}
+
+std::string address_text(std::uint8_t address) {
+  return "address " + hexadecimal(address, 2);
 }
 
 /// All bytes of a single-frame group; of a longer one the bytes of the parameter.
@@ -102,24 +112,23 @@ std::optional<std::uint8_t> J1939Line::address_of(std::size_t node) const {
 
 void J1939Line::opened(nanoseconds now) {
   open_ = true;
-  names_.fill(std::nullopt);
+  claims_.fill(std::nullopt);
   own_error_.clear();
   own_address_.reset();
   if (config_.own_address) own_address_ = static_cast<std::uint8_t>(*config_.own_address);
   transport_.forget();
   transport_.set_address(own_address_);
-  bool needs_names = false;
   for (std::size_t i = 0; i < nodes_.size(); ++i) {
     const J1939NodeConfig& config = config_.nodes[i];
     nodes_[i].address.reset();
     if (config.address) nodes_[i].address = static_cast<std::uint8_t>(*config.address);
     nodes_[i].note.clear();
+    nodes_[i].rivals.reset();
     if (!config.address) nodes_[i].note = "no device has claimed an address with its NAME yet";
-    needs_names = needs_names || config.name_claimed.has_value();
     lose(i, now);
   }
   if (own_address_) claim(*own_address_);
-  if (needs_names) ask_for_names();
+  ask_for_names();  // two answers from one address show two devices
 }
 
 void J1939Line::closed(nanoseconds now) {
@@ -129,9 +138,9 @@ void J1939Line::closed(nanoseconds now) {
   for (std::size_t i = 0; i < nodes_.size(); ++i) lose(i, now);
 }
 
-void J1939Line::lose(std::size_t node, nanoseconds at) {
+void J1939Line::lose(std::size_t node, nanoseconds at, Fault fault) {
   for (std::size_t i = 0; i < config_.nodes[node].channels.size(); ++i) {
-    readings_[nodes_[node].first + i] = {not_a_number, at, Fault::no_answer};
+    readings_[nodes_[node].first + i] = {not_a_number, at, fault};
     raw_[nodes_[node].first + i] = {};
   }
 }
@@ -161,8 +170,7 @@ void J1939Line::take_claim_of_ours(std::uint64_t name) {
     claim(*own_address_);
     return;
   }
-  own_error_ =
-      "our address " + std::to_string(*own_address_) + " was claimed by " + hexadecimal(name);
+  own_error_ = "our " + address_text(*own_address_) + " was claimed by " + name_text(name);
   own_address_.reset();
   transport_.set_address(std::nullopt);
   claim(address_null);
@@ -173,8 +181,29 @@ void J1939Line::take_claim(std::uint8_t source, std::span<const std::uint8_t> da
   if (data.size() != name_bytes) return;
   const std::uint64_t name = little_endian(data, 0, name_bytes);
   if (own_address_ && source == *own_address_) take_claim_of_ours(name);
-  for (std::size_t i = 0; i < nodes_.size(); ++i) move_node(i, source, name, at);
-  if (source <= address_max) names_[source] = name;
+  for (std::size_t i = 0; i < nodes_.size(); ++i) {
+    move_node(i, source, name, at);
+    note_rivals(i, source, name, at);
+  }
+  for (std::optional<Claim>& each : claims_)
+    if (each && each->name == name) each->at = {};  // it has left that address
+  claims_[source] = {name, at};
+}
+
+void J1939Line::note_rivals(std::size_t index, std::uint8_t source, std::uint64_t name,
+                            nanoseconds at) {
+  Node& node = nodes_[index];
+  if (node.rivals && node.rivals->address != source &&
+      (node.rivals->names[0] == name || node.rivals->names[1] == name)) {
+    node.rivals.reset();
+    node.note.clear();
+  }
+  const std::optional<Claim>& last = claims_[source];
+  if (node.address != source || !last || last->name == name || at - last->at > silent_after) return;
+  node.rivals = {source, {last->name, name}, at};
+  node.note = address_text(source) + " is claimed by " + name_text(last->name) + " and " +
+              name_text(name) + ": two devices send from it, give one of them another address";
+  lose(index, at, Fault::device_error);
 }
 
 void J1939Line::move_node(std::size_t index, std::uint8_t source, std::uint64_t name,
@@ -183,9 +212,9 @@ void J1939Line::move_node(std::size_t index, std::uint8_t source, std::uint64_t 
   const std::optional<std::uint64_t>& expected = config_.nodes[index].name_claimed;
   const bool at_its_place = node.address && *node.address == source;
   if (!expected) {
-    if (at_its_place && names_[source] && *names_[source] != name) {
-      node.note = "address " + std::to_string(source) + ": NAME changed from " +
-                  hexadecimal(*names_[source]) + " to " + hexadecimal(name);
+    if (at_its_place && claims_[source] && claims_[source]->name != name) {
+      node.note = address_text(source) + ": NAME changed from " + name_text(claims_[source]->name) +
+                  " to " + name_text(name);
     }
     return;
   }
@@ -203,7 +232,7 @@ void J1939Line::move_node(std::size_t index, std::uint8_t source, std::uint64_t 
     }
   } else if (at_its_place) {
     node.address.reset();
-    node.note = "address " + std::to_string(source) + " was claimed by " + hexadecimal(name);
+    node.note = address_text(source) + " was claimed by " + name_text(name);
     lose(index, at);
   }
 }
@@ -244,12 +273,17 @@ void J1939Line::take_group(std::uint32_t pgn, std::uint8_t source,
   for (std::size_t n = 0; n < nodes_.size(); ++n) {
     Node& node = nodes_[n];
     if (!node.address || *node.address != source) continue;
+    if (node.rivals && at - node.rivals->heard_at > rivals_gone_after) {
+      node.rivals.reset();
+      node.note.clear();
+    }
     const auto& channels = config_.nodes[n].channels;
     bool has_channel = false;
     bool is_short = false;
     for (std::size_t i = 0; i < channels.size(); ++i) {
       if (channels[i].parameter.pgn != pgn) continue;
-      const CanValue decoded = decode(bytes, channels[i].parameter);
+      const CanValue decoded = node.rivals ? CanValue{not_a_number, Fault::device_error}
+                                           : decode(bytes, channels[i].parameter);
       readings_[node.first + i] = {decoded.value, at, decoded.fault};
       const auto shown = bytes_of(bytes, channels[i].parameter);
       raw_[node.first + i].value.assign(shown.begin(), shown.end());
@@ -257,6 +291,7 @@ void J1939Line::take_group(std::uint32_t pgn, std::uint8_t source,
       is_short = is_short || decoded.fault == Fault::bad_frame;
     }
     if (!has_channel) continue;
+    if (node.rivals) node.rivals->heard_at = at;
     if (is_short) {
       ++node.counters.bad_frames;
       node.counters.last_error = "message too short";

@@ -13,7 +13,8 @@ namespace thermocomp {
 
 /// A device is identified by its source address or, if its NAME is configured, by the address that
 /// the NAME claims (J1939-81). If another NAME claims that address, the readings are no_answer
-/// until the device's NAME is received again.
+/// until the device's NAME is received again. Two NAMEs that claim one address within a short time
+/// are two senders, and its readings device_error, until one of them claims another address.
 class J1939Line final : public CanProtocol {
  public:
   /// @throws InvalidValue for impossible parameters and addresses
@@ -36,8 +37,19 @@ class J1939Line final : public CanProtocol {
   [[nodiscard]] std::optional<std::uint8_t> address_of(std::size_t node) const;
 
  private:
+  struct Claim {
+    std::uint64_t name{0};
+    nanoseconds at{};
+  };
+  /// Two devices at one address.
+  struct Rivals {
+    std::uint8_t address{0};
+    std::array<std::uint64_t, 2> names{};
+    nanoseconds heard_at{};
+  };
   struct Node {
     std::optional<std::uint8_t> address;
+    std::optional<Rivals> rivals{};
     std::size_t first{0};  ///< index of its first channel in the readings
     UnitHealth counters;
     std::string note;  ///< problem with its address
@@ -49,9 +61,10 @@ class J1939Line final : public CanProtocol {
   void take_claim(std::uint8_t source, std::span<const std::uint8_t> data, nanoseconds at);
   void take_claim_of_ours(std::uint64_t name);
   void move_node(std::size_t node, std::uint8_t source, std::uint64_t name, nanoseconds at);
+  void note_rivals(std::size_t node, std::uint8_t source, std::uint64_t name, nanoseconds at);
   void claim(std::uint8_t from);
   void ask_for_names();
-  void lose(std::size_t node, nanoseconds at);
+  void lose(std::size_t node, nanoseconds at, Fault fault = Fault::no_answer);
 
   const J1939BusConfig config_;
   std::vector<Node> nodes_;
@@ -60,7 +73,7 @@ class J1939Line final : public CanProtocol {
   TransportReceiver transport_;
   std::optional<std::uint8_t> own_address_;
   std::string own_error_;
-  std::array<std::optional<std::uint64_t>, 256> names_{};  ///< by address
+  std::array<std::optional<Claim>, 256> claims_{};  ///< the last one of each address
   bool open_{false};
   std::deque<CanFrame> frames_;
 };

@@ -65,6 +65,21 @@ TEST_CASE("a module whose temperatures are those of a room in degF is noted", "[
   CHECK(note_of({}).empty());
 }
 
+TEST_CASE("a channel that jumps between two values in turn has two senders", "[cli][scan]") {
+  const auto fault_of = [](const std::vector<double>& temps_degC) {
+    ScanChannel channel;
+    channel.fault = Fault::none;
+    judge_turns(temps_degC, channel);
+    return channel.fault;
+  };
+  CHECK(fault_of({21.5, 35.25, 21.5, 35.25, 21.5, 35.25}) == Fault::device_error);
+  CHECK(fault_of({21.5, 22.2, 21.5, 22.2, 21.6, 22.2, 21.6, 22.3}) == Fault::device_error);
+  CHECK(fault_of({21.5, 22.2, 21.5, 22.2}) == Fault::none);              // too few
+  CHECK(fault_of({21.5, 21.6, 21.5, 21.6, 21.5, 21.6}) == Fault::none);  // its last digit
+  CHECK(fault_of({20, 21, 22, 23, 24, 25, 26}) == Fault::none);
+  CHECK(fault_of({21, 22, 22, 21, 22, 21, 21, 22}) == Fault::none);
+}
+
 TEST_CASE("missing values of a controller are listed with its answers", "[cli][scan]") {
   const ScanReport report =
       report_of({there("spindle_rpm", 10.0), missing("x_mm"), missing("heartbeat")});

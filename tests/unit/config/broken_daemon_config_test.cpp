@@ -322,6 +322,8 @@ const std::vector<Broken>& broken_can() {
        "heartbeat = { id = 0x200, start_bit = 8", "", "controller.heartbeat", "shares bits"},
       {"applied in a frame we send", "applied = { id = 0x281", "applied = { id = 0x200", "",
        "axis[z].applied", "sent, not received"},
+      {"a sensor in a frame we send", "start_bit = 0\n", "start_bit = 0\nid = 0x200\n",
+       "name = \"column\"", "sensor[column].name", "the daemon itself sends"},
       {"bound beyond the bits", "start_bit = 0, length_bits = 16, scale",
        "start_bit = 0, length_bits = 12, scale", "", "axis[z].offset", "reaches from"},
       {"one bit with a sign", "signed = false\n", "signed = true # one bit\n", "",

@@ -135,6 +135,37 @@ TEST_CASE("two sensors that read one place cause a warning", "[dbc]") {
              Catch::EndsWith(": sensor[spindle]: reads the same value as sensor[column]"));
 }
 
+TEST_CASE("overlapping bits and a slow message cause warnings", "[dbc]") {
+  const Folder folder;
+  folder.edit("can_dbc.toml", "message = \"NODE_PAGES\"\nsignal = \"Spindle\"",
+              "signal = \"Column\"\nstart_bit = 8");
+  folder.edit("can_dbc.dbc", "CM_ SG_ 385", "BA_ \"GenMsgCycleTime\" BO_ 385 10000;\nCM_ SG_ 385");
+  const std::vector<std::string> remarks = folder.load().remarks;
+  REQUIRE(remarks.size() == 3);
+  CHECK_THAT(remarks[0],
+             Catch::EndsWith("gives NODE_TEMPERATURES a cycle of 10 s: its readings are "
+                             "stale after 5 s (screening.stale_after_s)"));
+  CHECK_THAT(remarks[2], Catch::EndsWith(": sensor[spindle]: shares bits with sensor[column]"));
+}
+
+TEST_CASE("named values outside of the DBC file's range are error codes, others are named",
+          "[dbc]") {
+  const Folder folder;
+  folder.edit("can_dbc.dbc", "CM_ SG_ 385",
+              "VAL_ 385 Column 32767 \"Open\" 32766 \"SNA\" -32768 \"Short\" 255 \"Init\" ;\n"
+              "VAL_ 77 Gone 1 \"on\" ;\nCM_ SG_ 385");
+  const DaemonConfig config = folder.load();
+  const auto& column = std::get<CanBusConfig>(config.buses.at(0)).devices.at(0).channels.at(0);
+  CHECK(column.signal.sentinels == std::vector<Sentinel>{{32767, Fault::open_circuit},
+                                                         {32766, Fault::device_error},
+                                                         {-32768, Fault::device_error}});
+  REQUIRE(config.remarks.size() == 1);
+  CHECK_THAT(
+      config.remarks[0],
+      Catch::EndsWith("the DBC file names values of Column: 255 \"Init\" (25.5 degC); one "
+                      "that is a fault is a temperature until it is in error_codes = [255]"));
+}
+
 TEST_CASE("named signals require a DBC file and a message", "[dbc]") {
   CHECK_THAT(database_error_after("dbc = \"can_dbc.dbc\"", ""),
              Catch::Contains("sensor[column].signal = \"Column\": needs a bus that names a DBC"));

@@ -45,5 +45,28 @@ TEST_CASE("values that are being confirmed after an outage are named, with the t
   CHECK(confirming().size() == 1);
 }
 
+TEST_CASE("a module that sends rarely answers while its values are valid", "[status_view]") {
+  DaemonConfig config;
+  config.estimator.sensors.emplace_back().module = "m1";
+  Report report;
+  report.sensors.push_back({.raw_degC = 21.5, .fault = Fault::none});
+  BusHealth bus;
+  bus.units.emplace_back().name = "m1";
+  bus.units[0].answers = 3;
+  const ControllerState controller;
+  const CycleTiming timing;
+  const auto answers = [&] {
+    const StatusView view{config, report, controller, timing, {bus}, {},
+                          {},     {},     {},         0.0,    false, {}};
+    return status_of(view).buses[0].units[0].answering;
+  };
+  CHECK(answers());
+  report.sensors[0].fault = Fault::stale;
+  CHECK_FALSE(answers());
+  report.sensors[0].fault = Fault::none;
+  bus.units[0].requests = 3;  // it is asked, and is silent
+  CHECK_FALSE(answers());
+}
+
 }  // namespace
 }  // namespace thermocomp

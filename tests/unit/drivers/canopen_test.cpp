@@ -6,95 +6,11 @@
 
 #include <catch2/catch.hpp>
 
-#include "canopen_frames.hpp"
-#include "drivers/can/canopen/canopen_line.hpp"
+#include "canopen_bus.hpp"
 #include "estimator/checks.hpp"
 
 using namespace thermocomp;
 using namespace std::chrono_literals;
-
-namespace {
-
-CanSignal int16_tenths(std::uint32_t id, int start) {
-  CanSignal signal;
-  signal.id = id;
-  signal.start_bit = start;
-  signal.length_bits = 16;
-  signal.scale = 0.1;
-  return signal;
-}
-
-CanopenChannel in_pdo(std::size_t sensor, std::uint32_t cob_id, int start) {
-  CanopenChannel channel;
-  channel.sensor = sensor;
-  channel.signal = int16_tenths(cob_id, start);
-  return channel;
-}
-
-CanopenChannel object_channel(CanopenWay way, ObjectAddress object) {
-  CanopenChannel channel;
-  channel.way = way;
-  channel.object = object;
-  channel.signal = int16_tenths(0, 0);
-  return channel;
-}
-
-CanopenBusConfig bus_of(std::vector<CanopenNodeConfig> nodes) {
-  CanopenBusConfig bus;
-  bus.name = "bus";
-  bus.interface = "vcan0";
-  bus.nodes = std::move(nodes);
-  return bus;
-}
-
-CanopenNodeConfig node_5(std::vector<CanopenChannel> channels) {
-  CanopenNodeConfig node;
-  node.name = "module";
-  node.node = 5;
-  node.channels = std::move(channels);
-  return node;
-}
-
-/// A line and its clock.
-struct Bus {
-  explicit Bus(CanopenBusConfig config) : line(std::move(config)) {
-    line.opened(now);
-    line.advance(now);
-  }
-  void put(std::uint32_t id, const Bytes& data) {
-    CanFrame frame;
-    frame.id = {id, false};
-    frame.size = data.size();
-    std::copy(data.begin(), data.end(), frame.data.begin());
-    frame.received_at = now;
-    line.take(frame);
-    line.advance(now);
-  }
-  void wait(nanoseconds time) {
-    for (const nanoseconds end = now + time; now < end;) {
-      now += 10ms;
-      line.advance(now);
-    }
-  }
-  std::vector<Sent> sent() { return sent_by(line); }
-  [[nodiscard]] Fault fault(std::size_t channel = 0) const {
-    return line.readings()[channel].fault;
-  }
-  [[nodiscard]] double temp_degC(std::size_t channel = 0) const {
-    return line.readings()[channel].temp_degC;
-  }
-  [[nodiscard]] std::string error(std::size_t node = 0) const {
-    return line.health(now)[node].last_error;
-  }
-
-  nanoseconds now{1000s};
-  CanopenLine line;
-};
-
-const Sent start_5{0x000, {0x01, 0x05}};
-const Sent pre_operational_5{0x000, {0x80, 0x05}};
-
-}  // namespace
 
 // ------------------------------------------------------------------ EMCY
 
@@ -118,6 +34,31 @@ TEST_CASE("EMCY: listed codes fault a channel until no error is left", "[canopen
   CHECK(bus.fault(0) == Fault::device_error);  // the old value does not return
   bus.put(0x185, {0xE3, 0x00, 0xE2, 0x00});
   CHECK(bus.temp_degC(0) == Approx(22.7));
+  CHECK(bus.error().empty());
+}
+
+TEST_CASE("EMCY: an error register that is not empty at the set-up is an emergency unheard",
+          "[canopen][emergency]") {
+  CanopenNodeConfig node = node_5({in_pdo(0, 0x185, 0), in_pdo(1, 0x185, 16)});
+  node.channels[0].emergency_codes = {0x5030};
+  Bus bus(bus_of({node}));
+  bus.put(0x585, {0x4F, 0x01, 0x10, 0x00, 0x09, 0, 0, 0});
+  bus.put(0x185, {0xE1, 0x00, 0xE2, 0x00});
+  CHECK(bus.fault(0) == Fault::device_error);
+  CHECK(bus.fault(1) == Fault::none);
+  CHECK_THAT(bus.error(), Catch::StartsWith("error register 1001:00 is 0x09"));
+  SECTION("until a reset with an empty one") {
+    bus.put(0x085, {0, 0, 0x01, 0, 0, 0, 0, 0});
+    bus.put(0x185, {0xE1, 0x00, 0xE2, 0x00});
+    CHECK(bus.fault(0) == Fault::device_error);
+    bus.put(0x085, {0, 0, 0, 0, 0, 0, 0, 0});
+  }
+  SECTION("until a reboot") {
+    bus.put(0x705, {0x00});
+    bus.put(0x585, {0x4F, 0x01, 0x10, 0x00, 0, 0, 0, 0});
+  }
+  bus.put(0x185, {0xE1, 0x00, 0xE2, 0x00});
+  CHECK(bus.temp_degC(0) == Approx(22.5));
   CHECK(bus.error().empty());
 }
 
@@ -152,7 +93,7 @@ TEST_CASE("a TPDO on change becomes stale, or holds while heartbeats come", "[ca
     bus.put(0x185, {0xE1, 0x00});
     live(bus, 6, 0x05);
     CHECK(age(bus) == 6s);
-    CHECK_THAT(bus.error(), Catch::Contains("COB-ID 389 is not received") &&
+    CHECK_THAT(bus.error(), Catch::Contains("COB-ID 0x185 is not received") &&
                                 Catch::Contains("event timer") && Catch::Contains("pdo_on_change"));
     bus.put(0x185, {0xE1, 0x00});
     CHECK(bus.error().empty());
@@ -191,6 +132,20 @@ TEST_CASE("a stopped node is started again, once a second", "[canopen][node]") {
   bus.put(0x705, {0x05});
   bus.wait(1s);
   CHECK(bus.sent().empty());
+}
+
+TEST_CASE("a node that is not operational is named so", "[canopen][node]") {
+  CanopenBusConfig config = bus_of({node_5({in_pdo(0, 0x185, 0)})});
+  config.start_nodes = GENERATE(true, false);
+  Bus bus(config);
+  for (int i = 0; i < 6; ++i) {
+    bus.wait(1s);
+    bus.put(0x705, {0x7F});
+  }
+  CHECK_THAT(bus.error(), Catch::StartsWith("the node stays in the state pre-operational") &&
+                              Catch::Contains(config.start_nodes ? "NMT start" : "start_nodes"));
+  bus.put(0x085, {0x00, 0x62, 0x11, 0, 0, 0, 0, 0});
+  CHECK_THAT(bus.error(), Catch::EndsWith("; emergency 0x6200 device software (register 0x11)"));
 }
 
 TEST_CASE("without start_nodes no NMT command is sent", "[canopen][node]") {
@@ -327,6 +282,47 @@ TEST_CASE("mappings are read and objects found in them", "[canopen][node]") {
     answer({0x43, 0x00, 0x18, 0x01, 0x95, 0x01, 0x00, 0x80});
     CHECK(bus.fault() == Fault::device_error);
     CHECK(bus.error() == "TPDO 1 is switched off in the node");
+  }
+}
+
+TEST_CASE("a mapping is read again when another master has had the node", "[canopen][node]") {
+  CanopenNodeConfig node = node_5({object_channel(CanopenWay::pdo_object, {0x7130, 1})});
+  node.mappings_read = {1};
+  Bus bus(bus_of({node}));
+  const auto map = [&](std::uint8_t sub, std::uint8_t second_sub) {
+    bus.put(0x585, {0x43, 0x00, 0x18, 0x01, 0x85, 0x01, 0, 0});
+    bus.put(0x585, {0x4F, 0x00, 0x1A, 0x00, 2, 0, 0, 0});
+    bus.put(0x585, {0x43, 0x00, 0x1A, 0x01, 0x10, sub, 0x30, 0x71});
+    bus.put(0x585, {0x43, 0x00, 0x1A, 0x02, 0x10, second_sub, 0x30, 0x71});
+  };
+  const Bytes values{0xE1, 0x00, 0xE2, 0x00};
+  map(1, 2);
+  bus.put(0x705, {0x7F});  // from before our start
+  bus.put(0x705, {0x05});
+  bus.put(0x185, values);
+  CHECK(bus.temp_degC() == Approx(22.5));
+  bus.wait(2s);
+  bus.sent();
+  bus.put(0x705, {0x7F});
+  CHECK(bus.fault() == Fault::no_answer);
+  CHECK_THAT(bus.error(), Catch::Contains("pre-operational by another master"));
+  bus.put(0x185, values);  // started, before the heartbeat that shows it
+  CHECK(bus.fault() == Fault::no_answer);
+  CHECK(bus.sent().empty());  // the other master is not disturbed
+  bus.wait(5s);
+  bus.put(0x705, {0x7F});
+  CHECK(bus.sent() == std::vector<Sent>{start_5});
+  bus.put(0x705, {0x05});
+  CHECK(bus.sent().at(0) == Sent{0x605, {0x40, 0x00, 0x18, 0x01, 0, 0, 0, 0}});
+  SECTION("exchanged") {
+    map(2, 1);
+    bus.put(0x185, values);
+    CHECK(bus.temp_degC() == Approx(22.6));
+  }
+  SECTION("no longer mapped") {
+    map(2, 3);
+    bus.put(0x185, values);
+    CHECK(bus.fault() == Fault::device_error);
   }
 }
 
@@ -502,7 +498,7 @@ TEST_CASE("a TPDO at twice its rate gives no value", "[canopen][duplicate]") {
   CHECK(bus.fault(0) == Fault::device_error);
   CHECK(bus.fault(1) == Fault::none);
   CHECK(bus.error() ==
-        "COB-ID 389 is received too often: two nodes send it, or pdo_period_s is wrong");
+        "COB-ID 0x185 is received too often: two nodes send it, or pdo_period_s is wrong");
   run(1);
   CHECK(bus.fault(0) == Fault::none);
 }
@@ -542,7 +538,7 @@ TEST_CASE("two nodes that report the same COB-ID are both refused", "[canopen][d
   bus.put(0x185, {0xE1, 0x00});
   CHECK(bus.fault(0) == Fault::device_error);
   CHECK(bus.fault(1) == Fault::device_error);
-  CHECK(bus.error(0) == "COB-ID 389 is sent by node 6 (other) too");
+  CHECK(bus.error(0) == "COB-ID 0x185 is sent by node 6 (other) too");
   bus.put(0x706, {0x00});  // repaired
   map(0x586, 0x86);
   bus.put(0x185, {0xE1, 0x00});

@@ -87,6 +87,8 @@ struct Bus {
 
 constexpr std::uint64_t name_a = 0x8000FF0012345678;
 constexpr std::uint64_t name_b = 0x8000FF0087654321;
+/// Request for all NAMEs, from the null address.
+const Sent ask_for_names{0x18EAFFFE, {0x00, 0xEE, 0x00}};
 
 Bytes name_bytes(std::uint64_t name) {
   Bytes bytes;
@@ -192,7 +194,7 @@ TEST_CASE("only the device's own groups give its readings", "[j1939]") {
   bus.put(0x18FEEE80, {0xFF, 0xFF, 0x00});
   CHECK(bus.reading().fault == Fault::bad_frame);
   CHECK(bus.error() == "message too short");
-  CHECK(bus.sent().empty());  // it only listens
+  CHECK(bus.sent() == std::vector<Sent>{ask_for_names});  // else it only listens
   bus.line.closed(bus.now);
   CHECK(bus.reading().fault == Fault::no_answer);
 }
@@ -235,7 +237,7 @@ TEST_CASE("BAM: a group of several packets is assembled", "[j1939][transport]") 
     bus.put(0x1CEBFF80, second);
     CHECK(bus.reading().temp_degC == Approx(23.0));
   }
-  CHECK(bus.sent().empty());
+  CHECK(bus.sent() == std::vector<Sent>{ask_for_names});
 }
 
 TEST_CASE("BAM: the padding of the last packet is not content", "[j1939][transport]") {
@@ -269,7 +271,8 @@ TEST_CASE("RTS and CTS: a message sent to us is granted, received and acknowledg
   config.own_address = 0xF9;
   config.own_name = name_b;
   Bus bus(config);
-  CHECK(bus.sent() == std::vector<Sent>{{0x18EEFFF9, name_bytes(name_b)}});
+  CHECK(bus.sent() ==
+        std::vector<Sent>{{0x18EEFFF9, name_bytes(name_b)}, {0x18EAFFF9, ask_for_names.bytes}});
   // 17 bytes in 3 packets, at most 2 per grant.
   bus.put(0x1CECF980, {16, 17, 0, 3, 2, 0x00, 0xEF, 0x00});
   CHECK(bus.sent() == std::vector<Sent>{{0x1CEC80F9, {17, 2, 1, 0xFF, 0xFF, 0x00, 0xEF, 0x00}}});
@@ -309,8 +312,7 @@ TEST_CASE("a device is found by its NAME at any address", "[j1939][claim]") {
   J1939BusConfig config = bus_of(oil(), std::nullopt);
   config.nodes[0].name_claimed = name_a;
   Bus bus(config);
-  // Request for all NAMEs, from the null address.
-  CHECK(bus.sent() == std::vector<Sent>{{0x18EAFFFE, {0x00, 0xEE, 0x00}}});
+  CHECK(bus.sent() == std::vector<Sent>{ask_for_names});
   bus.put(0x18FEEE80, oil_bytes(0x2500));
   CHECK(bus.reading().fault == Fault::no_answer);
   CHECK(bus.error() == "no device has claimed an address with its NAME yet");
@@ -329,8 +331,11 @@ TEST_CASE("a device is found by its NAME at any address", "[j1939][claim]") {
     bus.put(0x18EEFF80, name_bytes(name_b));
     bus.put(0x18FEEE80, oil_bytes(0x2500));
     CHECK(bus.reading().fault == Fault::no_answer);
-    CHECK(bus.error() == "address 128 was claimed by 0x8000FF0087654321");
+    CHECK(bus.error() == "address 0x80 was claimed by 0x8000FF0087654321");
     bus.put(0x18EEFF80, name_bytes(name_a));  // it defends its address
+    bus.put(0x18FEEE80, oil_bytes(0x2500));
+    CHECK(bus.reading().fault == Fault::device_error);
+    bus.put(0x18EEFFFE, name_bytes(name_b));
     bus.put(0x18FEEE80, oil_bytes(0x2500));
     CHECK(bus.reading().temp_degC == Approx(23.0));
     CHECK(bus.error().empty());
@@ -346,8 +351,45 @@ TEST_CASE("a new NAME at a known address is reported", "[j1939][claim]") {
   Bus bus(bus_of(oil()));
   bus.put(0x18EEFF80, name_bytes(name_a));
   CHECK(bus.error().empty());
+  bus.now += 10s;  // exchanged
   bus.put(0x18EEFF80, name_bytes(name_b));
-  CHECK(bus.error() == "address 128: NAME changed from 0x8000FF0012345678 to 0x8000FF0087654321");
+  CHECK(bus.error() == "address 0x80: NAME changed from 0x8000FF0012345678 to 0x8000FF0087654321");
+  bus.put(0x18FEEE80, oil_bytes(0x2500));
+  CHECK(bus.reading().temp_degC == Approx(23.0));
+}
+
+TEST_CASE("a NAME that has left an address is no second sender", "[j1939][claim]") {
+  Bus bus(bus_of(oil()));
+  bus.put(0x18EEFF80, name_bytes(name_b));
+  bus.put(0x18EEFFFE, name_bytes(name_b));
+  bus.put(0x18EEFF80, name_bytes(name_a));
+  bus.put(0x18FEEE80, oil_bytes(0x2500));
+  CHECK(bus.reading().temp_degC == Approx(23.0));
+}
+
+TEST_CASE("two NAMEs in turn on one address are two senders", "[j1939][claim]") {
+  Bus bus(bus_of(oil()));
+  bus.put(0x18EEFF80, name_bytes(name_b));
+  bus.put(0x18EEFF80, name_bytes(name_a));  // defended, and the other goes on
+  const auto send = [&](int frames) {
+    for (int i = 0; i < frames; ++i) {
+      bus.now += 1s;
+      bus.put(0x18FEEE80, oil_bytes(0x2500));
+    }
+  };
+  send(60);
+  CHECK(bus.reading().fault == Fault::device_error);
+  CHECK_THAT(bus.error(), Catch::StartsWith("address 0x80 is claimed by 0x8000FF0087654321 and "
+                                            "0x8000FF0012345678"));
+  SECTION("until one of them claims another address") {
+    bus.put(0x18EEFF81, name_bytes(name_b));
+  }
+  SECTION("until the address was silent") {
+    bus.now += 31s;
+  }
+  send(1);
+  CHECK(bus.reading().temp_degC == Approx(23.0));
+  CHECK(bus.error().empty());
 }
 
 TEST_CASE("our address is announced on request, defended, and given up to a smaller NAME",

@@ -267,7 +267,9 @@ def test_frames_of_python_can(nodes):
         bus.send(can.Message(arbitration_id=0x18EEFF80, is_extended_id=True,
                              data=list(OTHER_NAME.to_bytes(8, "little"))))
         nodes.become(J1939, "no_answer", "somebody else claims the address")
-        nodes.expect_text("vehicle", f"address 128 was claimed by 0x{OTHER_NAME:016X}")
+        nodes.expect_text("vehicle", f"address 0x80 was claimed by 0x{OTHER_NAME:016X}")
         bus.send(can.Message(arbitration_id=0x18EAFFFE, is_extended_id=True,
                              data=[0x00, 0xEE, 0x00]))
-        nodes.become(J1939, "none", "the module defends it")
+        bus.send(can.Message(arbitration_id=0x18EEFFFE, is_extended_id=True,
+                             data=list(OTHER_NAME.to_bytes(8, "little"))))
+        nodes.become(J1939, "none", "the module defends it, the other gives it up")

@@ -168,12 +168,13 @@ CanController::Outgoing& CanController::outgoing(const CanSignal& signal) {
   return found;
 }
 
-CanController::Incoming& CanController::incoming(const CanSignal& signal) {
+CanController::Incoming& CanController::incoming(const CanSignal& signal, const std::string& what) {
   const CanId id = id_of(signal);
   const auto known = std::find_if(incoming_.begin(), incoming_.end(),
                                   [&](const Incoming& other) { return other.id == id; });
   Incoming& found = known != incoming_.end() ? *known : incoming_.emplace_back();
   found.id = id;
+  if (!found.what.ends_with(what)) found.what += (found.what.empty() ? "" : ", ") + what;
   return found;
 }
 
@@ -196,16 +197,18 @@ void CanController::plan_outgoing() {
 void CanController::plan_incoming() {
   for (std::size_t axis = 0; axis < config_.axes.size(); ++axis) {
     const CanAxis& place = config_.axes[axis];
+    const std::string what = "applied of axis " + place.name;
     if (place.travel && place.reads_back()) {
-      for (const CanSignal* signal : shown_signals(place)) incoming(*signal);
+      for (const CanSignal* signal : shown_signals(place)) incoming(*signal, what);
       shown_sets_.push_back({{}, axis, CanSetReader(place.travel->applied)});
     } else if (place.applied) {
-      incoming(*place.applied)
+      incoming(*place.applied, what)
           .values.emplace_back(*place.applied, &state_.applied_um[first_[axis]]);
     }
   }
   for (const CanControllerSignal& signal : config_.signals)
-    incoming(signal.value).values.emplace_back(signal.value, &state_.signals[signal.signal]);
+    incoming(signal.value, signal.name)
+        .values.emplace_back(signal.value, &state_.signals[signal.signal]);
 }
 
 void CanController::start() {
@@ -264,6 +267,7 @@ void CanController::run() {
 void CanController::open_or_pause() {
   const bool opened = socket_.open();
   handed_ = written_ = 0;
+  opened_at_ = monotonic_now();
   {
     const std::scoped_lock lock(health_mutex_);
     health_.last_error = socket_.error();
@@ -312,6 +316,8 @@ void CanController::take(const CanFrame& frame) {
     *target = decoded.value;
   }
   whole = take_sets(frame) && whole;
+  found->is_short = !whole;
+  found->short_bytes = frame.size;
   if (whole) {
     found->received_at = frame.received_at;
     found->seen = true;
@@ -376,8 +382,8 @@ void CanController::supervise(nanoseconds now) {
   }
   await_what_is_older(now - from_seconds(config_.silent_after_s));
   const bool all_seen = all_frames_seen() && all_sets_seen();
-  if (gate_.in_sync() && !all_seen) {
-    lose();
+  if (!all_seen && (gate_.in_sync() || now - opened_at_ > from_seconds(config_.silent_after_s))) {
+    if (gate_.in_sync()) lose();
     silent_ = true;
     report_error();
   } else if (!gate_.in_sync() && all_seen && now >= no_sending_before_) {
@@ -394,7 +400,22 @@ void CanController::report_error() {
   if (all_frames_seen() && !all_sets_seen())
     health_.last_error = "the read-back frames along a travel belong to two sets";
   else if (silent_)
-    health_.last_error = "the controller is silent";
+    health_.last_error = missing_text(monotonic_now());
+}
+
+/// Names the frames that are missing or too short, with their values.
+std::string CanController::missing_text(nanoseconds now) const {
+  std::string text;
+  bool is_silent = true;
+  for (const Incoming& frame : incoming_) {
+    const bool is_missing = now - frame.received_at > from_seconds(config_.silent_after_s);
+    is_silent = is_silent && is_missing && !frame.is_short;
+    if (!is_missing) continue;
+    text += (text.empty() ? "frame " : "; frame ") + to_string(frame.id) + " (" + frame.what + ")";
+    text += frame.is_short ? " has too few bytes: " + std::to_string(frame.short_bytes)
+                           : " is not received";
+  }
+  return is_silent ? "the controller is silent" : text;
 }
 
 void CanController::note_bus_state() {

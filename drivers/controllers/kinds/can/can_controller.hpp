@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <mutex>
+#include <string>
 #include <vector>
 
 #include "drivers/bus.hpp"
@@ -60,6 +61,9 @@ class CanController final : public ControllerLink {
   /// A frame to receive, with the places of its values in state_; sets are in shown_sets_.
   struct Incoming : Awaited {
     CanId id;
+    std::string what{};         ///< "applied of axis z, cutting_on"
+    std::size_t short_bytes{};  ///< of the last frame, if these are too few
+    bool is_short{false};
     std::vector<std::pair<CanSignal, double*>> values{};
   };
   /// The read-back set of an axis.
@@ -71,7 +75,7 @@ class CanController final : public ControllerLink {
   void plan_outgoing();
   void plan_incoming();
   Outgoing& outgoing(const CanSignal& signal);
-  Incoming& incoming(const CanSignal& signal);
+  Incoming& incoming(const CanSignal& signal, const std::string& what);
   void run();
   void open_or_pause();
   void receive();
@@ -84,6 +88,7 @@ class CanController final : public ControllerLink {
   void supervise(nanoseconds now);
   void note_bus_state();
   void report_error();
+  [[nodiscard]] std::string missing_text(nanoseconds now) const;
   void synchronise();
   void hold_applied(bool link_is_new);
   void number_sets();
@@ -111,7 +116,8 @@ class CanController final : public ControllerLink {
   std::uint64_t bus_offs_{0};  ///< count of the socket at the last check
   std::uint64_t handed_{0};    ///< frames given to the interface, for comparison with sent_out()
   std::uint64_t written_{0};   ///< handed_ at the newest confirmed write
-  bool silent_{false};         ///< lost because of missing frames, which have not returned
+  bool silent_{false};         ///< frames are missing for silent_after_s
+  nanoseconds opened_at_{};
   nanoseconds next_send_{};
   std::array<double, axes_max> held_um_{};  ///< sent for an axis that is not valid
   WaitFreeSlot<ControllerState> states_;
