@@ -272,6 +272,8 @@ class Join {
   }
 
   void add_row(double at_s, std::size_t i, bool takes_a, std::size_t j, bool takes_b) {
+    if (takes_a && std::ranges::binary_search(first_.references, i))
+      run_.references.push_back(run_.values[0].size());
     run_.values[0].push_back(at_s);
     std::size_t column = 1;
     for (const std::size_t of : from_first_)

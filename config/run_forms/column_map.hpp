@@ -21,6 +21,7 @@ enum class DateOrder { unknown, day_month_year, month_day_year, year_month_day }
 
 struct ColumnMap {
   std::string file;               ///< for messages
+  std::string encoding;           ///< of iconv(3); empty: detected
   std::optional<char> separator;  ///< ',', ';', '|', tab or blank
   std::optional<char> decimal;    ///< '.' or ','
   std::optional<char> thousands;  ///< between groups of three digits

@@ -105,6 +105,34 @@ std::string_view unit_of_cells(const TextColumn& column) {
   return first;
 }
 
+/// "Temp", "bed_temp", "T4", "t_bed"
+bool names_temperature(std::string_view base) {
+  const std::string name = small_letters(base);
+  const auto digit = name.find_first_not_of("0123456789", 1);
+  return name.find("temp") != std::string::npos || name.starts_with("t_") ||
+         name.starts_with("t ") || (name.starts_with('t') && digit == std::string::npos);
+}
+
+/// "T4_C", "Temp F", "tempC": a temperature's name and the letter of its unit; nullopt: another
+/// name, or one of a row of letters, such as Temp A, Temp B, Temp C.
+std::optional<SpelledName> lettered_name(const TextTable& table, std::string_view header) {
+  if (header.size() < 2 || (header.back() != 'C' && header.back() != 'F')) return std::nullopt;
+  const std::string_view front = header.substr(0, header.size() - 1);
+  const auto is_sibling = [&](const TextColumn& other) {
+    const std::string_view name = other.header;
+    return name.size() == header.size() && name.starts_with(front) && name.back() >= 'A' &&
+           name.back() <= 'Z' &&
+           std::string_view("CFK").find(name.back()) == std::string_view::npos;
+  };
+  if (std::ranges::any_of(table.columns, is_sibling)) return std::nullopt;
+  std::string_view base = front;
+  while (!base.empty() && (base.back() == '_' || base.back() == ' ')) base.remove_suffix(1);
+  if (base.empty() || (base.size() == front.size() && !names_temperature(base)))
+    return std::nullopt;
+  const std::string_view unit = header.substr(header.size() - 1);
+  return SpelledName{std::string(base), std::string(unit), spelled_unit(unit)};
+}
+
 /// A name that keeps its meaning in a file of our own form.
 bool is_plain(const std::string& name) {
   return is_column_name(name) && spelled_name(name).known == nullptr && name != "time_s";
@@ -133,6 +161,19 @@ bool counts_rows(const TextColumn& column) {
   return column.fields.size() > 1 &&
          std::ranges::all_of(
              column.fields, [&](std::string_view field) { return finite_number(field) == next++; });
+}
+
+/// Whether the same different fields recur in the same order, as addresses of devices that are
+/// polled one after the other: 1 2 3 1 2 3.
+bool recurs(const TextColumn& column) {
+  constexpr std::size_t period_max = 64;
+  const auto& fields = column.fields;
+  const auto end = std::find(fields.begin() + 1, fields.end(), fields[0]);
+  const auto period = static_cast<std::size_t>(end - fields.begin());
+  if (period < 2 || period > period_max || fields.size() < 4 * period) return false;
+  for (std::size_t row = period; row < fields.size(); ++row)
+    if (fields[row] != fields[row - period]) return false;
+  return std::set<std::string_view>(fields.begin(), end).size() == period;
 }
 
 /// "{ name = "t1_degC", unit = "0.1 degC" }"
@@ -259,7 +300,18 @@ class MeaningFinder {
       spelled.unit = column.unit;
       spelled.known = spelled_unit(column.unit);
     }
+    const auto lettered = spelled.unit.empty() && !has_own_unit(header)
+                              ? lettered_name(table_, header)
+                              : std::nullopt;
+    const bool is_temperature_name = lettered && names_temperature(lettered->base);
+    if (is_temperature_name) spelled = *lettered;
     const MappedColumn* mapped = table_.map.find(header);
+    if (lettered && !is_temperature_name && mapped == nullptr && !is_text(column))
+      return refused("may be in deg" + lettered->unit + ": " +
+                     write_column(header, with_name_and_unit(plain_name(lettered->base) + "_degC",
+                                                             "deg" + lettered->unit) +
+                                              ", or " + toml_text(plain_name(header)) +
+                                              " for a signal,"));
     const bool has_own = of_header.unit.empty() && has_own_unit(header);
     if (mapped == nullptr || mapped->unit.empty()) {
       if (const std::string why = unclear_unit(column, spelled); !why.empty()) return refused(why);
@@ -456,7 +508,8 @@ std::string unclear_role(const TextColumn& column) {
   if (!std::ranges::all_of(column.fields, is_number) || column.has_one_value() ||
       increases(column, finite_number))
     return {};
-  if (is_one_of(numbered_names, column.header))
+  const bool has_unit = !column.unit.empty() || has_own_unit(column.header);
+  if (is_one_of(numbered_names, column.header) || (!has_unit && recurs(column)))
     return "may say which sensor a row is of: write pivot = [" + name +
            ", \"the column of the values\"] in the file of --columns, or ignore = [" + name +
            "] if all rows are of the same";

@@ -14,6 +14,7 @@
 #include "config/run_forms/column_meanings.hpp"
 #include "config/run_forms/field_text.hpp"
 #include "config/run_forms/spelled_unit.hpp"
+#include "config/run_forms/time_stamp.hpp"
 #include "config/text/units.hpp"
 
 namespace thermocomp {
@@ -50,6 +51,7 @@ LongColumns long_columns(const TextTable& table) {
     std::set<std::string_view> distinct;
     for (const std::string_view field : column.fields)
       if (distinct.size() <= series_max) distinct.insert(field);
+    if (parse_time_stamp(column.fields[0])) continue;  // another time
     const bool named_value = is_one_of(value_names, column.header);
     if (named_value) found.values.push_back(i);
     if (!are_numbers && empty == 0 && distinct.size() == 1) found.one_word.push_back(i);
@@ -73,6 +75,15 @@ std::string series_of(const TextTable& table, std::size_t row,
   for (const std::size_t column : names)
     name.append(name.empty() ? "" : " ").append(table.columns[column].fields[row]);
   return name;
+}
+
+/// Whether a word differs from the one before in most rows, as those of devices that are polled one
+/// after the other.
+bool alternates(const TextColumn& column) {
+  std::ptrdiff_t changes = 0;
+  for (std::size_t row = 1; row < column.fields.size(); ++row)
+    if (column.fields[row] != column.fields[row - 1]) ++changes;
+  return 2 * changes > std::ssize(column.fields);
 }
 
 std::optional<LongForm> mapped_form(const TextTable& table, const LongColumns& found) {
@@ -137,7 +148,9 @@ std::optional<LongForm> long_form(const TextTable& table, const std::vector<doub
                            " if all numbers are of one sensor");
     return std::nullopt;
   }
-  const auto named = std::ranges::find_if(form.names, names_series, header);
+  const auto named = std::ranges::find_if(form.names, [&](std::size_t i) {
+    return names_series(header(i)) || (!found.numbers.empty() && alternates(table.columns[i]));
+  });
   const bool is_named = named != form.names.end();
   if (found.values.size() == 1) {
     form.value = found.values[0];
@@ -169,8 +182,8 @@ class Pivot {
     find_times();
     lines_.assign(times_.size(), 0);
     for (std::size_t row = 0; row < table_.rows(); ++row) {
+      if (is_switching(row)) continue;
       const std::string series = series_of(table_, row, form_.names);
-      if (series.starts_with("$RT_")) continue;  // WinCC: the archive was switched on or off
       if (!index_.contains(series) && wide_.size() == series_max) {
         table_.problems.add(table_.lines[row], table_.columns[form_.names[0]].header, series,
                             "must be one of at most " + std::to_string(series_max) + " series");
@@ -197,9 +210,15 @@ class Pivot {
     }
   }
 
+  /// WinCC: the archive was switched on or off.
+  [[nodiscard]] bool is_switching(std::size_t row) const {
+    return table_.columns[form_.names[0]].fields[row].starts_with("$RT_");
+  }
+
   /// The rows of the wide table.
   void find_times() {
-    for (const double at : time_s_) row_of_.emplace(at, 0);
+    for (std::size_t row = 0; row < time_s_.size(); ++row)
+      if (!is_switching(row)) row_of_.emplace(time_s_[row], 0);
     for (auto& [at, row] : row_of_) {
       if (times_.empty() || at - times_.back() > table_.map.scan_s) times_.push_back(at);
       row = times_.size() - 1;
