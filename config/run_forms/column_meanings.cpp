@@ -19,9 +19,9 @@ namespace {
 
 constexpr std::string_view unit_names = "|unit|units|einheit|unit_of_measurement|uom|u|";
 constexpr std::string_view series_names =
-    "|sensor|sensors|sensor_id|sensor_name|sensor name|channel|kanal|tag|tagname"
-    "|tag name|probe|place|point|messstelle|series|signal|variable|parameter"
-    "|metric|item|topic|entity_id|sphere|";
+    "|sensor|sensors|sensor_id|sensor id|sensor_name|sensor name|channel|kanal|tag|tagname"
+    "|tag name|probe|place|point|messstelle|series|signal|variable|parameter|name|_field"
+    "|metric|item|topic|entity_id|sphere|device|device_id|device id|device name|node|logger|";
 /// Names of quantities whose sensors may be numbered.
 constexpr std::string_view numbered_names =
     "|sensor|sensor_id|channel|kanal|ch|chan|probe|messstelle|sphere|";

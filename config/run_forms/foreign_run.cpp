@@ -27,7 +27,7 @@ namespace {
 constexpr std::string_view missing_words =
     "|na|n/a|#n/a|#nv|null|none|inf|ol|open|overflow|overload|burnout|burn out|unavailable"
     "|unknown|err|error|fault|no data|bad|invalid|#div/0!|#value!|undef|n.a.|disconnected|over"
-    "|under|overrange|over range|underrange|under range|no value|nodata|logged|nan|";
+    "|under|overrange|over range|underrange|under range|\\n|no value|nodata|logged|nan|";
 
 /// Those words, perhaps with a sign, or a field of signs only: "--.-", "+OVER", "#####".
 bool is_word_for_missing(std::string_view field) {

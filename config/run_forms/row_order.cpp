@@ -86,6 +86,18 @@ bool alternates(const TextColumn& column) {
   return 2 * changes > std::ssize(column.fields);
 }
 
+void ask_for_devices(const TextTable& table, const std::vector<std::size_t>& columns) {
+  for (const std::size_t i : columns) {
+    const std::string name = toml_text(table.columns[i].header);
+    if (!alternates(table.columns[i])) continue;
+    table.refuse_column(
+        i, "alternates, and may say which device a row is of: write pivot = [" + name +
+               ", \"the column of the values\"] in the file of --columns, or ignore = [" + name +
+               "] if all rows are of the same");
+    return;
+  }
+}
+
 std::optional<LongForm> mapped_form(const TextTable& table, const LongColumns& found) {
   std::vector<std::size_t> columns;
   for (const std::string& name : table.map.pivot) {
@@ -119,11 +131,13 @@ void keep_needed_names(const TextTable& table, const std::vector<double>& time_s
 }
 
 std::optional<LongForm> long_form(const TextTable& table, const std::vector<double>& time_s) {
-  const LongColumns found = long_columns(table);
+  LongColumns found = long_columns(table);
   if (!table.map.pivot.empty()) return mapped_form(table, found);
   const auto header = [&](std::size_t column) { return table.columns[column].header; };
   const bool has_number = found.numbers.size() == 1;
   LongForm form{found.words, has_number ? found.numbers[0] : 0, found.unit};
+  for (std::vector<std::size_t>* names : {&form.names, &found.one_word})
+    std::ranges::stable_partition(*names, names_series, header);
   // A single series has the same name in all rows.
   if (form.names.empty() && found.values.size() == 1)
     for (const std::size_t i : found.one_word)
@@ -148,9 +162,7 @@ std::optional<LongForm> long_form(const TextTable& table, const std::vector<doub
                            " if all numbers are of one sensor");
     return std::nullopt;
   }
-  const auto named = std::ranges::find_if(form.names, [&](std::size_t i) {
-    return names_series(header(i)) || (!found.numbers.empty() && alternates(table.columns[i]));
-  });
+  const auto named = std::ranges::find_if(form.names, names_series, header);
   const bool is_named = named != form.names.end();
   if (found.values.size() == 1) {
     form.value = found.values[0];
@@ -162,6 +174,8 @@ std::optional<LongForm> long_form(const TextTable& table, const std::vector<doub
               toml_text(header(*named)) + ", " + toml_text(header(found.numbers[0])) +
               "] to read one of them, or " + ignore_column(header(*named)) +
               " if all rows are of one sensor");
+    else if (!found.numbers.empty())
+      ask_for_devices(table, form.names);
     return std::nullopt;
   }
   keep_needed_names(table, time_s, form);
@@ -361,8 +375,33 @@ std::string remedy(const TextTable& table, const std::vector<double>& time_s, st
 
 }  // namespace
 
+/// A row that was sent twice.
+void leave_repeated_rows_out(TextTable& table, std::vector<double>& time_s) {
+  const auto repeats = [&](std::size_t row) {
+    return time_s[row] == time_s[row - 1] &&
+           std::ranges::all_of(table.columns, [row](const TextColumn& column) {
+             return column.fields[row] == column.fields[row - 1];
+           });
+  };
+  std::size_t kept = 1;
+  for (std::size_t row = 1; row < time_s.size(); ++row) {
+    if (repeats(row)) continue;
+    time_s[kept] = time_s[row];
+    table.lines[kept] = table.lines[row];
+    for (TextColumn& column : table.columns) column.fields[kept] = column.fields[row];
+    ++kept;
+  }
+  if (kept == time_s.size()) return;
+  table.notes.push_back("rows that repeat the one before left out: " +
+                        std::to_string(time_s.size() - kept));
+  time_s.resize(kept);
+  table.lines.resize(kept);
+  for (TextColumn& column : table.columns) column.fields.resize(kept);
+}
+
 void order_rows(TextTable& table, RunTime& time, const TimeColumns& columns) {
   std::vector<double>& time_s = time.time_s;
+  leave_repeated_rows_out(table, time_s);
   std::size_t column = columns.columns.empty() ? 0 : columns.columns.back();
   if (const auto form = long_form(table, time_s)) {
     Pivot(table, time_s, *form).run();

@@ -28,7 +28,7 @@ constexpr auto spellings = std::to_array<Spellings>({
     {"degF", "F", {"", "temperature", fahrenheit_step, -32 * fahrenheit_step, "_degC"}},
     // a difference
     {"delta_degF", "", {"", "temperature", fahrenheit_step, -kelvin_of_0_degC, "_K"}},
-    {"um µm μm micron microns micrometer micrometers", "", {"", "length", 1, 0, "_um"}},
+    {"um µm μm æm micron microns micrometer micrometers", "", {"", "length", 1, 0, "_um"}},
     {"nm", "", {"", "length", 1e-3, 0, "_um"}},
     {"mm millimeter millimeters Millimeters", "", {"", "length", 1e3, 0, "_mm"}},
     {"", "cm", {"", "length", 1e4, 0, "_mm"}},
@@ -95,6 +95,7 @@ constexpr auto degree_signs = std::to_array<DegreeSign>({{"℃", "c"},
                                                          {"º", ""},
                                                          {"˚", ""},
                                                          {"∘", ""},
+                                                         {"ø", ""},  // of DOS
                                                          {"\xB0", ""},
                                                          {"\xBA", ""}});
 
@@ -185,6 +186,21 @@ bool split_brackets(std::string_view header, SpelledName& name) {
   return false;
 }
 
+/// "T1/K", "I/A", "t/ms": a unit behind a stroke; one of time only behind a time.
+bool split_stroke(std::string_view header, SpelledName& name) {
+  constexpr std::string_view times = "|t|time|zeit|elapsed|elapsed time|laufzeit|";
+  const auto stroke = header.rfind('/');
+  if (stroke == std::string_view::npos || stroke == 0 || spelled_unit(header) != nullptr)
+    return false;
+  const std::string_view base = trimmed(header.substr(0, stroke));
+  const SpelledUnit* unit = spelled_unit(trimmed(header.substr(stroke + 1)));
+  if (unit == nullptr || unit->dimension == "none" ||
+      (unit->dimension == "time" && !is_one_of(times, base)))
+    return false;
+  name = {std::string(base), std::string(unit->spelling), unit};
+  return true;
+}
+
 /// "T1°C", "z/µm", "t1_degF": characters that occur in units only, and our suffix of another unit.
 bool split_letters(std::string_view header, SpelledName& name) {
   for (const std::string_view unit : {"°C", "ºC", "℃", "°F", "ºF", "_degF", "µm", "μm"}) {
@@ -224,7 +240,8 @@ const SpelledUnit* time_unit(std::string_view unit) {
 SpelledName spelled_name(std::string_view header) {
   header = trimmed(header);
   SpelledName name;
-  if (split_brackets(header, name) || split_blank(header, name) || split_letters(header, name))
+  if (split_brackets(header, name) || split_blank(header, name) || split_letters(header, name) ||
+      split_stroke(header, name))
     return name;
   return {std::string(header), "", nullptr};
 }

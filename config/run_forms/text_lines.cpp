@@ -122,7 +122,7 @@ std::string without_zeros(std::string_view bytes) {
   for (std::size_t i = 0; i < bytes.size(); ++i) {
     if (bytes[i] != '\0')
       text += bytes[i];
-    else if (i > 0 && bytes[i - 1] == '\0' && text.back() != '\n')
+    else if (i > 0 && bytes[i - 1] == '\0' && !text.ends_with('\n'))
       text += '\n';
   }
   return text;
@@ -265,6 +265,14 @@ TextLines find_lines(std::string& text, int lines_above, int first_line) {
     }
     lines.push_back({number, line});
   }
+  // A spreadsheet quotes whole lines whose separator it does not know.
+  const auto is_quoted = [](const TextLine& line) {
+    return line.text.size() > 2 && line.text.starts_with('"') && line.text.ends_with('"') &&
+           std::ranges::count(line.text, '"') == 2;
+  };
+  if (2 * std::ranges::count_if(lines, is_quoted) > std::ssize(lines))
+    for (TextLine& line : lines)
+      if (is_quoted(line)) line.text = line.text.substr(1, line.text.size() - 2);
   if (lines.size() > 2 && is_end(lines.back().text)) lines.pop_back();
   return found;
 }

@@ -429,6 +429,11 @@ class TableReader {
                         "in the file of --columns");
       return false;
     }
+    // Names that stand above a row of further ones: "Time" above "", "Min", "Max".
+    if (line > 0 && head_[line - 1].fields.size() == fields.size() &&
+        head_[line - 1].is_all_words())
+      for (std::size_t i = 0; i < fields.size(); ++i)
+        if (fields[i].empty()) fields[i] = head_[line - 1].fields[i];
     table_.has_header = true;
     table_.header_line = lines_[line].number;
     for (const std::string_view field : fields) names_.push_back(unquoted(field));

@@ -198,10 +198,10 @@ std::optional<double> take_zone(std::string_view& text) {
 
 /// "PM", "am": adds 12 hours, or makes hour 12 hour 0.
 bool take_half_of_day(std::string_view& text, TimeStamp& stamp) {
-  text = trimmed(text);
-  if (text.size() != 2 || (text[1] != 'M' && text[1] != 'm')) return text.empty();
-  const bool afternoon = text[0] == 'P' || text[0] == 'p';
-  if (!afternoon && text[0] != 'A' && text[0] != 'a') return false;
+  std::string half = small_letters(text);
+  std::erase_if(half, [](char c) { return c == ' ' || c == '.'; });  // Spanish "a. m."
+  const bool afternoon = half == "pm";
+  if (!afternoon && half != "am") return half.empty();
   if (!(stamp.clock_a >= 1 && stamp.clock_a <= 12)) return false;
   stamp.clock_a = (stamp.clock_a == 12 ? 0 : stamp.clock_a) + (afternoon ? 12 : 0);
   text = {};
@@ -317,7 +317,7 @@ std::string year_in_front(std::string_view text) {
          std::string(text.substr(clock - 2, text.size() - 5 - (clock - 2)));
 }
 
-/// "2026年3月1日 8時30分15秒" with plain signs; empty: a text without them.
+/// "2026年3月1日 8時30分15秒", "下午 8:30" with plain signs; empty: a text without them.
 std::string without_ideographs(std::string_view all) {
   constexpr std::array<std::pair<std::string_view, char>, 13> signs{{{"年", '-'},
                                                                      {"月", '-'},
@@ -332,18 +332,30 @@ std::string without_ideographs(std::string_view all) {
                                                                      {"시", ':'},
                                                                      {"분", ':'},
                                                                      {"초", ' '}}};
+  constexpr std::array<std::pair<std::string_view, const char*>, 6> halves{{{"上午", " AM"},
+                                                                            {"下午", " PM"},
+                                                                            {"午前", " AM"},
+                                                                            {"午後", " PM"},
+                                                                            {"오전", " AM"},
+                                                                            {"오후", " PM"}}};
   std::string text;
+  std::string half;
   bool has_sign = false;
   while (!all.empty()) {
-    const auto* const sign =
-        std::ranges::find_if(signs, [&](const auto& each) { return all.starts_with(each.first); });
+    const auto begins = [&](const auto& each) { return all.starts_with(each.first); };
+    if (const auto* const found = std::ranges::find_if(halves, begins); found != halves.end()) {
+      half = found->second;
+      all = trimmed(all.substr(found->first.size()));
+      continue;
+    }
+    const auto* const sign = std::ranges::find_if(signs, begins);
     const bool is_sign = sign != signs.end();
     has_sign = has_sign || is_sign;
     text += is_sign ? sign->second : all.front();
     all.remove_prefix(is_sign ? sign->first.size() : 1);
   }
   while (text.ends_with(':') || text.ends_with(' ')) text.pop_back();
-  return has_sign ? text : std::string();
+  return has_sign || !half.empty() ? text + half : std::string();
 }
 
 constexpr std::string_view time_names =
@@ -488,7 +500,9 @@ bool names_date(std::string_view header) {
 
 std::string_view unit_of_time_name(std::string_view header) {
   const auto bar = header.rfind('_');
-  if (bar == std::string_view::npos || bar == 0 || !names_time(header.substr(0, bar))) return {};
+  if (bar == std::string_view::npos || bar == 0) return {};
+  const std::string_view name = header.substr(0, bar);
+  if (!names_time(name) && !is_one_of("|t|", name)) return {};
   const SpelledUnit* unit = time_unit(header.substr(bar + 1));
   return unit != nullptr ? unit->spelling : std::string_view();
 }
