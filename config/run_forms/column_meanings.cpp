@@ -215,7 +215,7 @@ class MeaningFinder {
     for (const TextColumn& column : table_.columns) headers.push_back(column.header);
     const auto check = [&](const std::string& key, const std::string& header) {
       const auto count = std::ranges::count(headers, header);
-      if (count == 1) return;
+      if (count == 1 || (count == 0 && table_.map.is_of_several)) return;
       std::string rule = count > 1 ? "appears twice in " : "is not a column of ";
       rule += table_.problems.file();
       std::string near = nearest_name(header, headers);

@@ -155,7 +155,9 @@ std::optional<TimeColumns> mapped_time(const TextTable& table) {
 }
 
 std::optional<TimeColumns> find_clock(const TextTable& table) {
-  if (!table.map.time.empty()) return mapped_time(table);
+  const bool is_absent = table.map.is_of_several && !table.map.time.empty() &&
+                         table.find(table.map.time[0]) == table.columns.size();
+  if (!table.map.time.empty() && !is_absent) return mapped_time(table);
   if (const std::size_t own = table.find("time_s"); own < table.columns.size())
     return TimeColumns{{own}};
   Candidates found = candidates(table);
