@@ -127,7 +127,10 @@ std::optional<SpelledName> lettered_name(const TextTable& table, std::string_vie
   if (std::ranges::any_of(table.columns, is_sibling)) return std::nullopt;
   std::string_view base = front;
   while (!base.empty() && (base.back() == '_' || base.back() == ' ')) base.remove_suffix(1);
-  if (base.empty() || (base.size() == front.size() && !names_temperature(base)))
+  // Without a blank: "tempC", not "Temp1F", a floor.
+  const bool is_joined = base.size() == front.size();
+  if (base.empty() ||
+      (is_joined && !(names_temperature(base) && base.back() >= 'a' && base.back() <= 'z')))
     return std::nullopt;
   const std::string_view unit = header.substr(header.size() - 1);
   return SpelledName{std::string(base), std::string(unit), spelled_unit(unit)};

@@ -226,10 +226,9 @@ const SpelledUnit* spelled_unit(std::string_view unit) {
   if (unit.starts_with("Âµ")) return find(unit.substr(std::string_view("Â").size()));
   // "UM", "Rpm"; of electricity the size of a letter matters.
   const auto* const small = unit.size() > 1 ? find(small_letters(unit)) : nullptr;
-  const auto is_any_size = [&](std::string_view dimension) {
-    return small->dimension == dimension;
-  };
-  return small != nullptr && (is_any_size("length") || is_any_size("speed")) ? small : nullptr;
+  const bool is_any_size = small != nullptr && !small->only_in_brackets &&
+                           (small->dimension == "length" || small->dimension == "speed");
+  return is_any_size ? small : nullptr;
 }
 
 const SpelledUnit* time_unit(std::string_view unit) {
@@ -324,7 +323,7 @@ bool may_be_unit(std::string_view text) {
   const std::string small = small_letters(text);
   if (small.find('%') != std::string::npos || small.find("deg") != std::string::npos) return true;
   for (const DegreeSign& sign : degree_signs)
-    if (small.find(sign.bytes) != std::string::npos) return true;
+    if (sign.bytes != "ø" && small.find(sign.bytes) != std::string::npos) return true;
   std::string word;
   for (const char c : small + ' ') {
     const bool is_letter = (c >= 'a' && c <= 'z') || static_cast<unsigned char>(c) >= 0x80;

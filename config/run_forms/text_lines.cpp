@@ -76,6 +76,8 @@ constexpr Binary binaries[] = {
 bool has_zeros_at(std::string_view bytes, std::size_t first) {
   const std::size_t size = std::min<std::size_t>(bytes.size(), 200);
   std::size_t zeros = 0;
+  for (std::size_t i = 1 - first; i < size; i += 2)
+    if (bytes[i] == '\0') return false;
   for (std::size_t i = first; i < size; i += 2) zeros += bytes[i] == '\0' ? 1U : 0U;
   return size >= 8 && 10 * zeros > 4 * size;
 }

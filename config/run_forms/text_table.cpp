@@ -106,10 +106,12 @@ bool is_known_row_of_numbers(const HeadLine& line) {
 }
 
 /// Whether a line has words, and neither a number nor a time: an event, the end of a file. The
-/// statistics of the columns are such a line, too.
-bool is_remark(const TableFields& fields) {
+/// statistics of the columns are such a line, too, unless rows begin with words.
+bool is_remark(const TableFields& fields, bool begins_with_words) {
   if (fields.empty() || fields[0].empty()) return false;
-  if (is_one_of(statistic_words, fields[0].substr(0, fields[0].find_first_of(".:")))) return true;
+  if (!begins_with_words &&
+      is_one_of(statistic_words, fields[0].substr(0, fields[0].find_first_of(".:"))))
+    return true;
   std::ptrdiff_t texts = 0;
   for (const std::string_view field : fields) {
     const FieldKind kind = kind_of_field(field);
@@ -505,7 +507,9 @@ class TableReader {
         continue;
       }
       while (fields.size() > columns && fields.back().empty()) fields.pop_back();
-      if (table_.rows() > 0 && is_remark(fields)) {
+      const bool begins_with_words =
+          table_.rows() > 0 && kind_of_field(table_.columns[0].fields[0]) == FieldKind::text;
+      if (table_.rows() > 0 && is_remark(fields, begins_with_words)) {
         take_remark(fields, line);
         continue;
       }

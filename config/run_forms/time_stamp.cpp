@@ -15,11 +15,20 @@
 namespace thermocomp {
 namespace {
 
-/// Beginnings of each month's names in English, German, French, Spanish, Italian, Portuguese.
+/// Names of each month in English, German, French, Spanish, Italian and Portuguese.
 constexpr std::array<std::string_view, 12> month_names{
-    "jan ene gen", "feb fév fev",     "mar mär mrz",  "apr avr abr",
-    "may mai mag", "jun juin giu",    "jul juil lug", "aug aoû aou ago",
-    "sep set",     "oct okt ott out", "nov",          "dec dez déc dic"};
+    "|jan|january|januar|janv|janvier|ene|enero|gen|gennaio|janeiro|",
+    "|feb|february|februar|fév|févr|fev|février|febrero|febbraio|fevereiro|",
+    "|mar|march|mär|mrz|märz|mars|marzo|março|",
+    "|apr|april|avr|avril|abr|abril|aprile|",
+    "|may|mai|mayo|mag|maggio|maio|",
+    "|jun|june|juni|juin|junio|giu|giugno|junho|",
+    "|jul|july|juli|juil|juillet|julio|lug|luglio|julho|",
+    "|aug|august|aoû|août|aout|ago|agosto|",
+    "|sep|sept|september|septembre|septiembre|set|settembre|setembro|",
+    "|oct|okt|october|oktober|octobre|octubre|ott|ottobre|out|outubro|",
+    "|nov|november|novembre|noviembre|novembro|",
+    "|dec|dez|december|dezember|déc|décembre|dic|diciembre|dicembre|dezembro|"};
 /// Names of days, at most three letters; longer ones end in "day", "tag", "woch" or "di".
 constexpr std::string_view day_names =
     "|mon|tue|wed|thu|fri|sat|sun|mo|di|mi|do|fr|sa|so|lun|mar|mer|jeu|ven|sam|dim|gio|sab|dom|";
@@ -77,16 +86,12 @@ std::string_view take_word(std::string_view& text) {
 
 std::optional<int> take_month_name(std::string_view& text) {
   std::string_view rest = text;
-  const std::string name = small_letters(take_word(rest));
-  for (std::size_t month = 0; month < month_names.size() && !name.empty(); ++month) {
-    std::string_view beginning;
-    for (std::string_view all = month_names[month]; take(all, ' ', beginning);) {
-      if (!name.starts_with(beginning)) continue;
-      text = rest;
-      return static_cast<int>(month) + 1;
-    }
-  }
-  return std::nullopt;
+  const std::string_view name = take_word(rest);
+  const auto* const found = std::ranges::find_if(
+      month_names, [&](std::string_view names) { return !name.empty() && is_one_of(names, name); });
+  if (found == month_names.end()) return std::nullopt;
+  text = rest;
+  return static_cast<int>(found - month_names.begin()) + 1;
 }
 
 /// Takes "Thu", "Do., ", "Thursday, ".
@@ -319,6 +324,8 @@ std::string year_in_front(std::string_view text) {
 
 /// "2026年3月1日 8時30分15秒", "下午 8:30" with plain signs; empty: a text without them.
 std::string without_ideographs(std::string_view all) {
+  if (std::ranges::none_of(all, [](char c) { return static_cast<unsigned char>(c) >= 0xe0; }))
+    return {};
   constexpr std::array<std::pair<std::string_view, char>, 13> signs{{{"年", '-'},
                                                                      {"月", '-'},
                                                                      {"日", ' '},

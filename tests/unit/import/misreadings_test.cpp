@@ -457,6 +457,8 @@ TEST_CASE("lines and bytes that are no rows", "[import]") {
       {"events, another header and statistics",
        "Time [s];T [C]\n0;20\n*** door opened\nTime [s];T [C]\n60;21\n\nMin;20,0\nEnd of data\n",
        run, ""},
+      {"a series called max", "name,Time [s],value\nmax,0,20\nmin,0,19\nmax,60,21\nmin,60,18\n",
+       "time_s,max,min\n0,20,19\n60,21,18\n", ""},
       {"a header in another order",
        "Time [s],T [C],z [um]\n0,20,1\nTime [s],z [um],T [C]\n60,2,21\n",
        "log:3: Time [s],z [um],T [C]: names the columns in another order than line 1", ""},
@@ -496,6 +498,8 @@ TEST_CASE("units, missing values and devices of further programs", "[import]") {
       named("T/°C"),
       named("T [\xf8"
             "C]"),
+      {"a floor", "Time [s],Temp1F,T (IN)\n0,20,30\n", "column 3 = T (IN): has an unknown unit",
+       ""},
       {"letters of sensors", "Time [s],Temp A,Temp B,Temp C\n0,20,30,40\n",
        "time_s,Temp_A,Temp_B,Temp_C\n0,20,30,40\n", ""},
       {"a letter behind another name", "Time [s],bed_C\n0,20\n",
