@@ -176,7 +176,8 @@ def main():
                                 {(b["kind"], b["column"]) for b in before} for f in with_others)
             count_clean(machine, run, before, sensor_days, clean_named)
             told = {(f["kind"], f["column"]) for f in before + with_others if f["probability"] >= 0.5}
-            judged = [key for key in told if key[0] in KINDS]
+            judged = {(f["kind"], f["column"]) for f in before
+                      if f["probability"] >= 0.5 and f["kind"] in KINDS}
             untouched_named += len(judged)
             untouched_columns += sum(n.endswith(("_degC", "_um")) for n in run)
             print(machine, name, "untouched:", sorted(map(str, told)), file=sys.stderr)
