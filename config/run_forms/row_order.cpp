@@ -369,8 +369,8 @@ std::string remedy(const TextTable& table, const std::vector<double>& time_s, st
   if (row == 1 && table.lines[0] < table.lines[1])
     return "delete line " + std::to_string(table.lines[0]) +
            " if it belongs to the header, or put the rows in the order of time";
-  return "put the rows in the order of time; where the clock was set, delete the lines before or "
-         "after it";
+  return "put the rows in the order of time; where the clock was set or the logger began anew, "
+         "give the lines from this one on a file of their own";
 }
 
 }  // namespace
