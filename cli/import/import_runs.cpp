@@ -299,7 +299,8 @@ class Join {
     const std::string suffix(unit_of(column).suffix);
     const std::string base = column.substr(0, column.size() - suffix.size());
     std::string name = column;
-    for (int i = 2; is_taken(name); ++i) name = base + "_" + std::to_string(i) + suffix;
+    for (int i = 2; is_taken(name); ++i)
+      name = std::string(base).append("_").append(std::to_string(i)).append(suffix);
     if (name != column)
       run_.understood.push_back(column + " of " + second_.name + " is " + name + ", since " +
                                 first_.name + " has a column of that name");

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <string>
 #include <utility>
 
@@ -405,8 +406,8 @@ bool are_multiples_of(double unit, const std::vector<double>& numbers) {
 
 /// The least and the greatest difference of consecutive numbers.
 std::pair<double, double> steps_of(const std::vector<double>& numbers, double (*seconds)(double)) {
-  double low = INFINITY;
-  double high = -INFINITY;
+  double low = std::numeric_limits<double>::infinity();
+  double high = -std::numeric_limits<double>::infinity();
   for (std::size_t i = 1; i < numbers.size(); ++i) {
     const double step = seconds(numbers[i]) - seconds(numbers[i - 1]);
     low = std::min(low, step);

@@ -91,11 +91,13 @@ void check_unit(const RunFile& run, std::size_t index, std::size_t column, Suspi
     ranges.push_back(range_of(run.values[i]));
   }
   if (beginnings.empty()) return;
-  const auto [low, high] = std::minmax_element(beginnings.begin(), beginnings.end());
+  const auto ends = std::minmax_element(beginnings.begin(), beginnings.end());
+  const double low = *ends.first;
+  const double high = *ends.second;
   const double first = first_finite(values);
   const double larger = range_of(values) / std::max(median(ranges), 0.1);
   const auto is_near = [&](double value, double reach_K) {
-    return value >= *low - reach_K && value <= *high + reach_K;
+    return value >= low - reach_K && value <= high + reach_K;
   };
   const auto would_fit = [&](double factor) {
     return beginnings.size() > 1 && !is_near(first, apart_K) && is_near(factor * first, near_K) &&
@@ -112,9 +114,9 @@ void check_unit(const RunFile& run, std::size_t index, std::size_t column, Suspi
   else if (drop_outs * cool <= static_cast<std::ptrdiff_t>(values.size()) &&
            std::abs(first - zero_degC_in_K - median(beginnings)) <= near_K)
     offer(zero_degC_in_K, "K");
-  else if (would_fit(-1.0) && first < 0 && *low > 0 && moves_against_others(run, column))
+  else if (would_fit(-1.0) && first < 0 && low > 0 && moves_against_others(run, column))
     offer(-1.0, "times");
-  else if (would_fit(10.0) && *low > apart_K && larger < 1.0 / larger_min)
+  else if (would_fit(10.0) && low > apart_K && larger < 1.0 / larger_min)
     offer(0.1, "times");
 }
 
@@ -179,11 +181,11 @@ bool was_operated_so(const RunFile& run, const Noisy& noisy, const std::vector<d
     if ((w < noisy.begin || w >= noisy.end) && noise[w] < 2.0 * usual) quiet.push_back(w);
   for (std::size_t i = 0; i < run.columns.size(); ++i) {
     if (!is_operating(run.columns[i]) || run.columns[i] == "time_s") continue;
-    const auto [low, high] = std::minmax_element(run.values[i].begin(), run.values[i].end());
+    const double range = range_of(run.values[i]);
     for (std::size_t w = noisy.begin; w < noisy.end; ++w) {
       const double here = mean(i, w, w + 1);
       if (std::none_of(quiet.begin(), quiet.end(), [&](std::size_t q) {
-            return !(std::abs(mean(i, q, q + 1) - here) > share * (*high - *low));
+            return !(std::abs(mean(i, q, q + 1) - here) > share * range);
           }))
         return false;
     }
