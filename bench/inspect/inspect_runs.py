@@ -1,5 +1,6 @@
 """Plants a fault of one reading (2 K jump, 4 K creep, 0.4 of the motion left, 3 K spikes, a stuck
-channel, a jump of a displacement) into each measured recording and runs `thermocomp inspect`.
+channel, 20 times the noise, tenfold or negative) or displacement (a jump, one value for a while,
+tenfold or negative beside the machine's other runs), or a time in minutes beside them, into each measured recording and runs `thermocomp inspect`.
 Right: the most likely finding of 0.5 or more that the unchanged recording lacks names column and
 kind. `--scores FILE` writes all scores, from which probability.cpp was set."""
 
@@ -17,8 +18,12 @@ import time
 SOURCE = pathlib.Path(__file__).resolve().parents[2]
 DATA = pathlib.Path(os.environ.get("THERMOCOMP_DATA", SOURCE.parent / "shared" / "data"))
 PROGRAM = pathlib.Path(os.environ["THERMOCOMP_BENCH_BUILD"]) / "bin" / "thermocomp-modelling"
-KINDS = ("sensor_step", "sensor_drift", "sensor_loose", "spikes", "stuck", "displacement_step")
-FACTS = ("gap", "clock", "coarse", "copy")
+KINDS = ("sensor_step", "sensor_drift", "sensor_loose", "spikes", "stuck", "displacement_step",
+         "noise", "frozen", "unit", "scale", "minutes")
+FOUND_AS = {"spikes": ("spikes", "outliers"), "frozen": ("stuck",), "scale": ("unit",),
+            "minutes": ("clock",)}
+BESIDE = ("scale", "minutes")  # with the other recordings of the machine
+FACTS = ("gap", "coarse", "copy")
 SEEDS = 25
 CASES = 2  # of each kind on each recording
 MINUTE_S = 60.0
@@ -70,7 +75,7 @@ def write(run, path):
 
 def planted(run, kind, chance):
     """(run with the fault, column, at_s); None if the recording has no such column."""
-    displacement = kind == "displacement_step"
+    displacement = kind in ("displacement_step", "frozen", "scale")
     columns = [n for n in run if (n.endswith("_um") if displacement else n.endswith("_degC"))
                and "target" not in n and max(run[n]) > min(run[n])]
     if not columns:
@@ -101,20 +106,34 @@ def planted(run, kind, chance):
     elif kind == "spikes":
         for i in chance.sample(range(10, rows - 10), 3):
             values[i] += chance.choice((-3.0, 3.0))
-    elif kind == "stuck":
+    elif kind == "noise":
+        bends = sorted(abs(a - 2 * b + c) for a, b, c in zip(values, values[1:], values[2:]))
+        deviation = max(20 * 0.605 * bends[len(bends) // 2], 0.2)
+        for i in range(at, min(rows, at + rows // 8)):
+            values[i] += chance.gauss(0, deviation)
+    elif kind in ("unit", "scale"):
+        factor = chance.choice((10.0, -1.0))
+        values = [factor * v for v in values]
+    elif kind == "minutes":
+        first = run["time_s"][0]
+        times = [(t - first) / 60 for t in run["time_s"]]
+        return {**run, "time_s": times}, None, first
+    elif kind in ("stuck", "frozen"):
         end = min(rows, at + rows // 5)
         values[at:end] = [values[at]] * (end - at)
     return {**run, name: values}, name, run["time_s"][at]
 
 
-def inspect(run, folder):
-    path = folder / "run.csv"
-    write(run, path)
-    done = subprocess.run([PROGRAM, "inspect", path, "--all", "--json", "-"], capture_output=True,
-                          text=True)
+def inspect(run, folder, beside=()):
+    paths = [folder / f"run{i}.csv" for i in range(1 + len(beside))]
+    for path, each in zip(paths, (*beside, run)):
+        write(each, path)
+    done = subprocess.run([PROGRAM, "inspect", *paths, "--all", "--json", "-"],
+                          capture_output=True, text=True)
     if done.returncode not in (0, 1):
         raise RuntimeError(done.stderr)
-    return json.loads(done.stdout)["findings"]
+    findings = json.loads(done.stdout)["findings"]
+    return [f for f in findings if f["run"].endswith(paths[-1].name)]
 
 
 def simulated(folder):
@@ -142,15 +161,23 @@ def main():
     table = {}
     false_named, untouched_named, untouched_columns = 0, 0, 0
     sensor_days, clean_named = {}, {}
-    cases = 0
+    cases, named_beside = 0, 0
     with tempfile.TemporaryDirectory() as temporary:
         folder = pathlib.Path(temporary)
         chance = random.Random(14)
-        for machine, name, run in recordings():
+        measured = list(recordings())
+        for machine, name, run in measured:
+            beside = [other for also, _, other in measured
+                      if also == machine and other is not run and list(other) == list(run)][:2]
             before = inspect(run, folder)
+            with_others = inspect(run, folder, beside)
+            named_beside += sum(f["probability"] >= 0.8 and f["kind"] not in FACTS and
+                                (f["kind"], f["column"]) not in
+                                {(b["kind"], b["column"]) for b in before} for f in with_others)
             count_clean(machine, run, before, sensor_days, clean_named)
-            told = {(f["kind"], f["column"]) for f in before if f["probability"] >= 0.5}
-            judged = [key for key in told if key[0] in KINDS]
+            told = {(f["kind"], f["column"]) for f in before + with_others if f["probability"] >= 0.5}
+            judged = {(f["kind"], f["column"]) for f in before
+                      if f["probability"] >= 0.5 and f["kind"] in KINDS}
             untouched_named += len(judged)
             untouched_columns += sum(n.endswith(("_degC", "_um")) for n in run)
             print(machine, name, "untouched:", sorted(map(str, told)), file=sys.stderr)
@@ -158,18 +185,18 @@ def main():
             for kind in KINDS:
                 for _ in range(CASES):
                     case = planted(run, kind, chance)
-                    if case is None:
+                    if case is None or (kind in BESIDE and not beside):
                         continue
                     changed, column, at_s = case
-                    found = inspect(changed, folder)
+                    found = inspect(changed, folder, beside if kind in BESIDE else ())
                     scores += [{"machine": machine, "run": name, "planted": [kind, column, at_s],
                                 **f} for f in found]
                     named = [f for f in found if f["probability"] >= 0.5
                              and (f["kind"], f["column"]) not in told]
-                    accepted = (kind, "outliers") if kind == "spikes" else (kind,)
+                    accepted = FOUND_AS.get(kind, (kind,))
                     right = any(f["kind"] in accepted and f["column"] == column for f in named)
                     of_column = any(f["column"] == column for f in named)
-                    wrong = sum(f["column"] != column and f["kind"] in KINDS for f in named)
+                    wrong = sum(f["column"] not in (column, None) and f["kind"] in KINDS for f in named)
                     cell = table.setdefault((machine, kind), [0, 0, 0, 0])
                     for i, value in enumerate((1, right, of_column, wrong)):
                         cell[i] += value
@@ -199,6 +226,7 @@ def main():
     print(f"named_on_untouched_columns {100 * untouched_named / untouched_columns:.1f} %")
     for machine, days in sensor_days.items():
         print(f"clean_{machine}_named {clean_named[machine]} in_{days:.0f}_sensor_days")
+    print(f"named_beside_other_runs {named_beside} count")
     print(f"inspect_spindle_32h_22_columns {seconds:.2f} s")
 
 

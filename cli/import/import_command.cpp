@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <memory>
@@ -11,6 +12,7 @@
 #include "cli/commands.hpp"
 #include "cli/import/import_runs.hpp"
 #include "config/runs/run_file.hpp"
+#include "config/text/problems.hpp"
 #include "report/files.hpp"
 
 namespace thermocomp::cli {
@@ -54,26 +56,55 @@ RunFile read_log(const std::string& file, const ColumnMap& map) {
   return run;
 }
 
+/// Refuses a column of the map that neither of two files has.
+void check_mapped(const ColumnMap& map, const std::vector<RunFile>& runs) {
+  std::vector<std::string> headers = map.ignored;
+  for (const auto& [header, column] : map.columns) headers.push_back(header);
+  const auto is_read = [&](const RunFile& run, const std::string& header) {
+    return std::ranges::any_of(run.understood, [&](const std::string& line) {
+      return line.starts_with("'" + header + "'");
+    });
+  };
+  for (const std::string& header : headers)
+    if (!header.empty() &&
+        std::ranges::none_of(runs, [&](const RunFile& run) { return is_read(run, header); }))
+      throw ConfigurationError(
+          {Problem{map.file, 0, "columns", header,
+                   "is a column neither of " + runs[0].name + " nor of " + runs[1].name}});
+}
+
 int run_import(const ImportOptions& options) {
   ColumnMap map;
   if (!options.columns.empty()) map = load_column_map(options.columns);
   map.takes_signals = true;
+  map.is_of_several = !options.join.empty();
   if (!options.names.empty()) map.names = options.names;
   if (options.period_s) map.period_s = options.period_s;
   if (options.shift_s && options.join.empty())
     throw Failure("--shift-s is the shift of the file of --join, which is missing");
   RunFile run = read_log(options.log, map);
-  if (!options.corrections.empty()) {
-    run.understood.clear();
-    run = displacements_of(std::move(run), options.corrections == "steps" ? CorrectionEntry::step
-                                                                          : CorrectionEntry::total);
-    print_lines(options.output, run.understood);
-  }
-  if (!options.join.empty()) {
+  const auto convert = [&](RunFile& corrections) {
+    corrections.understood.clear();
+    corrections = displacements_of(std::move(corrections), options.corrections == "steps"
+                                                               ? CorrectionEntry::step
+                                                               : CorrectionEntry::total);
+    print_lines(options.output, corrections.understood);
+  };
+  const bool has_corrections = !options.corrections.empty();
+  if (options.join.empty()) {
+    if (has_corrections) convert(run);
+  } else {
     ColumnMap of_second = map;
     of_second.names.clear();
     of_second.period_s.reset();
-    run = joined_runs(run, read_log(options.join, of_second), options.shift_s);
+    RunFile second = read_log(options.join, of_second);
+    check_mapped(map, {run, second});
+    if (has_corrections && has_axes(run) && has_axes(second))
+      throw Failure(
+          "--corrections is of one file, and both have columns named like axes: give "
+          "those that are no corrections other names in the file of --columns");
+    if (has_corrections) convert(has_axes(second) ? second : run);
+    run = joined_runs(run, second, options.shift_s);
     print_lines(options.output, run.understood);
   }
   OutputFile file(options.output);

@@ -78,7 +78,7 @@ double correlation(const std::vector<double>& a, const std::vector<double>& b,
 }
 
 void try_pair(const std::vector<double>& a, const std::vector<double>& b, double offset_s,
-              const std::string& columns, ClockShift& best) {
+              double expected_s, const std::string& columns, ClockShift& best) {
   const auto size_a = static_cast<std::ptrdiff_t>(a.size());
   const auto size_b = static_cast<std::ptrdiff_t>(b.size());
   const std::ptrdiff_t common = std::max(points_min, std::min(size_a, size_b) / 3);
@@ -92,6 +92,10 @@ void try_pair(const std::vector<double>& a, const std::vector<double>& b, double
   if (by_shift.empty() || !(by_shift[static_cast<std::size_t>(strongest)] > best.correlation))
     return;
   best.correlation = by_shift[static_cast<std::size_t>(strongest)];
+  const auto expected = std::lround((expected_s - offset_s) / best.step_s) - common + size_b;
+  best.at_expected = expected >= 0 && expected < std::ssize(by_shift)
+                         ? by_shift[static_cast<std::size_t>(expected)]
+                         : 0.0;
   best.shift_s = offset_s + best.step_s * static_cast<double>(strongest + common - size_b);
   best.columns = columns;
   // r falls on both sides of its peak; where it rises by more than 0.05, another peak follows.
@@ -113,7 +117,8 @@ bool ClockShift::is_sure() const noexcept {
   return correlation >= correlation_min && correlation - next >= lead_min;
 }
 
-std::optional<ClockShift> clock_shift(const RunFile& first, const RunFile& second) {
+std::optional<ClockShift> clock_shift(const RunFile& first, const RunFile& second,
+                                      double expected_s) {
   const auto length_s = [](const RunFile& run) { return run.time_s().back() - run.time_s()[0]; };
   const auto step_s = [&](const RunFile& run) {
     return length_s(run) / static_cast<double>(std::max<std::size_t>(run.rows(), 2) - 1);
@@ -134,7 +139,7 @@ std::optional<ClockShift> clock_shift(const RunFile& first, const RunFile& secon
     const std::vector<double> a = changes(first, i, best.step_s, lag);
     for (std::size_t j = 0; j < of_second.size(); ++j)
       if (!a.empty() && !of_second[j].empty())
-        try_pair(a, of_second[j], offset_s,
+        try_pair(a, of_second[j], offset_s, expected_s,
                  "'" + first.columns[i] + "' and '" + second.columns[j] + "'", best);
   }
   return best.columns.empty() ? std::nullopt : std::optional(best);
@@ -177,6 +182,31 @@ struct Shift {
   std::string why;
 };
 
+/// Refuses dates if the columns change alike at quite another shift: a clock on another zone, or
+/// not changed to summer time.
+Shift shift_by_dates(const RunFile& first, const RunFile& second) {
+  constexpr double lag_s_max = 1800.0;  // a displacement may follow a temperature so late
+  const double by_dates_s = second.wall_zero->seconds - first.wall_zero->seconds;
+  const auto seen = clock_shift(first, second, by_dates_s);
+  const double apart_s = seen ? seen->shift_s - by_dates_s : 0.0;
+  if (!seen || !(std::abs(apart_s) > lag_s_max) || seen->correlation < correlation_min ||
+      seen->correlation - seen->at_expected < lead_min)
+    return {by_dates_s, "by their dates"};
+  // Clocks differ by whole hours, and the shift is known to a step of the grid.
+  const double hours_s = 3600.0 * std::round(apart_s / 3600.0);
+  const double shift_s =
+      by_dates_s + (std::abs(apart_s - hours_s) <= seen->step_s ? hours_s : std::round(apart_s));
+  const std::string alike = seen->columns + " change alike at " + number_text(shift_s) +
+                            " s (correlation " + two_digits(seen->correlation) + ", by the dates " +
+                            two_digits(seen->at_expected) + ", at most " + two_digits(seen->next) +
+                            " at other shifts)";
+  if (!seen->is_sure()) return {by_dates_s, "by their dates; but " + alike + ", which is not sure"};
+  refuse(second, "--shift-s", "(missing)",
+         "the dates give " + number_text(by_dates_s) + " s, but " + alike +
+             ": one clock seems to be set differently; write --shift-s " + number_text(shift_s) +
+             ", or --shift-s " + number_text(by_dates_s) + " if the dates are right");
+}
+
 Shift shift_of(const RunFile& first, const RunFile& second, std::optional<double> shift_s) {
   if (shift_s) return {*shift_s, "given by --shift-s"};
   std::string why;
@@ -185,7 +215,7 @@ Shift shift_of(const RunFile& first, const RunFile& second, std::optional<double
       why = run->name + " has no dates, so the shift between the two clocks is unknown";
   if (why.empty() && first.wall_zero->is_utc != second.wall_zero->is_utc)
     why = "only one of the two gives its time zone";
-  if (why.empty()) return {second.wall_zero->seconds - first.wall_zero->seconds, "by their dates"};
+  if (why.empty()) return shift_by_dates(first, second);
   const auto seen = seen_shift(first, second, why);
   return {seen->shift_s, "since " + seen->columns + " change alike there (correlation " +
                              two_digits(seen->correlation) + ", at most " + two_digits(seen->next) +
@@ -230,12 +260,7 @@ class Join {
     run_.columns = {"time_s"};
     for (const std::size_t i : from_first_) run_.columns.push_back(first.columns[i]);
     for (const std::size_t i : from_second_) {
-      if (first.find(second.columns[i]))
-        refuse(second, second.columns[i], "(twice)",
-               "is a column of " + first.name +
-                   " too: give one of them another name in the file "
-                   "of --columns");
-      run_.columns.push_back(second.columns[i]);
+      run_.columns.push_back(new_name(second.columns[i]));
     }
     run_.values.resize(run_.columns.size());
   }
@@ -266,12 +291,30 @@ class Join {
   }
 
  private:
+  /// A column of both files gets a number: bed_2_degC.
+  std::string new_name(const std::string& column) {
+    const auto is_taken = [&](const std::string& name) {
+      return std::ranges::find(run_.columns, name) != run_.columns.end();
+    };
+    const std::string suffix(unit_of(column).suffix);
+    const std::string base = column.substr(0, column.size() - suffix.size());
+    std::string name = column;
+    for (int i = 2; is_taken(name); ++i)
+      name = std::string(base).append("_").append(std::to_string(i)).append(suffix);
+    if (name != column)
+      run_.understood.push_back(column + " of " + second_.name + " is " + name + ", since " +
+                                first_.name + " has a column of that name");
+    return name;
+  }
+
   static std::string range(const std::vector<double>& time_s, double shift_s) {
     return number_text(time_s.front() + shift_s) + " to " + number_text(time_s.back() + shift_s) +
            " s";
   }
 
   void add_row(double at_s, std::size_t i, bool takes_a, std::size_t j, bool takes_b) {
+    if (takes_a && std::ranges::binary_search(first_.references, i))
+      run_.references.push_back(run_.values[0].size());
     run_.values[0].push_back(at_s);
     std::size_t column = 1;
     for (const std::size_t of : from_first_)
@@ -310,6 +353,12 @@ class Join {
 
 RunFile joined_runs(const RunFile& first, const RunFile& second, std::optional<double> shift_s) {
   return Join(first, second, shift_of(first, second, shift_s)).run();
+}
+
+bool has_axes(const RunFile& run) {
+  return std::ranges::any_of(run.columns, [](const std::string& column) {
+    return is_axis_letter(column.substr(0, column.size() - unit_of(column).suffix.size()));
+  });
 }
 
 RunFile displacements_of(RunFile corrections, CorrectionEntry entry) {

@@ -15,6 +15,7 @@ struct ClockShift {
   double step_s{0.0};       ///< grid step, the resolution of the shift
   double correlation{0.0};  ///< of the two columns' changes at this shift
   double next{0.0};         ///< highest correlation at another peak
+  double at_expected{0.0};  ///< correlation at the expected shift
   std::string columns;      ///< "'bed_degC' and 'probe_degC'"
   /// The correlation is high, and clearly higher than at any other peak.
   [[nodiscard]] bool is_sure() const noexcept;
@@ -26,20 +27,24 @@ struct ClockShift {
 ///     r(k) = sum a_i b_(i-k) / sqrt(A B),  A = (sum_common a_i^2 + sum_all a_i^2) / 2, B likewise
 ///
 /// @return nullopt if no column of either recording changes
-[[nodiscard]] std::optional<ClockShift> clock_shift(const RunFile& first, const RunFile& second);
+[[nodiscard]] std::optional<ClockShift> clock_shift(const RunFile& first, const RunFile& second,
+                                                    double expected_s = 0.0);
 
 /// Merges the rows of both files on the first one's clock. In rows only of the second file,
 /// temperatures and positions of the first are interpolated, its outputs are empty and its other
 /// columns hold their last value, except across gaps longer than a minute and three usual steps.
 /// @param shift_s  added to the second's time_s to get the first's; nullopt: from the files' dates,
 /// else from columns that change alike
-/// @throws ConfigurationError if the shift is unknown, a column exists in both files, or the two do
-/// not overlap
+/// @throws ConfigurationError if the shift is unknown or contradicts the dates, or the two do not
+/// overlap
 [[nodiscard]] RunFile joined_runs(const RunFile& first, const RunFile& second,
                                   std::optional<double> shift_s);
 
 /// Meaning of an entry: an increment, or the total at the controller from then on.
 enum class CorrectionEntry { step, total };
+
+/// Whether a column is named like an axis.
+[[nodiscard]] bool has_axes(const RunFile& run);
 
 /// displacement = -(sum of the steps until then), or -(total), in um, under the axis' name: an
 /// operator who moves a tool by -12 um has measured +12 um. Converts columns named like axes (x,

@@ -67,6 +67,7 @@ ColumnMap parse_column_map(const std::string& text, const std::string& name) {
   ColumnMap map;
   map.file = name;
   static_cast<void>(root.integer("format", 1, 1, 1));
+  map.encoding = root.text("encoding", "");
   if (root.has("separator"))
     map.separator = root.choice<char>(
         "separator", {{",", ','}, {";", ';'}, {"|", '|'}, {"tab", '\t'}, {"blank", ' '}});

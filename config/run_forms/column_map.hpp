@@ -21,6 +21,7 @@ enum class DateOrder { unknown, day_month_year, month_day_year, year_month_day }
 
 struct ColumnMap {
   std::string file;               ///< for messages
+  std::string encoding;           ///< of iconv(3); empty: detected
   std::optional<char> separator;  ///< ',', ';', '|', tab or blank
   std::optional<char> decimal;    ///< '.' or ','
   std::optional<char> thousands;  ///< between groups of three digits
@@ -35,6 +36,7 @@ struct ColumnMap {
   double scan_s{0};  ///< values of one row per value within it of the first become one row
   std::vector<std::string> missing;  ///< additional words for a missing value
   std::vector<std::string> ignored;  ///< columns left out; "": those without a name
+  bool is_of_several{false};         ///< of several files: a column may be in another one
   bool takes_signals{false};         ///< columns without a unit are signals; set by `import`
   std::map<std::string, MappedColumn> columns;  ///< by the name in the header
 

@@ -19,9 +19,9 @@ namespace {
 
 constexpr std::string_view unit_names = "|unit|units|einheit|unit_of_measurement|uom|u|";
 constexpr std::string_view series_names =
-    "|sensor|sensors|sensor_id|sensor_name|sensor name|channel|kanal|tag|tagname"
-    "|tag name|probe|place|point|messstelle|series|signal|variable|parameter"
-    "|metric|item|topic|entity_id|sphere|";
+    "|sensor|sensors|sensor_id|sensor id|sensor_name|sensor name|channel|kanal|tag|tagname"
+    "|tag name|probe|place|point|messstelle|series|signal|variable|parameter|name|_field"
+    "|metric|item|topic|entity_id|sphere|device|device_id|device id|device name|node|logger|";
 /// Names of quantities whose sensors may be numbered.
 constexpr std::string_view numbered_names =
     "|sensor|sensor_id|channel|kanal|ch|chan|probe|messstelle|sphere|";
@@ -105,6 +105,37 @@ std::string_view unit_of_cells(const TextColumn& column) {
   return first;
 }
 
+/// "Temp", "bed_temp", "T4", "t_bed"
+bool names_temperature(std::string_view base) {
+  const std::string name = small_letters(base);
+  const auto digit = name.find_first_not_of("0123456789", 1);
+  return name.find("temp") != std::string::npos || name.starts_with("t_") ||
+         name.starts_with("t ") || (name.starts_with('t') && digit == std::string::npos);
+}
+
+/// "T4_C", "Temp F", "tempC": a temperature's name and the letter of its unit; nullopt: another
+/// name, or one of a row of letters, such as Temp A, Temp B, Temp C.
+std::optional<SpelledName> lettered_name(const TextTable& table, std::string_view header) {
+  if (header.size() < 2 || (header.back() != 'C' && header.back() != 'F')) return std::nullopt;
+  const std::string_view front = header.substr(0, header.size() - 1);
+  const auto is_sibling = [&](const TextColumn& other) {
+    const std::string_view name = other.header;
+    return name.size() == header.size() && name.starts_with(front) && name.back() >= 'A' &&
+           name.back() <= 'Z' &&
+           std::string_view("CFK").find(name.back()) == std::string_view::npos;
+  };
+  if (std::ranges::any_of(table.columns, is_sibling)) return std::nullopt;
+  std::string_view base = front;
+  while (!base.empty() && (base.back() == '_' || base.back() == ' ')) base.remove_suffix(1);
+  // Without a blank: "tempC", not "Temp1F", a floor.
+  const bool is_joined = base.size() == front.size();
+  if (base.empty() ||
+      (is_joined && !(names_temperature(base) && base.back() >= 'a' && base.back() <= 'z')))
+    return std::nullopt;
+  const std::string_view unit = header.substr(header.size() - 1);
+  return SpelledName{std::string(base), std::string(unit), spelled_unit(unit)};
+}
+
 /// A name that keeps its meaning in a file of our own form.
 bool is_plain(const std::string& name) {
   return is_column_name(name) && spelled_name(name).known == nullptr && name != "time_s";
@@ -133,6 +164,19 @@ bool counts_rows(const TextColumn& column) {
   return column.fields.size() > 1 &&
          std::ranges::all_of(
              column.fields, [&](std::string_view field) { return finite_number(field) == next++; });
+}
+
+/// Whether the same different fields recur in the same order, as addresses of devices that are
+/// polled one after the other: 1 2 3 1 2 3.
+bool recurs(const TextColumn& column) {
+  constexpr std::size_t period_max = 64;
+  const auto& fields = column.fields;
+  const auto end = std::find(fields.begin() + 1, fields.end(), fields[0]);
+  const auto period = static_cast<std::size_t>(end - fields.begin());
+  if (period < 2 || period > period_max || fields.size() < 4 * period) return false;
+  for (std::size_t row = period; row < fields.size(); ++row)
+    if (fields[row] != fields[row - period]) return false;
+  return std::set<std::string_view>(fields.begin(), end).size() == period;
 }
 
 /// "{ name = "t1_degC", unit = "0.1 degC" }"
@@ -174,7 +218,7 @@ class MeaningFinder {
     for (const TextColumn& column : table_.columns) headers.push_back(column.header);
     const auto check = [&](const std::string& key, const std::string& header) {
       const auto count = std::ranges::count(headers, header);
-      if (count == 1) return;
+      if (count == 1 || (count == 0 && table_.map.is_of_several)) return;
       std::string rule = count > 1 ? "appears twice in " : "is not a column of ";
       rule += table_.problems.file();
       std::string near = nearest_name(header, headers);
@@ -259,7 +303,18 @@ class MeaningFinder {
       spelled.unit = column.unit;
       spelled.known = spelled_unit(column.unit);
     }
+    const auto lettered = spelled.unit.empty() && !has_own_unit(header)
+                              ? lettered_name(table_, header)
+                              : std::nullopt;
+    const bool is_temperature_name = lettered && names_temperature(lettered->base);
+    if (is_temperature_name) spelled = *lettered;
     const MappedColumn* mapped = table_.map.find(header);
+    if (lettered && !is_temperature_name && mapped == nullptr && !is_text(column))
+      return refused("may be in deg" + lettered->unit + ": " +
+                     write_column(header, with_name_and_unit(plain_name(lettered->base) + "_degC",
+                                                             "deg" + lettered->unit) +
+                                              ", or " + toml_text(plain_name(header)) +
+                                              " for a signal,"));
     const bool has_own = of_header.unit.empty() && has_own_unit(header);
     if (mapped == nullptr || mapped->unit.empty()) {
       if (const std::string why = unclear_unit(column, spelled); !why.empty()) return refused(why);
@@ -456,7 +511,8 @@ std::string unclear_role(const TextColumn& column) {
   if (!std::ranges::all_of(column.fields, is_number) || column.has_one_value() ||
       increases(column, finite_number))
     return {};
-  if (is_one_of(numbered_names, column.header))
+  const bool has_unit = !column.unit.empty() || has_own_unit(column.header);
+  if (is_one_of(numbered_names, column.header) || (!has_unit && recurs(column)))
     return "may say which sensor a row is of: write pivot = [" + name +
            ", \"the column of the values\"] in the file of --columns, or ignore = [" + name +
            "] if all rows are of the same";

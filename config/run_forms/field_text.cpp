@@ -35,7 +35,8 @@ bool take(std::string_view& rest, char separator, std::string_view& part) {
 
 std::string_view take_line(std::string_view& text) {
   std::string_view line;
-  if (take(text, '\n', line) && line.ends_with('\r')) line.remove_suffix(1);
+  if (take(text, '\n', line))
+    while (line.ends_with('\r')) line.remove_suffix(1);
   return line;
 }
 

@@ -16,6 +16,7 @@
 #include "config/run_forms/text_lines.hpp"
 #include "config/run_forms/text_table.hpp"
 #include "config/run_forms/time_column.hpp"
+#include "config/run_forms/time_stamp.hpp"
 #include "config/text/printable_text.hpp"
 #include "config/text/units.hpp"
 
@@ -24,10 +25,17 @@ namespace {
 
 /// Usual words for a missing value, in lower case.
 constexpr std::string_view missing_words =
-    "|na|n/a|#n/a|#nv|null|none|-|--|---|----|-.-|--.-|*|***|inf|+inf|-inf|ol"
-    "|open|overflow|overload|burnout|unavailable|unknown|error|no data|bad"
-    "|invalid|#div/0!|#value!|undef|n.a.|disconnected|over|under|no value|nodata"
-    "|logged|nan|";
+    "|na|n/a|#n/a|#nv|null|none|inf|ol|open|overflow|overload|burnout|burn out|unavailable"
+    "|unknown|err|error|fault|no data|bad|invalid|#div/0!|#value!|undef|n.a.|disconnected|over"
+    "|under|overrange|over range|underrange|under range|\\n|no value|nodata|logged|nan|";
+
+/// Those words, perhaps with a sign, or a field of signs only: "--.-", "+OVER", "#####".
+bool is_word_for_missing(std::string_view field) {
+  const bool is_signs = std::ranges::all_of(
+      field, [](char c) { return std::string_view("-.*#?+_ ").find(c) != std::string_view::npos; });
+  if (field.starts_with('+') || field.starts_with('-')) field.remove_prefix(1);
+  return is_signs || is_one_of(missing_words, field);
+}
 
 /// A temperature below is a fault code, such as -9999.
 constexpr double degC_min = -273.15;
@@ -39,6 +47,47 @@ void leave_empty_columns_out(TextTable& table) {
     return is_unnamed(column.header) &&
            std::ranges::all_of(column.fields, [](std::string_view field) { return field.empty(); });
   });
+}
+
+/// A time for each channel is needed only once if all are the same.
+void leave_repeated_times_out(TextTable& table) {
+  for (std::size_t i = table.columns.size(); i-- > 1;) {
+    const TextColumn& column = table.columns[i];
+    const auto end = table.columns.begin() + static_cast<std::ptrdiff_t>(i);
+    const auto is_same = [&](const TextColumn& earlier) {
+      return spelled_name(earlier.header).base == spelled_name(column.header).base &&
+             earlier.fields == column.fields;
+    };
+    if (!names_time(column.header) || std::none_of(table.columns.begin(), end, is_same)) continue;
+    table.notes.push_back("'" + column.header + "' left out: repeats the time");
+    table.columns.erase(end);
+  }
+}
+
+/// Replaces columns of year, month, day, hour, minute and perhaps second by one of time stamps.
+void join_calendar(TextTable& table) {
+  constexpr std::array<std::string_view, 6> names{"|year|jahr|",  "|month|monat|",
+                                                  "|day|tag|",    "|hour|stunde|",
+                                                  "|minute|min|", "|second|sekunde|sec|"};
+  constexpr std::string_view signs = "-- :: ";
+  std::size_t begin = 0;
+  while (begin < table.columns.size() && !is_one_of(names[0], table.columns[begin].header)) ++begin;
+  std::size_t parts = 0;
+  while (parts < names.size() && begin + parts < table.columns.size() &&
+         is_one_of(names[parts], table.columns[begin + parts].header))
+    ++parts;
+  if (parts < 5 || !table.map.time.empty()) return;
+  TextColumn joined;
+  joined.header = "time";
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    std::string& stamp = table.joined.emplace_back();
+    for (std::size_t i = 0; i < parts; ++i)
+      stamp.append(table.columns[begin + i].fields[row]).append(i + 1 < parts ? 1 : 0, signs[i]);
+    joined.fields.push_back(stamp);
+  }
+  const auto first = table.columns.begin() + static_cast<std::ptrdiff_t>(begin);
+  *first = std::move(joined);
+  table.columns.erase(first + 1, first + static_cast<std::ptrdiff_t>(parts));
 }
 
 void note_layout(TextTable& table, std::vector<std::string> notes, bool from_latin1) {
@@ -89,7 +138,7 @@ class ValueReader {
   /// One problem for all words that are not numbers, and for impossible temperatures.
   void ask_for_words() const {
     if (words_.empty()) return;
-    constexpr std::size_t words_max = 5;
+    constexpr std::size_t words_max = 12;
     std::string list;
     std::size_t count = 0;
     for (const std::string& word : words_)
@@ -139,7 +188,7 @@ class ValueReader {
     if (is_missing(field)) return true;
     const std::vector<std::string>& listed = table_.map.missing;
     const bool is_overload = number && std::abs(*number) >= overload_min;
-    if (!is_one_of(missing_words, field) && !is_overload &&
+    if (!is_word_for_missing(field) && !is_overload &&
         std::ranges::find(listed, field) == listed.end())
       return false;
     if (missing_++ == 0) missing_as_ = field;
@@ -173,7 +222,7 @@ RunFile read_foreign_run(std::string_view text, const std::string& name, const C
   run.name = name;
   ProblemList problems(name);
   ColumnMap own_map = map == nullptr ? ColumnMap() : *map;
-  RunText read = run_text(text, name);
+  RunText read = run_text(text, name, own_map.encoding);
   run.wall_zero = stated_wall_zero(read.text);
   PlainTable plain = plain_table(std::move(read.text), name, own_map);
   if (!run.wall_zero) run.wall_zero = stated_wall_zero(plain.text);
@@ -182,6 +231,8 @@ RunFile read_foreign_run(std::string_view text, const std::string& name, const C
   problems.throw_any();
   table.has_own_names = plain.has_own_names;
   leave_empty_columns_out(table);
+  leave_repeated_times_out(table);
+  join_calendar(table);
   read_units(table);
   table.form = number_form(table);
   problems.throw_any();
@@ -199,6 +250,11 @@ RunFile read_foreign_run(std::string_view text, const std::string& name, const C
   order_rows(table, time, *columns);
   problems.throw_any();
   run.wall_zero = time.wall_zero;
+  for (const int line : table.references) {
+    const auto row = std::ranges::lower_bound(table.lines, line) - table.lines.begin();
+    if (row > 0 && (run.references.empty() || std::cmp_less(run.references.back(), row)))
+      run.references.push_back(static_cast<std::size_t>(row));
+  }
   run.columns.emplace_back("time_s");
   run.values.push_back(std::move(time.time_s));
   ValueReader values(table);

@@ -57,6 +57,7 @@ std::array<Seen, 6> seen_in(const TextTable& table, bool& has_apostrophes) {
         if (looks_like_number(digits)) has_apostrophes = true;
         digits.remove_prefix(group + 1);
       }
+      if (is_grouped_by_blanks(digits)) digits.remove_prefix(digits.rfind(' ') + 1);
       Seen& first = seen[static_cast<std::size_t>(shown_by(digits))];
       if (!first) first = {table.lines[row], field};
     }

@@ -14,6 +14,7 @@
 #include "config/run_forms/column_meanings.hpp"
 #include "config/run_forms/field_text.hpp"
 #include "config/run_forms/spelled_unit.hpp"
+#include "config/run_forms/time_stamp.hpp"
 #include "config/text/units.hpp"
 
 namespace thermocomp {
@@ -50,6 +51,7 @@ LongColumns long_columns(const TextTable& table) {
     std::set<std::string_view> distinct;
     for (const std::string_view field : column.fields)
       if (distinct.size() <= series_max) distinct.insert(field);
+    if (parse_time_stamp(column.fields[0])) continue;  // another time
     const bool named_value = is_one_of(value_names, column.header);
     if (named_value) found.values.push_back(i);
     if (!are_numbers && empty == 0 && distinct.size() == 1) found.one_word.push_back(i);
@@ -73,6 +75,27 @@ std::string series_of(const TextTable& table, std::size_t row,
   for (const std::size_t column : names)
     name.append(name.empty() ? "" : " ").append(table.columns[column].fields[row]);
   return name;
+}
+
+/// Whether a word differs from the one before in most rows, as those of devices that are polled one
+/// after the other.
+bool alternates(const TextColumn& column) {
+  std::ptrdiff_t changes = 0;
+  for (std::size_t row = 1; row < column.fields.size(); ++row)
+    if (column.fields[row] != column.fields[row - 1]) ++changes;
+  return 2 * changes > std::ssize(column.fields);
+}
+
+void ask_for_devices(const TextTable& table, const std::vector<std::size_t>& columns) {
+  for (const std::size_t i : columns) {
+    const std::string name = toml_text(table.columns[i].header);
+    if (!alternates(table.columns[i])) continue;
+    table.refuse_column(
+        i, "alternates, and may say which device a row is of: write pivot = [" + name +
+               ", \"the column of the values\"] in the file of --columns, or ignore = [" + name +
+               "] if all rows are of the same");
+    return;
+  }
 }
 
 std::optional<LongForm> mapped_form(const TextTable& table, const LongColumns& found) {
@@ -108,11 +131,13 @@ void keep_needed_names(const TextTable& table, const std::vector<double>& time_s
 }
 
 std::optional<LongForm> long_form(const TextTable& table, const std::vector<double>& time_s) {
-  const LongColumns found = long_columns(table);
+  LongColumns found = long_columns(table);
   if (!table.map.pivot.empty()) return mapped_form(table, found);
   const auto header = [&](std::size_t column) { return table.columns[column].header; };
   const bool has_number = found.numbers.size() == 1;
   LongForm form{found.words, has_number ? found.numbers[0] : 0, found.unit};
+  for (std::vector<std::size_t>* names : {&form.names, &found.one_word})
+    std::ranges::stable_partition(*names, names_series, header);
   // A single series has the same name in all rows.
   if (form.names.empty() && found.values.size() == 1)
     for (const std::size_t i : found.one_word)
@@ -149,6 +174,8 @@ std::optional<LongForm> long_form(const TextTable& table, const std::vector<doub
               toml_text(header(*named)) + ", " + toml_text(header(found.numbers[0])) +
               "] to read one of them, or " + ignore_column(header(*named)) +
               " if all rows are of one sensor");
+    else if (!found.numbers.empty())
+      ask_for_devices(table, form.names);
     return std::nullopt;
   }
   keep_needed_names(table, time_s, form);
@@ -169,8 +196,8 @@ class Pivot {
     find_times();
     lines_.assign(times_.size(), 0);
     for (std::size_t row = 0; row < table_.rows(); ++row) {
+      if (is_switching(row)) continue;
       const std::string series = series_of(table_, row, form_.names);
-      if (series.starts_with("$RT_")) continue;  // WinCC: the archive was switched on or off
       if (!index_.contains(series) && wide_.size() == series_max) {
         table_.problems.add(table_.lines[row], table_.columns[form_.names[0]].header, series,
                             "must be one of at most " + std::to_string(series_max) + " series");
@@ -197,9 +224,15 @@ class Pivot {
     }
   }
 
+  /// WinCC: the archive was switched on or off.
+  [[nodiscard]] bool is_switching(std::size_t row) const {
+    return table_.columns[form_.names[0]].fields[row].starts_with("$RT_");
+  }
+
   /// The rows of the wide table.
   void find_times() {
-    for (const double at : time_s_) row_of_.emplace(at, 0);
+    for (std::size_t row = 0; row < time_s_.size(); ++row)
+      if (!is_switching(row)) row_of_.emplace(time_s_[row], 0);
     for (auto& [at, row] : row_of_) {
       if (times_.empty() || at - times_.back() > table_.map.scan_s) times_.push_back(at);
       row = times_.size() - 1;
@@ -336,14 +369,39 @@ std::string remedy(const TextTable& table, const std::vector<double>& time_s, st
   if (row == 1 && table.lines[0] < table.lines[1])
     return "delete line " + std::to_string(table.lines[0]) +
            " if it belongs to the header, or put the rows in the order of time";
-  return "put the rows in the order of time; where the clock was set, delete the lines before or "
-         "after it";
+  return "put the rows in the order of time; where the clock was set or the logger began anew, "
+         "give the lines from this one on a file of their own";
 }
 
 }  // namespace
 
+/// A row that was sent twice.
+void leave_repeated_rows_out(TextTable& table, std::vector<double>& time_s) {
+  const auto repeats = [&](std::size_t row) {
+    return time_s[row] == time_s[row - 1] &&
+           std::ranges::all_of(table.columns, [row](const TextColumn& column) {
+             return column.fields[row] == column.fields[row - 1];
+           });
+  };
+  std::size_t kept = 1;
+  for (std::size_t row = 1; row < time_s.size(); ++row) {
+    if (repeats(row)) continue;
+    time_s[kept] = time_s[row];
+    table.lines[kept] = table.lines[row];
+    for (TextColumn& column : table.columns) column.fields[kept] = column.fields[row];
+    ++kept;
+  }
+  if (kept == time_s.size()) return;
+  table.notes.push_back("rows that repeat the one before left out: " +
+                        std::to_string(time_s.size() - kept));
+  time_s.resize(kept);
+  table.lines.resize(kept);
+  for (TextColumn& column : table.columns) column.fields.resize(kept);
+}
+
 void order_rows(TextTable& table, RunTime& time, const TimeColumns& columns) {
   std::vector<double>& time_s = time.time_s;
+  leave_repeated_rows_out(table, time_s);
   std::size_t column = columns.columns.empty() ? 0 : columns.columns.back();
   if (const auto form = long_form(table, time_s)) {
     Pivot(table, time_s, *form).run();

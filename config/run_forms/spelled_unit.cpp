@@ -28,7 +28,7 @@ constexpr auto spellings = std::to_array<Spellings>({
     {"degF", "F", {"", "temperature", fahrenheit_step, -32 * fahrenheit_step, "_degC"}},
     // a difference
     {"delta_degF", "", {"", "temperature", fahrenheit_step, -kelvin_of_0_degC, "_K"}},
-    {"um µm μm micron microns micrometer micrometers", "", {"", "length", 1, 0, "_um"}},
+    {"um µm μm æm micron microns micrometer micrometers", "", {"", "length", 1, 0, "_um"}},
     {"nm", "", {"", "length", 1e-3, 0, "_um"}},
     {"mm millimeter millimeters Millimeters", "", {"", "length", 1e3, 0, "_mm"}},
     {"", "cm", {"", "length", 1e4, 0, "_mm"}},
@@ -95,6 +95,7 @@ constexpr auto degree_signs = std::to_array<DegreeSign>({{"℃", "c"},
                                                          {"º", ""},
                                                          {"˚", ""},
                                                          {"∘", ""},
+                                                         {"ø", ""},  // of DOS
                                                          {"\xB0", ""},
                                                          {"\xBA", ""}});
 
@@ -137,42 +138,67 @@ bool is_index(std::string_view text) {
   return !text.empty() && text.find_first_not_of("0123456789, ") == std::string_view::npos;
 }
 
-/// "Temp °C", "Temp, °C", "I / A", "t in s": unit after the last blank.
+/// "Temp °C", "Temp, deg C", "I / A", "t in s": unit of one or two words at the end.
 bool split_blank(std::string_view header, SpelledName& name) {
-  const auto blank = header.rfind(' ');
-  if (blank == std::string_view::npos) return false;
-  const SpelledUnit* unit = spelled_unit(header.substr(blank + 1));
-  std::string_view base = trimmed(header.substr(0, blank));
-  bool is_marked = false;
-  for (const std::string_view before : {" /", " in", ","}) {
-    if (!base.ends_with(before)) continue;
-    base = trimmed(base.substr(0, base.size() - before.size()));
-    is_marked = true;
-    break;
-  }
-  if (unit == nullptr || (unit->only_in_brackets && !is_marked)) return false;
-  name = {std::string(base), std::string(header.substr(blank + 1)), unit};
-  return true;
+  const auto split_at = [&](std::size_t blank) {
+    if (blank == std::string_view::npos) return false;
+    const SpelledUnit* unit = spelled_unit(header.substr(blank + 1));
+    std::string_view base = trimmed(header.substr(0, blank));
+    bool is_marked = false;
+    for (const std::string_view before : {" /", " in", ","}) {
+      if (!base.ends_with(before)) continue;
+      base = trimmed(base.substr(0, base.size() - before.size()));
+      is_marked = true;
+      break;
+    }
+    if (unit == nullptr || (unit->only_in_brackets && !is_marked)) return false;
+    name = {std::string(base), std::string(header.substr(blank + 1)), unit};
+    return true;
+  };
+  const auto last = header.rfind(' ');
+  const bool has_two = last != std::string_view::npos && last > 0;
+  return (has_two && split_at(header.rfind(' ', last - 1))) || split_at(last);
 }
 
-/// "T1 [°C]": unit in brackets at the end.
+/// "T1 [°C]": unit in brackets at the end; "1:[°C] Bed", "T (degC) spindle": a known one before.
 bool split_brackets(std::string_view header, SpelledName& name) {
   for (const auto& [open, close] : {std::pair('[', ']'), {'(', ')'}, {'{', '}'}}) {
-    if (!header.ends_with(close)) continue;
-    const auto begin = header.rfind(open);
+    const auto end = header.rfind(close);
+    const auto begin = end == std::string_view::npos ? end : header.rfind(open, end);
     if (begin == std::string_view::npos) continue;
-    const std::string_view inside = header.substr(begin + 1, header.size() - begin - 2);
+    const std::string_view inside = header.substr(begin + 1, end - begin - 1);
     if (inside.find('=') != std::string_view::npos) continue;  // labels: {place="bed"}
     if (open == '(' && is_index(inside)) continue;
-    const std::string_view base = trimmed(header.substr(0, begin));
+    const std::string_view behind = trimmed(header.substr(end + 1));
     const std::string unit(trimmed(inside));
-    name = {std::string(base), unit, spelled_unit(unit)};
+    const SpelledUnit* const known = spelled_unit(unit);
+    const bool is_unit =
+        known != nullptr && known->dimension != "none" && (open == '[' || !known->only_in_brackets);
+    if (!behind.empty() && !is_unit) continue;
+    std::string base(trimmed(header.substr(0, begin)));
+    if (!behind.empty()) base.append(base.empty() ? "" : " ").append(behind);
+    name = {base, unit, known};
     // "Temp, °C (LGR S/N: 1)": the unit precedes other text.
     SpelledName before;
     if (name.known == nullptr && split_blank(base, before)) name = before;
     return true;
   }
   return false;
+}
+
+/// "T1/K", "I/A", "t/ms": a unit behind a stroke; one of time only behind a time.
+bool split_stroke(std::string_view header, SpelledName& name) {
+  constexpr std::string_view times = "|t|time|zeit|elapsed|elapsed time|laufzeit|";
+  const auto stroke = header.rfind('/');
+  if (stroke == std::string_view::npos || stroke == 0 || spelled_unit(header) != nullptr)
+    return false;
+  const std::string_view base = trimmed(header.substr(0, stroke));
+  const SpelledUnit* unit = spelled_unit(trimmed(header.substr(stroke + 1)));
+  if (unit == nullptr || unit->dimension == "none" ||
+      (unit->dimension == "time" && !is_one_of(times, base)))
+    return false;
+  name = {std::string(base), std::string(unit->spelling), unit};
+  return true;
 }
 
 /// "T1°C", "z/µm", "t1_degF": characters that occur in units only, and our suffix of another unit.
@@ -190,9 +216,19 @@ bool split_letters(std::string_view header, SpelledName& name) {
 }  // namespace
 
 const SpelledUnit* spelled_unit(std::string_view unit) {
-  auto found = known_units().find(unit);
-  if (found == known_units().end()) found = known_units().find(plain_temperature(unit));
-  return found == known_units().end() ? nullptr : &found->second;
+  const auto find = [](std::string_view text) {
+    const auto found = known_units().find(text);
+    return found == known_units().end() ? nullptr : &found->second;
+  };
+  if (const auto* const known = find(unit)) return known;
+  if (const auto* const known = find(plain_temperature(unit))) return known;
+  // "Âµm": UTF-8 that was read as Latin-1.
+  if (unit.starts_with("Âµ")) return find(unit.substr(std::string_view("Â").size()));
+  // "UM", "Rpm"; of electricity the size of a letter matters.
+  const auto* const small = unit.size() > 1 ? find(small_letters(unit)) : nullptr;
+  const bool is_any_size = small != nullptr && !small->only_in_brackets &&
+                           (small->dimension == "length" || small->dimension == "speed");
+  return is_any_size ? small : nullptr;
 }
 
 const SpelledUnit* time_unit(std::string_view unit) {
@@ -203,7 +239,8 @@ const SpelledUnit* time_unit(std::string_view unit) {
 SpelledName spelled_name(std::string_view header) {
   header = trimmed(header);
   SpelledName name;
-  if (split_brackets(header, name) || split_blank(header, name) || split_letters(header, name))
+  if (split_brackets(header, name) || split_blank(header, name) || split_letters(header, name) ||
+      split_stroke(header, name))
     return name;
   return {std::string(header), "", nullptr};
 }
@@ -239,6 +276,13 @@ bool is_grouped(std::string_view text, char sign) {
   return true;
 }
 
+/// "12 000", "-1 200,5"
+bool is_grouped_by_blanks(std::string_view field) {
+  if (field.find(' ') == std::string_view::npos) return false;
+  if (field.front() == '-' || field.front() == '+') field.remove_prefix(1);
+  return is_grouped(field.substr(0, field.find_first_of(".,")), ' ');
+}
+
 std::optional<double> number_of(std::string_view field, const NumberForm& form) {
   std::array<char, 64> digits{};
   if (field.size() >= digits.size()) return finite_number(field);
@@ -247,9 +291,11 @@ std::optional<double> number_of(std::string_view field, const NumberForm& form) 
     if (!whole.empty() && (whole.front() == '-' || whole.front() == '+')) whole.remove_prefix(1);
     if (!is_grouped(whole, form.thousands)) return std::nullopt;
   }
+  const bool has_blanks = is_grouped_by_blanks(field);
   std::size_t size = 0;
   bool in_fraction = false;
   for (const char c : field) {
+    if (c == ' ' && has_blanks) continue;
     if (c == form.thousands && c != '\0' && !in_fraction) continue;
     if (c == form.decimal) in_fraction = true;
     if (c == '.' && form.decimal != '.') return std::nullopt;
@@ -277,7 +323,7 @@ bool may_be_unit(std::string_view text) {
   const std::string small = small_letters(text);
   if (small.find('%') != std::string::npos || small.find("deg") != std::string::npos) return true;
   for (const DegreeSign& sign : degree_signs)
-    if (small.find(sign.bytes) != std::string::npos) return true;
+    if (sign.bytes != "ø" && small.find(sign.bytes) != std::string::npos) return true;
   std::string word;
   for (const char c : small + ' ') {
     const bool is_letter = (c >= 'a' && c <= 'z') || static_cast<unsigned char>(c) >= 0x80;
@@ -304,8 +350,9 @@ bool looks_like_number(std::string_view field) {
   field = number_text_of(field).digits;
   if (field.empty() || field.size() > 40) return false;
   if (field.front() == '-' || field.front() == '+') field.remove_prefix(1);
-  if (field.empty() || field.find_first_not_of("0123456789.,'eE+-") != std::string_view::npos)
-    return false;
+  const std::string_view signs =
+      is_grouped_by_blanks(field) ? "0123456789., " : "0123456789.,'eE+-";
+  if (field.empty() || field.find_first_not_of(signs) != std::string_view::npos) return false;
   const auto exponent = field.find_first_of("eE");
   const std::string_view digits = field.substr(0, exponent);
   return !digits.empty() && digits.find_first_of("+-") == std::string_view::npos &&

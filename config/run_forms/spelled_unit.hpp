@@ -78,6 +78,7 @@ struct NumberForm {
 [[nodiscard]] bool looks_like_number(std::string_view field);
 
 /// Digits, then groups of three digits, each after `sign`, up to the end.
+[[nodiscard]] bool is_grouped_by_blanks(std::string_view field);
 [[nodiscard]] bool is_grouped(std::string_view text, char sign);
 
 }  // namespace thermocomp

@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <iconv.h>
+#include <utility>
 
 #include "config/run_forms/field_text.hpp"
+#include "config/run_forms/run_data.hpp"
 #include "config/text/printable_text.hpp"
 #include "config/text/problems.hpp"
 
@@ -68,6 +71,64 @@ constexpr Binary binaries[] = {
     {"MDF ", "is ASAM's MDF: export its channels as CSV"},
     {"PAR1", "is Parquet: save its table as CSV"},
     {"%PDF", "is a PDF: the table itself is needed, as CSV"}};
+
+/// Whether every second byte of the beginning is zero, as in UTF-16 of European text.
+bool has_zeros_at(std::string_view bytes, std::size_t first) {
+  const std::size_t size = std::min<std::size_t>(bytes.size(), 200);
+  std::size_t zeros = 0;
+  for (std::size_t i = 1 - first; i < size; i += 2)
+    if (bytes[i] == '\0') return false;
+  for (std::size_t i = first; i < size; i += 2) zeros += bytes[i] == '\0' ? 1U : 0U;
+  return size >= 8 && 10 * zeros > 4 * size;
+}
+
+/// Whether the bytes that are not ASCII are those of Asian encodings: control characters in
+/// Latin-1, or mostly side by side.
+bool has_wide_letters(std::string_view bytes) {
+  constexpr std::string_view windows_signs = "\x80\x85\x91\x92\x93\x94\x96\x97\x99";
+  const auto is_high = [](char c) { return static_cast<unsigned char>(c) >= 0x80; };
+  std::size_t high = 0;
+  std::size_t beside = 0;
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    if (!is_high(bytes[i])) continue;
+    ++high;
+    if (static_cast<unsigned char>(bytes[i]) < 0xa0 &&
+        windows_signs.find(bytes[i]) == std::string_view::npos)
+      return true;
+    if ((i > 0 && is_high(bytes[i - 1])) || (i + 1 < bytes.size() && is_high(bytes[i + 1])))
+      ++beside;
+  }
+  return high >= 4 && 2 * beside > high;
+}
+
+/// @return nullopt: an unknown encoding, or bytes that are not of it
+std::optional<std::string> converted(std::string bytes, const std::string& encoding) {
+  const iconv_t converter = ::iconv_open("UTF-8", encoding.c_str());
+  // NOLINTNEXTLINE(performance-no-int-to-ptr, cppcoreguidelines-pro-type-cstyle-cast)
+  if (converter == reinterpret_cast<iconv_t>(-1)) return std::nullopt;
+  std::string text(4 * bytes.size(), '\0');
+  char* from = bytes.data();
+  char* to = text.data();
+  std::size_t left = bytes.size();
+  std::size_t space = text.size();
+  const bool is_done =
+      ::iconv(converter, &from, &left, &to, &space) != static_cast<std::size_t>(-1);
+  ::iconv_close(converter);
+  text.resize(text.size() - space);
+  return is_done ? std::optional(std::move(text)) : std::nullopt;
+}
+
+/// Zeros that a logger left when it lost power end a line; a single one is left out.
+std::string without_zeros(std::string_view bytes) {
+  std::string text;
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    if (bytes[i] != '\0')
+      text += bytes[i];
+    else if (i > 0 && bytes[i - 1] == '\0' && !text.ends_with('\n'))
+      text += '\n';
+  }
+  return text;
+}
 
 /// Before a digit: replaces a typeset minus by '-', removes a blank that groups digits.
 std::string with_plain_letters(std::string_view all) {
@@ -147,7 +208,7 @@ bool is_workbook(std::string_view bytes) {
   return bytes.starts_with(binaries[0].begin);
 }
 
-RunText run_text(std::string_view bytes, const std::string& name) {
+RunText run_text(std::string_view bytes, const std::string& name, const std::string& encoding) {
   const auto refuse = [&](const char* rule) {
     throw ConfigurationError({Problem{name, 0, "", "(binary)", rule}});
   };
@@ -156,15 +217,33 @@ RunText run_text(std::string_view bytes, const std::string& name) {
   if (bytes.starts_with("\xFF\xFE") || bytes.starts_with("\xFE\xFF"))
     return {utf8_of_utf16(bytes.substr(2), bytes.front() == '\xFF'), false};
   if (bytes.starts_with(byte_order_mark)) bytes.remove_prefix(byte_order_mark.size());
-  // A logger that lost power leaves preallocated zeros.
+  if (!encoding.empty()) {
+    auto text = converted(std::string(bytes), encoding);
+    if (!text)
+      throw ConfigurationError(
+          {Problem{name, 0, "encoding", encoding,
+                   "must be the encoding of all letters of the file, by a name of iconv --list"}});
+    return {with_line_ends(*std::move(text)), false};
+  }
+  for (const bool low_first : {true, false})
+    if (has_zeros_at(bytes, low_first ? 1 : 0)) return {utf8_of_utf16(bytes, low_first), false};
   while (!bytes.empty() && bytes.back() == '\0') bytes.remove_suffix(1);
-  if (bytes.substr(0, 4096).find('\0') != std::string_view::npos)
+  const auto is_control = [](char c) { return c > 0 && c < '\t'; };
+  if (std::ranges::any_of(bytes.substr(0, 4096), is_control))
     refuse("is neither text nor a known form; docs/run_files.md lists them");
+  std::string without;
+  if (bytes.find('\0') != std::string_view::npos) bytes = without = without_zeros(bytes);
   if (is_utf8(bytes)) return {with_line_ends(std::string(bytes)), false};
-  RunText converted{{}, true};
-  converted.text.reserve(bytes.size() + bytes.size() / 8);
-  for (const char c : bytes) append_letter(converted.text, static_cast<unsigned char>(c));
-  return converted;
+  if (has_wide_letters(bytes))
+    throw ConfigurationError(
+        {Problem{name, 0, "encoding", "(unknown)",
+                 "must be known, since the letters are neither UTF-8 nor Latin-1: write encoding = "
+                 "\"shift_jis\" (Japanese), \"gb18030\" (Chinese), \"euc-kr\" (Korean), "
+                 "\"cp1251\" (Cyrillic) or what it is in the file of --columns"}});
+  RunText latin1{{}, true};
+  latin1.text.reserve(bytes.size() + bytes.size() / 8);
+  for (const char c : bytes) append_letter(latin1.text, static_cast<unsigned char>(c));
+  return latin1;
 }
 
 TextLines find_lines(std::string& text, int lines_above, int first_line) {
@@ -175,7 +254,9 @@ TextLines find_lines(std::string& text, int lines_above, int first_line) {
   for (int number = 1 + lines_above; !rest.empty(); ++number) {
     const std::string_view line = with_quoted_ends(text, take_line(rest), rest, number);
     if (number < first_line) continue;
-    const bool is_comment = line.starts_with('#');
+    const bool is_comment =
+        line.starts_with('#') || line.starts_with("% ") || line.starts_with("//");
+    if (is_comment && line.ends_with(reference_mark)) found.references.push_back(number);
     if (is_comment && lines.empty()) found.last_comment = {number, line};
     if (is_comment || line.find_first_not_of(" \t;,|") == std::string_view::npos) continue;
     if (is_rule(line)) continue;
@@ -186,6 +267,14 @@ TextLines find_lines(std::string& text, int lines_above, int first_line) {
     }
     lines.push_back({number, line});
   }
+  // A spreadsheet quotes whole lines whose separator it does not know.
+  const auto is_quoted = [](const TextLine& line) {
+    return line.text.size() > 2 && line.text.starts_with('"') && line.text.ends_with('"') &&
+           std::ranges::count(line.text, '"') == 2;
+  };
+  if (2 * std::ranges::count_if(lines, is_quoted) > std::ssize(lines))
+    for (TextLine& line : lines)
+      if (is_quoted(line)) line.text = line.text.substr(1, line.text.size() - 2);
   if (lines.size() > 2 && is_end(lines.back().text)) lines.pop_back();
   return found;
 }

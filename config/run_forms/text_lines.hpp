@@ -13,9 +13,12 @@ struct RunText {
   bool from_latin1{false};
 };
 
-/// UTF-8, UTF-16 with a byte order mark, else Latin-1.
-/// @throws ConfigurationError when the bytes are not text (a workbook, an archive, a database)
-[[nodiscard]] RunText run_text(std::string_view bytes, const std::string& name);
+/// UTF-8, UTF-16, else Latin-1.
+/// @param encoding  a name of iconv(3); empty: one of these
+/// @throws ConfigurationError when the bytes are not text (a workbook, an archive, a database), or
+///         text of several bytes a letter in no known encoding
+[[nodiscard]] RunText run_text(std::string_view bytes, const std::string& name,
+                               const std::string& encoding = {});
 
 /// Whether bytes are an Excel workbook or a similar archive.
 [[nodiscard]] bool is_workbook(std::string_view bytes);
@@ -27,6 +30,7 @@ struct TextLine {
 
 struct TextLines {
   std::vector<TextLine> lines;    ///< without empty lines, comments and drawn frames
+  std::vector<int> references;    ///< numbers of the comments "command reference" of an export
   TextLine last_comment;          ///< of those above the first line
   std::optional<char> separator;  ///< stated by Excel's "sep=;"
 };

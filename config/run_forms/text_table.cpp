@@ -105,6 +105,22 @@ bool is_known_row_of_numbers(const HeadLine& line) {
              numbers.end();
 }
 
+/// Whether a line has words, and neither a number nor a time: an event, the end of a file. The
+/// statistics of the columns are such a line, too, unless rows begin with words.
+bool is_remark(const TableFields& fields, bool begins_with_words) {
+  if (fields.empty() || fields[0].empty()) return false;
+  if (!begins_with_words &&
+      is_one_of(statistic_words, fields[0].substr(0, fields[0].find_first_of(".:"))))
+    return true;
+  std::ptrdiff_t texts = 0;
+  for (const std::string_view field : fields) {
+    const FieldKind kind = kind_of_field(field);
+    if (kind == FieldKind::number || kind == FieldKind::time) return false;
+    if (kind == FieldKind::text) ++texts;
+  }
+  return texts > 0;
+}
+
 /// Whether the key column has its kind, or is missing in a line without any word.
 bool may_be_row(const HeadLine& line, const std::vector<FieldKind>& kinds, std::size_t key) {
   if (line.kinds.size() != kinds.size()) return false;
@@ -161,6 +177,7 @@ class TableReader {
     // Heap-allocated, so that moving the table keeps pointers into it valid.
     table_.text.reserve(64);
     found_ = find_lines(table_.text, lines_above, map_.header_line);
+    table_.references = found_.references;
     if (lines_.empty()) {
       problems_.add(0, "", "", "has no header row");
     } else if (choose_separator()) {
@@ -379,9 +396,9 @@ class TableReader {
     return true;
   }
 
-  void note_left_out(const std::string& where, std::size_t line, std::size_t count) {
+  void note_left_out(const std::string& where, std::size_t count, std::string_view line) {
     if (count == 0) return;
-    std::string note = where + " left out: '" + shortened(lines_[line].text) + "'";
+    std::string note = where + " left out: '" + shortened(line) + "'";
     if (count > 1) note += " and " + std::to_string(count - 1) + " more line";
     table_.notes.push_back(note + (count > 2 ? "s" : ""));
   }
@@ -400,6 +417,13 @@ class TableReader {
       problems_.add(lines_[line].number, "", lines_[line].text, "has a quote that is not closed");
       return false;
     }
+    if (cut_.separator == ',' && cut_.fields == 2 * fields.size() - 1) {
+      problems_.add(lines_[line].number, "", std::to_string(fields.size()) + " names",
+                    "above rows of " + std::to_string(cut_.fields) +
+                        " fields: a comma separates them and seems to be the decimal sign, too; "
+                        "write the file with decimal points or with semicolons between the fields");
+      return false;
+    }
     if (fields.size() != cut_.fields) {
       problems_.add(lines_[line].number, "", std::to_string(fields.size()) + " names",
                     "must be one for each of the " + std::to_string(cut_.fields) +
@@ -407,13 +431,20 @@ class TableReader {
                         "in the file of --columns");
       return false;
     }
+    // Names that stand above a row of further ones: "Time" above "", "Min", "Max".
+    if (line > 0 && head_[line - 1].fields.size() == fields.size() &&
+        head_[line - 1].is_all_words())
+      for (std::size_t i = 0; i < fields.size(); ++i)
+        if (fields[i].empty()) fields[i] = head_[line - 1].fields[i];
     table_.has_header = true;
     table_.header_line = lines_[line].number;
     for (const std::string_view field : fields) names_.push_back(unquoted(field));
     header_text_ = lines_[line].text;
-    note_left_out("above the header in line " + std::to_string(table_.header_line), 0, line);
-    note_left_out("between the header and the first row", row_begin_ - 1,
-                  row_begin_ - line - 1 - (units_line_ > line ? 1 : 0));
+    note_left_out("above the header in line " + std::to_string(table_.header_line), line,
+                  lines_[0].text);
+    note_left_out("between the header and the first row",
+                  row_begin_ - line - 1 - (units_line_ > line ? 1 : 0),
+                  lines_[units_line_ == line + 1 ? line + 2 : line + 1].text);
     return true;
   }
 
@@ -476,6 +507,12 @@ class TableReader {
         continue;
       }
       while (fields.size() > columns && fields.back().empty()) fields.pop_back();
+      const bool begins_with_words =
+          table_.rows() > 0 && kind_of_field(table_.columns[0].fields[0]) == FieldKind::text;
+      if (table_.rows() > 0 && is_remark(fields, begins_with_words)) {
+        take_remark(fields, line);
+        continue;
+      }
       fill_up(fields);
       const bool is_cut_off = i + 1 == lines_.size() && table_.text.back() != '\n';
       if (is_cut_off && fields.size() < columns && table_.rows() > 0) {
@@ -490,6 +527,20 @@ class TableReader {
       }
     }
     if (table_.rows() == 0 && problems_.empty()) problems_.add(0, "", "", "has no row of data");
+    note_left_out("among the rows", remarks_, first_remark_);
+  }
+
+  /// Leaves out a line among the rows that has no number; refuses another header.
+  void take_remark(const TableFields& fields, const TextLine& line) {
+    std::vector<std::string> words;
+    for (const std::string_view field : fields) words.push_back(unquoted(field));
+    if (words == names_) return;
+    if (std::ranges::is_permutation(words, names_))
+      problems_.add(line.number, "", line.text,
+                    "names the columns in another order than line " +
+                        std::to_string(table_.header_line) +
+                        ": give the rows below it a file of their own");
+    if (remarks_++ == 0) first_remark_ = line.text;
   }
 
   const ColumnMap& map_;
@@ -507,6 +558,8 @@ class TableReader {
       unclear_line_;  ///< factors, or numbers below the names that are no row
   std::vector<std::string> names_;
   std::string_view header_text_;
+  std::size_t remarks_{0};  ///< lines without a number among the rows
+  std::string_view first_remark_;
 };
 
 }  // namespace

@@ -74,7 +74,8 @@ struct TextTable {
   ProblemList& problems;
   std::string text;  ///< UTF-8; storage of the fields
   std::vector<TextColumn> columns;
-  std::vector<int> lines;  ///< line number of each row, counted from 1
+  std::vector<int> lines;       ///< line number of each row, counted from 1
+  std::vector<int> references;  ///< lines of an export's comments "command reference"
   int header_line{0};
   bool has_header{false};
   bool has_unit_row{false};

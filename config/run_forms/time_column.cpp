@@ -155,7 +155,9 @@ std::optional<TimeColumns> mapped_time(const TextTable& table) {
 }
 
 std::optional<TimeColumns> find_clock(const TextTable& table) {
-  if (!table.map.time.empty()) return mapped_time(table);
+  const bool is_absent = table.map.is_of_several && !table.map.time.empty() &&
+                         table.find(table.map.time[0]) == table.columns.size();
+  if (!table.map.time.empty() && !is_absent) return mapped_time(table);
   if (const std::size_t own = table.find("time_s"); own < table.columns.size())
     return TimeColumns{{own}};
   Candidates found = candidates(table);
@@ -228,32 +230,6 @@ void find_am_pm(const TextTable& table, TimeColumns& time) {
 }
 
 constexpr double day_s = 86400.0;
-
-/// The least and the greatest difference of consecutive numbers.
-std::pair<double, double> steps_of(const std::vector<double>& numbers, double (*seconds)(double)) {
-  double low = INFINITY;
-  double high = -INFINITY;
-  for (std::size_t i = 1; i < numbers.size(); ++i) {
-    const double step = seconds(numbers[i]) - seconds(numbers[i - 1]);
-    low = std::min(low, step);
-    high = std::max(high, step);
-  }
-  return {low, high};
-}
-
-/// 95950, 100000, 100010: equal steps only as hours, minutes and seconds.
-bool are_clock_digits(const std::vector<double>& numbers) {
-  const bool may_be = std::ranges::all_of(numbers, [](double n) {
-    return n >= 0 && n < 240000 && std::fmod(n, 100) < 60 && std::fmod(n / 100, 100) < 60;
-  });
-  if (!may_be || numbers.back() < 1e4) return false;
-  const auto [low, high] = steps_of(numbers, [](double n) {
-    return 3600 * std::floor(n / 1e4) + 60 * std::fmod(std::floor(n / 100), 100) +
-           std::fmod(n, 100);
-  });
-  const auto [number_low, number_high] = steps_of(numbers, [](double n) { return n; });
-  return low > 0 && high <= 2 * low && number_high > 2 * number_low && number_high >= 40 + high;
-}
 
 class TimeReader {
  public:
@@ -347,7 +323,8 @@ class TimeReader {
     const SpelledUnit* known = time_unit(unit);
     const bool is_time = known != nullptr;
     const Epoch* epoch = epoch_of(run_.time_s, is_time || names_date(header), is_time);
-    if (epoch != nullptr && is_time && std::abs(known->factor * epoch->per_second - 1) > 1e-9)
+    if (epoch != nullptr && is_time && header != "Time_ms" &&
+        std::abs(known->factor * epoch->per_second - 1) > 1e-9)
       epoch = nullptr;  // the unit implies another scale
     if (epoch != nullptr) {
       count_from_first(header, *epoch);
@@ -438,16 +415,20 @@ class TimeReader {
   [[nodiscard]] std::vector<double> seconds_by(const std::vector<TimeStamp>& stamps,
                                                DateOrder order) const {
     const bool minutes_first = table_.map.time_unit == "mm:ss";
-    const bool wraps = !stamps.front().has_date && !minutes_first &&
-                       std::ranges::all_of(stamps, [](const auto& s) { return s.clock_a < 24; });
+    const double wrap_s = minutes_first ? day_s / 24 : day_s;
+    const bool wraps = !stamps.front().has_date && std::ranges::all_of(stamps, [&](const auto& s) {
+      return s.clock_a < (minutes_first ? 60 : 24);
+    });
     std::vector<double> seconds;
-    double days = 0.0;
-    double last = 0.0;
     for (const TimeStamp& stamp : stamps) {
-      const double at = seconds_of(stamp, order, minutes_first).value_or(NAN);
-      if (wraps && !seconds.empty() && at < last - day_s / 2) days += day_s;
-      last = at;
-      seconds.push_back(at + days);
+      seconds.push_back(seconds_of(stamp, order, minutes_first).value_or(NAN));
+      const std::size_t row = seconds.size() - 1;
+      if (!wraps || row == 0) continue;
+      const double last = seconds[row - 1];
+      seconds[row] += wrap_s * std::floor(last / wrap_s);
+      // Minutes may also begin anew; the usual step shows the end of an hour.
+      const double step = minutes_first && row > 1 ? 3 * (last - seconds[row - 2]) : wrap_s / 2;
+      if (seconds[row] + wrap_s - last < step) seconds[row] += wrap_s;
     }
     return seconds;
   }
@@ -588,8 +569,8 @@ std::optional<TimeColumns> find_time(TextTable& table) {
   if (time->columns.empty() || time->columns.size() > 2) return time;
   find_fraction(table, *time);
   find_am_pm(table, *time);
-  if (time->fraction) mark(*time->fraction);
-  if (time->half) mark(*time->half);
+  for (const auto& part : {time->fraction, time->half})
+    if (part) mark(*part);
   return time;
 }
 

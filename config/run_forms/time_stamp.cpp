@@ -5,7 +5,9 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <string>
+#include <utility>
 
 #include "config/run_forms/field_text.hpp"
 #include "config/run_forms/spelled_unit.hpp"
@@ -14,9 +16,46 @@
 namespace thermocomp {
 namespace {
 
-constexpr std::array<std::string_view, 24> month_names{
-    "jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec",
-    "jan", "feb", "mrz", "apr", "mai", "jun", "jul", "aug", "sep", "okt", "nov", "dez"};
+/// Names of each month in English, German, French, Spanish, Italian and Portuguese.
+constexpr std::array<std::string_view, 12> month_names{
+    "|jan|january|januar|janv|janvier|ene|enero|gen|gennaio|janeiro|",
+    "|feb|february|februar|fév|févr|fev|février|febrero|febbraio|fevereiro|",
+    "|mar|march|mär|mrz|märz|mars|marzo|março|",
+    "|apr|april|avr|avril|abr|abril|aprile|",
+    "|may|mai|mayo|mag|maggio|maio|",
+    "|jun|june|juni|juin|junio|giu|giugno|junho|",
+    "|jul|july|juli|juil|juillet|julio|lug|luglio|julho|",
+    "|aug|august|aoû|août|aout|ago|agosto|",
+    "|sep|sept|september|septembre|septiembre|set|settembre|setembro|",
+    "|oct|okt|october|oktober|octobre|octubre|ott|ottobre|out|outubro|",
+    "|nov|november|novembre|noviembre|novembro|",
+    "|dec|dez|december|dezember|déc|décembre|dic|diciembre|dicembre|dezembro|"};
+/// Names of days, at most three letters; longer ones end in "day", "tag", "woch" or "di".
+constexpr std::string_view day_names =
+    "|mon|tue|wed|thu|fri|sat|sun|mo|di|mi|do|fr|sa|so|lun|mar|mer|jeu|ven|sam|dim|gio|sab|dom|";
+
+/// Zones whose letters mean one zone only; CST, IST and BST are several.
+struct ZoneName {
+  std::string_view letters;
+  double hours;
+};
+constexpr auto zone_names = std::to_array<ZoneName>({{"CET", 1},
+                                                     {"CEST", 2},
+                                                     {"MEZ", 1},
+                                                     {"MESZ", 2},
+                                                     {"WET", 0},
+                                                     {"WEST", 1},
+                                                     {"EET", 2},
+                                                     {"EEST", 3},
+                                                     {"EST", -5},
+                                                     {"EDT", -4},
+                                                     {"CDT", -5},
+                                                     {"MST", -7},
+                                                     {"MDT", -6},
+                                                     {"PST", -8},
+                                                     {"PDT", -7},
+                                                     {"JST", 9},
+                                                     {"KST", 9}});
 
 /// Takes one to `digits_max` leading digits.
 std::optional<int> take_digits(std::string_view& text, std::size_t digits_max) {
@@ -35,22 +74,37 @@ bool take_char(std::string_view& text, std::string_view any_of) {
   return true;
 }
 
-std::optional<int> take_month_name(std::string_view& text) {
-  if (text.size() < 3) return std::nullopt;
-  const std::string name = small_letters(text.substr(0, 3));
-  const auto* const found = std::ranges::find(month_names, name);
-  if (found == month_names.end()) return std::nullopt;
-  text.remove_prefix(3);
-  return static_cast<int>((found - month_names.begin()) % 12) + 1;
+/// Takes the leading letters.
+std::string_view take_word(std::string_view& text) {
+  const auto is_letter = [](char c) {
+    return static_cast<unsigned char>(c) >= 0x80 || ((c | 0x20) >= 'a' && (c | 0x20) <= 'z');
+  };
+  const auto* const end = std::ranges::find_if_not(text, is_letter);
+  const std::string_view word = text.substr(0, static_cast<std::size_t>(end - text.begin()));
+  text.remove_prefix(word.size());
+  return word;
 }
 
-bool take_day_name(std::string_view& text) {
-  constexpr std::array<std::string_view, 7> days{"Mon", "Tue", "Wed", "Thu", "Fri", "Sat", "Sun"};
-  if (std::ranges::none_of(days, [&](auto day) { return text.starts_with(day); })) return false;
-  text = trimmed(text.substr(3));
-  take_char(text, ",");
-  text = trimmed(text);
-  return true;
+std::optional<int> take_month_name(std::string_view& text) {
+  std::string_view rest = text;
+  const std::string_view name = take_word(rest);
+  const auto* const found = std::ranges::find_if(
+      month_names, [&](std::string_view names) { return !name.empty() && is_one_of(names, name); });
+  if (found == month_names.end()) return std::nullopt;
+  text = rest;
+  return static_cast<int>(found - month_names.begin()) + 1;
+}
+
+/// Takes "Thu", "Do., ", "Thursday, ".
+void take_day_name(std::string_view& text) {
+  std::string_view rest = text;
+  const std::string name = small_letters(take_word(rest));
+  const auto ends = [&](std::string_view end) { return name.ends_with(end); };
+  if (!is_one_of(day_names, name) && !ends("day") && !ends("tag") && !ends("woch") && !ends("di"))
+    return;
+  take_char(rest, ".");
+  take_char(rest, ",");
+  text = trimmed(rest);
 }
 
 /// A number in a date and its count of digits; 0 for a month's name.
@@ -90,10 +144,9 @@ void find_orders(const std::array<DatePart, 3>& parts, char separator, TimeStamp
   stamp.has_points = separator == '.' && !is_long;
 }
 
-/// 2026-03-01, 01.03.2026, 3/1/26, 01-Mar-2026, Mar 1, 2026, 20260301.
+/// 2026-03-01, 01.03.2026, 3/1/26, 01-Mar-2026, Mar 1, 2026, 1. März 2026, 20260301.
 bool take_date(std::string_view& text, TimeStamp& stamp) {
   std::string_view rest = text;
-  take_day_name(rest);
   std::array<DatePart, 3> parts{};
   char separator = ' ';
   const auto compact = rest.substr(0, 8);
@@ -114,10 +167,9 @@ bool take_date(std::string_view& text, TimeStamp& stamp) {
         return false;
       const char here = rest.front();
       const bool named = parts[0].digits == 0 || (i == 1 && parts[1].digits == 0);
-      if (i == 1 && here != separator && !(named && here == ',')) return false;
+      if (i == 1 && here != separator && !named) return false;
       separator = i == 0 ? here : separator;
-      rest.remove_prefix(1);
-      if (here == ',' || here == ' ') rest = trimmed(rest);
+      rest = trimmed(rest.substr(1));
     }
   }
   const bool named = parts[0].digits == 0 || parts[1].digits == 0;
@@ -152,21 +204,66 @@ std::optional<double> take_zone(std::string_view& text) {
 
 /// "PM", "am": adds 12 hours, or makes hour 12 hour 0.
 bool take_half_of_day(std::string_view& text, TimeStamp& stamp) {
-  text = trimmed(text);
-  if (text.size() != 2 || (text[1] != 'M' && text[1] != 'm')) return text.empty();
-  const bool afternoon = text[0] == 'P' || text[0] == 'p';
-  if (!afternoon && text[0] != 'A' && text[0] != 'a') return false;
+  std::string half = small_letters(text);
+  std::erase_if(half, [](char c) { return c == ' ' || c == '.'; });  // Spanish "a. m."
+  const bool afternoon = half == "pm";
+  if (!afternoon && half != "am") return half.empty();
   if (!(stamp.clock_a >= 1 && stamp.clock_a <= 12)) return false;
   stamp.clock_a = (stamp.clock_a == 12 ? 0 : stamp.clock_a) + (afternoon ? 12 : 0);
   text = {};
   return true;
 }
 
+/// Takes a zone named by letters off the end.
+void take_zone_name(std::string_view& text, TimeStamp& stamp) {
+  for (const ZoneName& zone : zone_names) {
+    if (!text.ends_with(zone.letters)) continue;
+    const std::string_view before = text.substr(0, text.size() - zone.letters.size());
+    if (!before.empty() && before.back() != ' ') continue;
+    stamp.zone_s = 3600.0 * zone.hours;
+    text = trimmed(before);
+    return;
+  }
+}
+
+/// Takes the days off "1 days 02:15:00", "1 day, 2:15:00", "1d 02:15:00", "1.02:15:00".
+int take_days(std::string_view& text) {
+  std::string_view rest = text;
+  const auto days = take_digits(rest, 4);
+  if (!days) return 0;
+  if (take_char(rest, ".")) {
+    if (rest.size() < 8 || rest[2] != ':' || rest[5] != ':') return 0;
+  } else {
+    rest = trimmed(rest);
+    if (!is_one_of("|d|day|days|", take_word(rest))) return 0;
+    take_char(rest, ",");
+  }
+  text = trimmed(rest);
+  return *days;
+}
+
+/// "06h55" and, after a date, "06.55.00", with colons; empty: neither.
+std::string with_colons(std::string_view clock, bool has_date) {
+  std::string text(clock);
+  const auto is_clock = [&](char sign, std::size_t size) {
+    return text.size() >= size && text[2] == sign && is_digit(text[1]) && is_digit(text[3]);
+  };
+  if (is_clock('h', 5)) {
+    text[2] = ':';
+    if (text.ends_with(':') || text.ends_with('m')) text.pop_back();
+    return text;
+  }
+  if (!has_date || !is_clock('.', 8) || text[5] != '.') return {};
+  text[2] = text[5] = ':';
+  return text;
+}
+
 /// 8:30, 08:30:15, 08:30:15.250, 08:30:15:250, 26:15:00, 083015; then a zone or AM, PM.
 bool take_clock(std::string_view& text, TimeStamp& stamp) {
   std::string_view rest = text;
   const std::string_view compact = rest.substr(0, 6);
-  std::string spelled;
+  std::string spelled = with_colons(rest, stamp.has_date);
+  if (!spelled.empty()) rest = spelled;
   if (stamp.has_date && compact.size() == 6 && std::ranges::all_of(compact, is_digit)) {
     for (const std::size_t at : {0U, 2U, 4U})
       spelled.append(at > 0 ? ":" : "").append(compact.substr(at, 2));
@@ -200,6 +297,8 @@ bool take_clock(std::string_view& text, TimeStamp& stamp) {
   }
   stamp.has_clock = true;
   rest = trimmed(rest);
+  if (rest.ends_with(']')) rest = rest.substr(0, rest.find('['));  // [Europe/Berlin]
+  take_zone_name(rest, stamp);
   if (!rest.empty() && std::string_view("ZzUG+-").find(rest.front()) != std::string_view::npos) {
     stamp.zone_s = take_zone(rest);
     if (!stamp.zone_s) return false;
@@ -211,7 +310,9 @@ bool take_clock(std::string_view& text, TimeStamp& stamp) {
 
 /// Moves the year of ctime's "Wed Jun 11 11:50:00 2026" to the front.
 std::string year_in_front(std::string_view text) {
-  take_day_name(text);
+  std::string_view rest = text;
+  take_day_name(rest);
+  if (!rest.empty() && !is_digit(rest.front())) text = rest;
   if (text.size() < 18 || text[text.size() - 5] != ' ') return {};
   const std::string_view year = text.substr(text.size() - 4);
   const auto clock = text.find(':');
@@ -220,6 +321,49 @@ std::string year_in_front(std::string_view text) {
   const std::string_view day = trimmed(text.substr(0, clock - 2));
   return std::string(day) + " " + std::string(year) + " " +
          std::string(text.substr(clock - 2, text.size() - 5 - (clock - 2)));
+}
+
+/// "2026年3月1日 8時30分15秒", "下午 8:30" with plain signs; empty: a text without them.
+std::string without_ideographs(std::string_view all) {
+  if (std::ranges::none_of(all, [](char c) { return static_cast<unsigned char>(c) >= 0xe0; }))
+    return {};
+  constexpr std::array<std::pair<std::string_view, char>, 13> signs{{{"年", '-'},
+                                                                     {"月", '-'},
+                                                                     {"日", ' '},
+                                                                     {"時", ':'},
+                                                                     {"时", ':'},
+                                                                     {"分", ':'},
+                                                                     {"秒", ' '},
+                                                                     {"년", '-'},
+                                                                     {"월", '-'},
+                                                                     {"일", ' '},
+                                                                     {"시", ':'},
+                                                                     {"분", ':'},
+                                                                     {"초", ' '}}};
+  constexpr std::array<std::pair<std::string_view, const char*>, 6> halves{{{"上午", " AM"},
+                                                                            {"下午", " PM"},
+                                                                            {"午前", " AM"},
+                                                                            {"午後", " PM"},
+                                                                            {"오전", " AM"},
+                                                                            {"오후", " PM"}}};
+  std::string text;
+  std::string half;
+  bool has_sign = false;
+  while (!all.empty()) {
+    const auto begins = [&](const auto& each) { return all.starts_with(each.first); };
+    if (const auto* const found = std::ranges::find_if(halves, begins); found != halves.end()) {
+      half = found->second;
+      all = trimmed(all.substr(found->first.size()));
+      continue;
+    }
+    const auto* const sign = std::ranges::find_if(signs, begins);
+    const bool is_sign = sign != signs.end();
+    has_sign = has_sign || is_sign;
+    text += is_sign ? sign->second : all.front();
+    all.remove_prefix(is_sign ? sign->first.size() : 1);
+  }
+  while (text.ends_with(':') || text.ends_with(' ')) text.pop_back();
+  return has_sign || !half.empty() ? text + half : std::string();
 }
 
 constexpr std::string_view time_names =
@@ -233,13 +377,14 @@ constexpr std::string_view date_names =
 
 constexpr double s_per_day = 86400.0;
 
-constexpr std::array<Epoch, 8> epochs{{
+constexpr std::array<Epoch, 9> epochs{{
     {"s since 1970", 1e9, 2.5e9, 1, 0, false, true},
     {"ms since 1970", 1e12, 2.5e12, 1e3, 0, false, true},
     {"us since 1970", 1e15, 2.5e15, 1e6, 0, false, true},
     {"ns since 1970", 1e18, 2.5e18, 1e9, 0, false, true},
     {"s since 1904", 3.1e9, 4.6e9, 1, -2082844800.0, true, true},
     {"100 ns since 1601", 1.25e17, 1.42e17, 1e7, -11644473600.0, false, true},
+    {"millionths of a day", 3.65e10, 5.5e10, 1e6 / s_per_day, -25569 * s_per_day, true, false},
     {"day", 20000, 80000, 1 / s_per_day, -25569 * s_per_day, true, false},
     {"days since the year 0", 7.2e5, 7.6e5, 1 / s_per_day, -719529 * s_per_day, true, false},
 }};
@@ -259,6 +404,18 @@ bool are_multiples_of(double unit, const std::vector<double>& numbers) {
   });
 }
 
+/// The least and the greatest difference of consecutive numbers.
+std::pair<double, double> steps_of(const std::vector<double>& numbers, double (*seconds)(double)) {
+  double low = std::numeric_limits<double>::infinity();
+  double high = -std::numeric_limits<double>::infinity();
+  for (std::size_t i = 1; i < numbers.size(); ++i) {
+    const double step = seconds(numbers[i]) - seconds(numbers[i - 1]);
+    low = std::min(low, step);
+    high = std::max(high, step);
+  }
+  return {low, high};
+}
+
 /// "Date Time, GMT+01:00" without what follows the comma.
 bool is_named_like(std::string_view names, std::string_view header) {
   const std::string base = spelled_name(header).base;
@@ -269,21 +426,28 @@ bool is_named_like(std::string_view names, std::string_view header) {
 
 std::optional<TimeStamp> parse_time_stamp(std::string_view text) {
   text = trimmed(text);
-  TimeStamp stamp;
+  if (text.starts_with('\'')) text.remove_prefix(1);  // a spreadsheet's sign of a text
   // Quick rejection: most fields of text are not dates.
   if (text.size() < 4 || text.size() > 64) return std::nullopt;
-  std::string turned;
-  if (!is_digit(text.front()))
+  TimeStamp stamp;
+  std::string turned = without_ideographs(text);
+  if (!turned.empty())
+    text = trimmed(turned);
+  else if (!is_digit(text.front()))
     turned = year_in_front(text);
   else if (text.size() == 14 && std::ranges::all_of(text, is_digit))  // 20260301123000
     turned = std::string(text).insert(8, " ");
-  if (!turned.empty()) text = turned;
-  if (take_date(text, stamp)) {
+  if (!turned.empty()) text = trimmed(turned);
+  const int days = take_days(text);
+  std::string_view behind_day = text;
+  take_day_name(behind_day);
+  if (take_date(text, stamp) || take_date(text = behind_day, stamp)) {
     if (trimmed(text).empty()) return stamp;
     if (!take_char(text, "T _-,")) return std::nullopt;
     text = trimmed(text);
   }
   if (!take_clock(text, stamp)) return std::nullopt;
+  stamp.clock_a += 24 * days;
   // The day 0 of databases: only a clock time.
   constexpr std::array day_0{30, 12, 1899};
   if (stamp.has_date && (stamp.date == day_0 || stamp.date == std::array{1899, 12, 30})) {
@@ -344,7 +508,9 @@ bool names_date(std::string_view header) {
 
 std::string_view unit_of_time_name(std::string_view header) {
   const auto bar = header.rfind('_');
-  if (bar == std::string_view::npos || bar == 0 || !names_time(header.substr(0, bar))) return {};
+  if (bar == std::string_view::npos || bar == 0) return {};
+  const std::string_view name = header.substr(0, bar);
+  if (!names_time(name) && !is_one_of("|t|", name)) return {};
   const SpelledUnit* unit = time_unit(header.substr(bar + 1));
   return unit != nullptr ? unit->spelling : std::string_view();
 }
@@ -361,6 +527,19 @@ std::optional<double> zone_of_header(std::string_view header) {
   return std::nullopt;
 }
 
+bool are_clock_digits(const std::vector<double>& numbers) {
+  const bool may_be = std::ranges::all_of(numbers, [](double n) {
+    return n >= 0 && n < 240000 && std::fmod(n, 100) < 60 && std::fmod(n / 100, 100) < 60;
+  });
+  if (!may_be || numbers.back() < 1e4) return false;
+  const auto [low, high] = steps_of(numbers, [](double n) {
+    return 3600 * std::floor(n / 1e4) + 60 * std::fmod(std::floor(n / 100), 100) +
+           std::fmod(n, 100);
+  });
+  const auto [number_low, number_high] = steps_of(numbers, [](double n) { return n; });
+  return low > 0 && high <= 2 * low && number_high > 2 * number_low && number_high >= 40 + high;
+}
+
 const Epoch* epoch_of(const std::vector<double>& numbers, bool is_named, bool has_unit) {
   constexpr double step_s_max = 3600.0;
   for (const Epoch& epoch : epochs) {
@@ -368,6 +547,8 @@ const Epoch* epoch_of(const std::vector<double>& numbers, bool is_named, bool ha
     // Whole numbers of that size may be ms of a counter of 32 bits.
     if (epoch.only_named && epoch.per_second == 1 && !has_unit && are_multiples_of(1, numbers))
       continue;
+    // WinCC's Time_ms, which has decimals.
+    if (epoch.only_named && epoch.per_second > 1 && are_multiples_of(1, numbers)) continue;
     // Steps of 86.4 s are unlikely: these are seconds.
     if (epoch.per_second < 1 && !has_unit && are_multiples_of(0.001, numbers)) continue;
     if (!has_unit && !has_steps_below(step_s_max * epoch.per_second * 1.001, numbers)) continue;

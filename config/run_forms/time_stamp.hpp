@@ -70,6 +70,9 @@ struct TimeStamp {
 /// "Date Time, GMT+01:00": time zone of the column.
 [[nodiscard]] std::optional<double> zone_of_header(std::string_view header);
 
+/// 95950, 100000, 100010: equal steps only as hours, minutes and seconds.
+[[nodiscard]] bool are_clock_digits(const std::vector<double>& numbers);
+
 /// Origin and unit of times that are numbers.
 struct Epoch {
   const char* name;

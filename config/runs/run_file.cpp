@@ -93,8 +93,7 @@ class RunParser {
   bool next_line(std::string_view& line) {
     while (!rest_.empty()) {
       ++line_number_;
-      static_cast<void>(take(rest_, '\n', line));
-      if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+      line = take_line(rest_);
       if (!line.starts_with('#')) return true;
       const std::size_t row = run_.rows();
       std::vector<std::size_t>& references = run_.references;
@@ -292,9 +291,8 @@ namespace {
 
 /// The first line that is not a comment or empty.
 std::string_view header_of(std::string_view text) {
-  std::string_view line;
-  while (take(text, '\n', line)) {
-    if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+  while (!text.empty()) {
+    const std::string_view line = take_line(text);
     if (!line.starts_with('#') && !trimmed(line).empty()) return line;
   }
   return {};

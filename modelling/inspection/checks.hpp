@@ -27,9 +27,18 @@ void check_empty(const RunFile& run, std::size_t index, Suspicions& found);
 /// Values that jump and return (`spikes` of a reading, `outliers` of a displacement). In `run` they
 /// are replaced by the median of their neighbours.
 void check_spikes(RunFile& run, std::size_t index, Suspicions& found);
-/// Readings that are constant while others move, that have coarse steps, that are in kelvin, or
-/// that duplicate another.
+/// Columns that are constant while temperatures move, that have coarse steps, or readings that
+/// duplicate another.
 void check_values(const std::vector<RunFile>& runs, Suspicions& found);
+
+/// Columns in another unit: readings that begin like the others in kelvin, or multiplied;
+/// displacements that agree with other runs only when multiplied.
+void check_units(const std::vector<RunFile>& runs, const Recording& recording, Suspicions& found);
+/// Stretches of several times the usual noise, which no other column and no signal explains.
+void check_noises(const RunFile& run, std::size_t index, Suspicions& found);
+/// A time in minutes: beside another run, or since most of three or more temperatures change faster
+/// than those of a machine without heaters.
+void check_time_unit(const std::vector<RunFile>& runs, Suspicions& found);
 
 /// Compares each reading with its expectation from the others: steps, drift and loosening of
 /// temperatures, steps of displacements. Findings are removed from `recording` and the rest is

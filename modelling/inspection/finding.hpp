@@ -9,7 +9,7 @@
 namespace thermocomp::inspection {
 
 /// A fault of a recording. `kind` is one of spikes, sensor_step, sensor_drift, sensor_loose,
-/// sensor_swap, stuck, coarse, unit, copy, displacement_step, outliers, gap, clock.
+/// sensor_swap, stuck, coarse, unit, noise, copy, displacement_step, outliers, gap, clock.
 struct Finding {
   std::string kind;
   std::string column;  ///< empty: the run as a whole

@@ -21,7 +21,7 @@ struct ScoreCurve {
   double even;
   double steepness;
 };
-constexpr std::array<ScoreCurve, 9> score_curves{{
+constexpr std::array<ScoreCurve, 11> score_curves{{
     {"spikes", 1.15, 8},
     {"outliers", 1.15, 8},
     {"sensor_step", 8.0, 6},
@@ -29,10 +29,12 @@ constexpr std::array<ScoreCurve, 9> score_curves{{
     {"sensor_loose", 22.0, 6},
     {"sensor_swap", 2.0, 4},
     {"stuck", 2.0, 3},
-    {"unit", 5.0, 2},
+    {"unit", 2.0, 3},
+    {"noise", 7.0, 4},
+    {"clock", 2.0, 3},
     {"displacement_step", 10.0, 6},
 }};
-constexpr double of_plain_facts = 0.99;  // coarse, copy, gap, clock: evident in the file
+constexpr double of_plain_facts = 0.99;  // coarse, copy, gap: evident in the file
 
 /// Probability of a score, by kind; docs/inspection.md gives the origin of the constants.
 double probability_of(const std::string& kind, double score) {
@@ -139,15 +141,18 @@ Inspection inspect(const std::vector<RunFile>& given, double probability_min,
     inspection.runs.push_back(sampling_of(runs[i]));
     check_clock(runs[i], i, inspection.runs.back(), suspicions);
     check_empty(runs[i], i, suspicions);
+    check_noises(runs[i], i, suspicions);
     despiked.push_back(without_outliers(runs[i], i, suspicions));
   }
   check_values(runs, suspicions);
+  check_time_unit(runs, suspicions);
   for (const Suspicion& each : suspicions)
     if (each.finding.kind == "stuck") bridge(despiked[each.finding.run], each.finding);
   Recording recording = make_recording(despiked, rows_max(runs.size()));
   inspection.groups = groups_of(recording);
   judge_excitation(recording, inspection);
   check_exchanged(recording, suspicions);
+  check_units(runs, recording, suspicions);
   check_changes(std::move(recording), Looked::all, suspicions, progress);
   for (Suspicion& each : suspicions) {
     each.finding.score = each.score;

@@ -101,10 +101,24 @@ std::string sentence(const Finding& finding, const RunFile& run) {
   if (kind == "stuck")
     return finding.column + " stays at one value from " + at + " to " +
            moment(finding.until_s, run) + " while other places change by " + size +
-           ": the channel is stuck, or this is a setpoint.";
+           (is_output(finding.column) ? ": the probe or its channel is stuck."
+                                      : ": the channel is stuck, or this is a setpoint.");
   if (kind == "coarse")
     return finding.column + " is recorded in steps of " + size +
            ", which hide smaller changes: record it with more digits.";
+  if (kind == "unit" && finding.unit == "times")
+    return finding.column + " agrees with the others only if divided by " +
+           two_digits(finding.size) +
+           (finding.other.empty() ? ""
+                                  : " (or the other run's is multiplied: two do not show which)") +
+           ": check its unit, its scale and its wiring.";
+  if (kind == "noise")
+    return finding.column + " has " + two_digits(finding.size) + " times its usual noise from " +
+           at + " to " + moment(finding.until_s, run) +
+           ", and nothing else has: check its plug, its shield and its supply.";
+  if (kind == "clock" && finding.unit == "times")
+    return "All temperatures change as if time_s were in minutes: multiply it by 60, or name the "
+           "unit in the file of --columns (time_unit = \"min\").";
   if (kind == "unit")
     return finding.column +
            " agrees with the others if it is in kelvin, though its name says degC: then subtract "

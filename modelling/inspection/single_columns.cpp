@@ -24,7 +24,6 @@ constexpr double coarse_um_min = 1.0;
 constexpr std::size_t stuck_rows_min = 10;
 constexpr double others_moved_K_min = 1.0;
 constexpr double stuck_steps_min = 3.0;  ///< least expected motion, in least steps of the reading
-constexpr double zero_degC_in_K = 273.15;
 constexpr std::size_t copy_values_min = 20;  // distinct values; fewer agree by chance
 
 Suspicion suspicion(const std::string& kind, const std::string& column, std::size_t run,
@@ -115,6 +114,35 @@ void leave_out_impossible(std::vector<double>& values,
   }
 }
 
+/// Sets stretches of one value that the reading jumps to and back from to missing: a code, such as
+/// 85.0 of a sensor that was reset.
+void leave_out_codes(std::vector<double>& values,
+                     const std::function<void(std::size_t, double)>& note) {
+  constexpr double leap_K = 5.0;
+  constexpr double leap_moves = 20.0;  // usual changes from row to row
+  constexpr std::size_t rows_max_share = 4;
+  std::vector<double> moves;
+  for (std::size_t row = 1; row < values.size(); ++row)
+    moves.push_back(std::abs(values[row] - values[row - 1]));
+  const double usual = median(std::move(moves));
+  if (!(usual > 0)) return;  // a setpoint
+  const double least = std::max(leap_K, leap_moves * usual);
+  for (std::size_t begin = 1; begin + 1 < values.size(); ++begin) {
+    std::size_t end = begin + 1;
+    while (end < values.size() && values[end] == values[begin]) ++end;
+    const double in = values[begin] - values[begin - 1];
+    const double out = end < values.size() ? values[begin] - values[end] : 0.0;
+    const bool is_code = end - begin > 1 && rows_max_share * (end - begin) < values.size() &&
+                         std::min(std::abs(in), std::abs(out)) > least && out / in > 0.5 &&
+                         out / in < 2.0;
+    for (std::size_t row = begin; is_code && row < end; ++row) {
+      note(row, in);
+      values[row] = std::numeric_limits<double>::quiet_NaN();
+    }
+    begin = end - 1;
+  }
+}
+
 void check_leaps(RunFile& run, std::size_t index, std::size_t column, Suspicions& found) {
   std::vector<double>& values = run.values[column];
   const bool output = is_output(run.columns[column]);
@@ -125,6 +153,7 @@ void check_leaps(RunFile& run, std::size_t index, std::size_t column, Suspicions
     if (std::abs(leap) > std::abs(made.finding.size)) made.finding.size = leap;
   };
   if (!output) leave_out_impossible(values, note);
+  if (!output) leave_out_codes(values, note);
   std::vector<double> around(values.size());
   std::vector<double> leaps(values.size());
   std::vector<double> bends(values.size());
@@ -202,6 +231,14 @@ bool is_held(const RunFile& run, std::size_t column, StillRows rows) {
          });
 }
 
+/// True if nearly every row outside of the stretch differs from the one before: noise that ends.
+bool is_lively(const std::vector<double>& values, StillRows still) {
+  const auto finite = std::count_if(values.begin(), values.end(),
+                                    [](double value) { return std::isfinite(value); });
+  const auto others = static_cast<std::size_t>(finite) - still.rows();
+  return others > still.rows() && 10 * moves_of(values).size() >= 9 * others;
+}
+
 void check_stuck(const RunFile& run, std::size_t index, std::size_t column, Suspicions& found) {
   const auto [longest, second] = longest_still(run.values[column]);
   if (longest.rows() < stuck_rows_min || is_held(run, column, longest)) return;
@@ -220,15 +257,23 @@ void check_stuck(const RunFile& run, std::size_t index, std::size_t column, Susp
   }
   if (others.empty()) return;
   const double moved = median(others);
+  const double longer = static_cast<double>(longest.rows()) / static_cast<double>(second);
+  const auto offer = [&](double score) {
+    found.push_back(suspicion("stuck", run.columns[column], index, run.time_s()[longest.begin],
+                              run.time_s()[longest.end - 1], moved, score));
+    found.back().finding.unit = "K";
+  };
+  if (is_output(run.columns[column]) && is_lively(run.values[column], longest)) {
+    offer(longer / 3.0);
+    return;
+  }
   // A working reading moves by the same share of its range as the others do of theirs.
   const double expected = throughout ? *std::min_element(others.begin(), others.end())
                                      : median(shares) * range_of(run.values[column], all);
   if (!(moved > others_moved_K_min) || !(expected > stuck_steps_min * step_K)) return;
-  const double longer = static_cast<double>(longest.rows()) / static_cast<double>(second);
   const double score = throughout ? moved : std::min(longer, 5.0 * moved);
   if (!throughout && longer < 3.0) return;
-  found.push_back(suspicion("stuck", run.columns[column], index, run.time_s()[longest.begin],
-                            run.time_s()[longest.end - 1], moved, score));
+  offer(score);
 }
 
 void check_coarse(const RunFile& run, std::size_t index, std::size_t column, Suspicions& found) {
@@ -244,33 +289,6 @@ void check_coarse(const RunFile& run, std::size_t index, std::size_t column, Sus
   if (on_grid < static_cast<std::ptrdiff_t>(steps.size()) || least < 0.02 * range) return;
   found.push_back(suspicion("coarse", run.columns[column], index, run.time_s().front(),
                             run.time_s().back(), least, 10.0));
-}
-
-double first_value(const std::vector<double>& values) {
-  const auto found =
-      std::find_if(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
-  return found == values.end() ? std::numeric_limits<double>::quiet_NaN() : *found;
-}
-
-/// Checks a reading of more than 200 degC, without its drop-outs: in kelvin it would begin like the
-/// others.
-void check_unit(const RunFile& run, std::size_t index, std::size_t column, Suspicions& found) {
-  constexpr double hot_degC = 200.0;
-  constexpr double near_K = 5.0;
-  constexpr std::ptrdiff_t drop_outs = 20;  // at most one in this number of rows
-  const auto is_cool = [](double value) { return value <= hot_degC; };
-  const std::vector<double>& values = run.values[column];
-  const auto cool = std::count_if(values.begin(), values.end(), is_cool);
-  if (drop_outs * cool > static_cast<std::ptrdiff_t>(values.size())) return;
-  std::vector<double> others;
-  for (std::size_t i = 0; i < run.columns.size(); ++i)
-    if (const double other = first_value(run.values[i]);
-        is_temperature(run.columns[i]) && is_cool(other))
-      others.push_back(other);
-  if (others.empty()) return;
-  if (!(std::abs(first_value(values) - zero_degC_in_K - median(others)) <= near_K)) return;
-  found.push_back(suspicion("unit", run.columns[column], index, run.time_s().front(),
-                            run.time_s().back(), zero_degC_in_K, 10.0));
 }
 
 void check_copies(const RunFile& run, std::size_t index, Suspicions& found) {
@@ -317,8 +335,7 @@ void check_values(const std::vector<RunFile>& runs, Suspicions& found) {
     const RunFile& run = runs[index];
     for (std::size_t column = 0; column < run.columns.size(); ++column) {
       const bool reading = is_temperature(run.columns[column]);
-      if (reading) check_stuck(run, index, column, found);
-      if (run.columns[column].ends_with("_degC")) check_unit(run, index, column, found);
+      if (reading || is_output(run.columns[column])) check_stuck(run, index, column, found);
       if (reading || is_output(run.columns[column])) check_coarse(run, index, column, found);
     }
     check_copies(run, index, found);

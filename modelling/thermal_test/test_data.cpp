@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "config/runs/model_inputs.hpp"
+#include "config/runs/run_file.hpp"
 #include "config/text/printable_text.hpp"
 #include "config/text/problems.hpp"
 #include "config/text/units.hpp"
@@ -386,7 +387,7 @@ void refuse_new_reference(const RunFile& run) {
   };
   for (const std::size_t row : run.references)
     if (row > run.selected_begin && row < run.selected_end && is_measured_before(row))
-      refuse(run, "selection", run.name,
+      refuse(run, "selection", selected_name(run),
              "must not contain a new reference, such as at " + number_text(run.time_s()[row]) +
                  " s: displacement counts anew from there");
 }
@@ -414,7 +415,7 @@ TestData test_data(const RunFile& given, const TestOptions& options) {
   for (const Outliers& each : leave_out_outliers(run, outputs))
     data.description.push_back(each.text());
   data.kind = options.kind;
-  data.file = run.name;
+  data.file = selected_name(run);
   data.phases.from_s = run.time_s()[run.selected_begin];
   data.phases.to_s = run.time_s()[run.selected_end - 1];
   const std::vector<AxisBinding> bindings = bind_axes(run, options);

@@ -236,6 +236,12 @@ bool add_table(const json& object, Records& records) {
   return has_columns;
 }
 
+/// {"ts": ..., "value": ...} of a list under the name of a series
+bool is_point(const json& record) {
+  return record.is_object() && record.size() == 2 && record.contains("value") &&
+         !first_of(record, {"ts", "t", "time", "timestamp"}).is_null();
+}
+
 /// Collects the tables anywhere in a document or, without `tables`, the records in lists or keyed
 /// by their time.
 void collect(const json& value, bool tables, int depth, Records& records) {
@@ -244,7 +250,13 @@ void collect(const json& value, bool tables, int depth, Records& records) {
     return;
   for (const auto& [key, each] : value.items()) {
     const bool is_timed = value.is_object() && parse_time_stamp(key);
-    if (!tables && each.is_object() && (value.is_array() || is_timed))
+    const bool is_list = value.is_object() && each.is_array();
+    if (is_list && std::ranges::all_of(each, is_point)) {
+      for (json point : each) {
+        point["series"] = key;
+        records.add(point);
+      }
+    } else if (!tables && each.is_object() && (value.is_array() || is_timed))
       records.add(each, is_timed ? in_quotes(key) : "");
     else
       collect(each, tables, depth + 1, records);

@@ -88,15 +88,27 @@ std::optional<PlainTable> lvm(const Log& log) {
   if (zero) table.text = wall_zero_comment({zero->seconds, false});
   for (std::size_t i = 0; i < names.size(); ++i) {
     if (i > 0) table.text += separator;
-    table.text += with_unit(names[i], i == 0 ? "s" : key("Y_Unit_Label", i));
+    table.text += with_unit(names[i], names[i] == "X_Value" ? "s" : key("Y_Unit_Label", i));
   }
   table.lines_above = line - 1 - (zero ? 1 : 0);
-  while (!rest.empty()) {
+  // Without times in the rows the header has their distance.
+  const char decimal = key("Decimal_Separator", 1) == "," ? ',' : '.';
+  const auto step_s = key("X_Columns", 1) == "No"
+                          ? number_of(key("Delta_X", 1), NumberForm{decimal, '\0'})
+                          : std::nullopt;
+  for (int count = 0; !rest.empty(); ++count) {
     const std::string_view row = take_line(rest);
+    if (step_s && row.empty()) continue;
     std::size_t end = has_comments ? 0 : std::string_view::npos;
     for (std::size_t i = 0; i < names.size() && end != std::string_view::npos; ++i)
       end = row.find(separator, i == 0 ? 0 : end + 1);
-    table.text.append("\n").append(row.substr(0, end));
+    table.text += '\n';
+    if (step_s) {
+      std::string time = number_text(count * *step_s);
+      std::ranges::replace(time, '.', decimal);
+      table.text += time;
+    }
+    table.text.append(row.substr(0, end));
   }
   if (has_comments) table.notes.emplace_back("'Comment' left out");
   table.notes.emplace_back("LVM of LabVIEW: names in line " + std::to_string(line));

@@ -132,6 +132,30 @@ Labelled labelled_of(std::string_view line) {
   return found;
 }
 
+/// Parses "TIME|name|value|name|value", as MTConnect's adapters send.
+Labelled piped_of(std::string_view line) {
+  const std::vector<std::string> fields = fields_of(line, '|');
+  Labelled found;
+  if (fields.size() < 3 || fields.size() % 2 == 0 || !parse_time_stamp(fields[0])) return found;
+  for (std::size_t i = 1; i < fields.size(); i += 2) {
+    if (fields[i].empty() || looks_like_number(fields[i])) return {};
+    found.values.emplace_back(fields[i], fields[i + 1]);
+  }
+  found.time = fields[0];
+  return found;
+}
+
+/// Whether all of the first lines are such, and one has several values.
+bool is_piped(std::string_view text) {
+  bool has_several = false;
+  for (int line = 0; line < 20 && !text.empty(); ++line) {
+    const Labelled found = piped_of(take_line(text));
+    if (found.time.empty()) return false;
+    has_several = has_several || found.values.size() > 1;
+  }
+  return has_several;
+}
+
 bool is_labelled(std::string_view text) {
   constexpr int lines_judged = 20;
   int lines = 0;
@@ -149,10 +173,11 @@ bool is_labelled(std::string_view text) {
 }  // namespace
 
 std::optional<PlainTable> labelled(const Log& log) {
-  if (!is_labelled(log.text)) return std::nullopt;
+  const auto parse = is_piped(log.text) ? piped_of : labelled_of;
+  if (parse == labelled_of && !is_labelled(log.text)) return std::nullopt;
   std::map<std::string, bool> has_number;
   for (std::string_view rest = log.text; !rest.empty();)
-    for (const auto& [name, value] : labelled_of(take_line(rest)).values)
+    for (const auto& [name, value] : parse(take_line(rest)).values)
       has_number[name] |= looks_like_number(value);
   NamedColumns columns;
   const std::size_t time = columns.add("time");
@@ -163,7 +188,7 @@ std::optional<PlainTable> labelled(const Log& log) {
   WordsBesideNames words;
   std::string_view rest = log.text;
   for (int line = 1; !rest.empty(); ++line) {
-    Labelled found = labelled_of(take_line(rest));
+    Labelled found = parse(take_line(rest));
     std::erase_if(found.values, [&](const auto& value) { return !has_number.at(value.first); });
     if (found.time.empty() || found.values.empty()) {
       ++left_out;

@@ -33,7 +33,9 @@ RunFile load_record(const std::string& argument, RunLoader& loader) {
   for (const HistoryDamage& damage : summary.damage) {
     std::fprintf(stderr, "%s: %s\n", file.c_str(), to_string(damage).c_str());
   }
-  return parse_run(text.str(), argument, selection);  // the run's name includes the stretch
+  RunFile run = parse_run(text.str(), file, selection);
+  run.argument = argument;
+  return run;
 }
 
 }  // namespace thermocomp::cli

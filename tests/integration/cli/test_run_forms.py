@@ -197,3 +197,23 @@ def test_test_rows_must_not_be_fitted(tmp_path):
         assert answer.returncode == 2 and "run.csv" in answer.stderr, answer.stderr
     answer = run("fit", f"{file}@:4000", f"{file}@3000:", "--outputs", "z_um", "-o", model)
     assert answer.returncode == 2 and "given twice" in answer.stderr
+
+
+def test_one_map_describes_both_files_of_a_join(tmp_path):
+    (tmp_path / "temps.csv").write_text(
+        "Zeit;T1\n20.11.2026 10:00:00;20,5\n20.11.2026 10:10:00;21,5\n", encoding="utf-8")
+    (tmp_path / "entered.csv").write_text(
+        "Zeit;axis;value\n20.11.2026 10:05:00;Z;-0,012\n", encoding="utf-8")
+    columns = tmp_path / "columns.toml"
+    ask = ("import", tmp_path / "temps.csv", "--join", tmp_path / "entered.csv", "--corrections",
+           "steps", "--columns", columns, "-o", tmp_path / "run.csv")
+    columns.write_text('[columns]\nT1 = "t1_degC"\nZ = { name = "z_mm", unit = "mm" }\n',
+                       encoding="utf-8")
+    answer = run(*ask)
+    assert answer.returncode == 0, answer.stderr
+    assert "time_s,t1_degC,z_um\n0,20.5,\n300,21,12\n600,21.5,\n" in (
+        tmp_path / "run.csv").read_text(encoding="utf-8")
+    columns.write_text('[columns]\nT2 = "t1_degC"\n', encoding="utf-8")
+    answer = run(*ask)
+    assert answer.returncode == 2
+    assert "T2: is a column neither of " in answer.stderr, answer.stderr

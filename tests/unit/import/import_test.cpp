@@ -199,7 +199,9 @@ TEST_CASE("files without a common clock need the shift", "[import]") {
   CHECK(run.time_s()[2] == 1.5);
   CHECK(run.column("z_um")[2] == 0.8);
   CHECK_THROWS_WITH(joined_runs(store, probings, 5000.0), Contains("is outside "));
-  CHECK_THROWS_WITH(joined_runs(probings, probings, 0.0), Contains("is a column of"));
+  const RunFile twice = joined_runs(probings, probings, 0.0);
+  CHECK(twice.columns == Columns{"time_s", "z_um", "z_2_um"});
+  CHECK(has_note(twice, "z_um of " + probings.name + " is z_2_um"));
 }
 
 namespace {
@@ -237,6 +239,16 @@ TEST_CASE("files without dates are joined by a common event, or not at all", "[i
     CHECK(shift->is_sure());
     CHECK(shift->shift_s == Approx(1500.0).margin(15.0));
     CHECK(has_note(joined_runs(first, second, {}), "'bed_degC' and 'z_um' change alike"));
+    // Dates that contradict the columns are refused; a lag of minutes is none.
+    const auto dated = [](RunFile run, double zero_s) {
+      run.wall_zero = WallZero{zero_s, false};
+      return run;
+    };
+    CHECK_THROWS_WITH(
+        joined_runs(dated(first, 1e9), dated(second, 1e9 + 1500 - 3600), {}),
+        Contains("the dates give -2100 s, but 'bed_degC' and 'z_um' change alike at 1500 s"));
+    CHECK(
+        has_note(joined_runs(dated(first, 1e9), dated(second, 1e9 + 900), {}), ", by their dates"));
     // Noise alone, or an event in only one file, gives no result.
     const RunFile calm = seen_from(1500.0, 7.0, "z_um", 1.0, false, 200 + seed);
     CHECK(!clock_shift(first, calm)->is_sure());

@@ -410,3 +410,139 @@ TEST_CASE("the comments of an LVM are left out", "[import]") {
   check_all({{"in one row", head + "0\t20\tstart\n1\t21\n2\t22\n",
               "time_s,Bed_degC\n0,20\n1,21\n2,22\n", ""}});
 }
+
+TEST_CASE("times are read as people of several countries write them", "[import]") {
+  const std::string run = "time_s,T_degC\n0,20\n60,21\n";
+  const auto written = [&](const std::string& first, const std::string& second,
+                           const std::string& map = "") {
+    return MisreadLog{first, "Time;T [C]\n" + first + ";20\n" + second + ";21\n", run, map};
+  };
+  check_all({
+      written("26. Nov. 2026 06:59:00", "26. Nov. 2026 07:00:00"),
+      written("3 décembre 2026 06:59:00", "3 décembre 2026 07:00:00"),
+      written("Thursday, November 26, 2026 11:59:00 AM", "Thursday, November 26, 2026 12:00:00 PM"),
+      written("mar. 3 mars 2026 06h59", "mar. 3 mars 2026 07h00"),
+      written("26.11.2026 06.59.00", "26.11.2026 07.00.00"),
+      written("2026年11月26日 6時59分00秒", "2026年11月26日 7時00分00秒"),
+      written("'26-11-26 06:59:00.000", "'26-11-26 07:00:00.000",
+              "date_order = \"year.month.day\""),
+      written("2026-10-25 02:59:00 CEST", "2026-10-25 02:00:00 CET"),
+      written("2026-11-26T06:59:00+01:00[Europe/Berlin]",
+              "2026-11-26T07:00:00+01:00[Europe/Berlin]"),
+      written("26/11/2026 11:59:00 a. m.", "26/11/2026 12:00:00 p. m."),
+      written("2026/11/26 上午 11:59:00", "2026/11/26 下午 12:00:00"),
+      written("0 days 23:59:00", "1 days 00:00:00"),
+      written("23:59:00", "1.00:00:00"),
+      written("59:30.0", "00:30.0", "time_unit = \"mm:ss\""),
+      {"minutes that begin anew", "Time,T [C]\n44:00,20\n45:00,21\n00:00,22\n01:00,23\n",
+       "log:4: Time = 00:00: must be later than in line 3", "time_unit = \"mm:ss\""},
+      {"WinCC's millionths of a day",
+       "\"VarName\";\"TimeString\";\"VarValue\";\"Validity\";\"Time_ms\"\n"
+       "\"T_degC\";\"26.11.2026 06:55:00\";20;1;46352288194,4444\n"
+       "\"T_degC\";\"26.11.2026 06:55:00\";21;1;46352288197,3380\n"
+       "\"T_degC\";\"26.11.2026 06:55:00\";22;1;46352288200,2315\n"
+       "\"$RT_OFF$\";\"26.11.2026 06:55:09\";0;2;46352288300,1230\n",
+       "time_s,T_degC\n0,20\n0.250007,21\n", ""},
+      {"a column for each part",
+       "Year,Month,Day,Hour,Minute,Second,T [C]\n2026,11,26,6,59,0,20\n2026,11,26,7,0,0,21\n", run,
+       ""},
+      {"a time for each channel", "Time [s],T [C],Time [s],z [um]\n0,20,0,1\n60,21,60,2\n",
+       "time_s,T_degC,z_um\n0,20,1\n60,21,2\n", ""},
+  });
+}
+
+TEST_CASE("lines and bytes that are no rows", "[import]") {
+  const std::string run = "time_s,T_degC\n0,20\n60,21\n";
+  check_all({
+      {"events, another header and statistics",
+       "Time [s];T [C]\n0;20\n*** door opened\nTime [s];T [C]\n60;21\n\nMin;20,0\nEnd of data\n",
+       run, ""},
+      {"a series called max", "name,Time [s],value\nmax,0,20\nmin,0,19\nmax,60,21\nmin,60,18\n",
+       "time_s,max,min\n0,20,19\n60,21,18\n", ""},
+      {"a header in another order",
+       "Time [s],T [C],z [um]\n0,20,1\nTime [s],z [um],T [C]\n60,2,21\n",
+       "log:3: Time [s],z [um],T [C]: names the columns in another order than line 1", ""},
+      {"a comma that separates fields and decimals",
+       "Time [s],T [C],z [um]\n0,20,5,1,0\n60,20,6,2,5\n", "seems to be the decimal sign, too", ""},
+      {"lines in quotes", "\"Time [s],T [C]\"\n\"0,20\"\n\"60,21\"\n", run, ""},
+      {"a row that was sent twice", "Time [s],T [C]\n0,20\n0,20\n60,21\n", run, ""},
+      {"CR CR LF", "Time [s],T [C]\r\r\n0,20\r\r\n60,21\r\r\n", run, ""},
+      {"comments", "% bench 3\n// door shut\nTime [s],T [C]\n0,20\n60,21\n", run, ""},
+      {"zeros of a lost supply", "Time [s],T [C]\n0,20\n" + std::string(99, '\0') + "60,21\n", run,
+       ""},
+      {"which cut a row", "Time [s],T [C]\n0,2" + std::string(9, '\0') + "60,21\n",
+       "time_s,T_degC\n0,2\n60,21\n", ""},
+      {"UTF-16 without a mark",
+       [] {
+         std::string wide;
+         for (const char c : std::string("Time [s],T [C]\n0,20\n60,21\n")) (wide += c) += '\0';
+         return wide;
+       }(),
+       run, ""},
+      {"letters of another encoding", "Time [s],\x89\xb7\x93x(\x81\x8e)\n0,20\n",
+       "write encoding = \"shift_jis\"", ""},
+      {"which is given", "Time [s],\x89\xb7\x93x(\x81\x8e)\n0,20\n", "time_s,温度_degC\n0,20\n",
+       "encoding = \"shift_jis\""},
+  });
+}
+
+TEST_CASE("units, missing values and devices of further programs", "[import]") {
+  const std::string run = "time_s,T_degC\n0,20\n60,21\n";
+  const auto named = [&](const std::string& header) {
+    return MisreadLog{header, "Time [s];" + header + "\n0;20\n60;21\n", run, ""};
+  };
+  check_all({
+      named("[°C] T"),
+      named("T, deg C"),
+      named("T_C"),
+      named("T/°C"),
+      named("T [\xf8"
+            "C]"),
+      {"a floor", "Time [s],Temp1F,T (IN)\n0,20,30\n", "column 3 = T (IN): has an unknown unit",
+       ""},
+      {"letters of sensors", "Time [s],Temp A,Temp B,Temp C\n0,20,30,40\n",
+       "time_s,Temp_A,Temp_B,Temp_C\n0,20,30,40\n", ""},
+      {"a letter behind another name", "Time [s],bed_C\n0,20\n",
+       "bed_C: may be in degC: write \"bed_C\" = { name = \"bed_degC\", unit = \"degC\" }", ""},
+      {"other sizes of letters, a twice coded sign", "Time [s],a (UM),n (Rpm),z [Âµm]\n0,1,2,3\n",
+       "time_s,a_um,n_rpm,z_um\n0,1,2,3\n", ""},
+      {"blanks between thousands", "Time [s];n [rpm];T [C]\n0;2 000;20,5\n60;12 000;21,5\n",
+       "time_s,n_rpm,T_degC\n0,2000,20.5\n60,12000,21.5\n", ""},
+      {"units behind strokes", "t/ms;T/K;I/A\n0;293.15;1\n60;294.15;2\n",
+       "time_s,T_K,I_A\n0,293.15,1\n0.06,294.15,2\n", ""},
+      {"names over two rows", "Time [s],Bed,\n,Min [C],Max [C]\n0,20,21\n",
+       "time_s,Min_degC,Max_degC\n0,20,21\n", ""},
+      {"signs for a missing value", "Time [s],T [C]\n0,20\n60,-----\n120,+OVER\n180,Burn Out\n",
+       "time_s,T_degC\n0,20\n60,\n120,\n180,\n", ""},
+      {"one series of InfluxDB",
+       ",result,table,_start,_stop,_time,_value,_field\n"
+       ",,0,2026-02-01T09:00:00Z,2026-02-01T11:00:00Z,2026-02-01T10:00:00Z,20,T_degC\n"
+       ",,0,2026-02-01T09:00:00Z,2026-02-01T11:00:00Z,2026-02-01T10:01:00Z,21,T_degC\n",
+       run, ""},
+      {"devices, each with a time of its own",
+       "Time [s],Device,T [C]\n0,bed,20\n5,head,30\n60,bed,21\n65,head,31\n",
+       "time_s,bed_degC,head_degC\n0,20,\n5,,30\n60,21,\n65,,31\n", ""},
+      {"words that alternate", "Time [s],Box,T [C]\n0,bed,20\n5,head,30\n60,bed,21\n65,head,31\n",
+       "column 2 = Box: alternates, and may say which device a row is of: write pivot", ""},
+      {"two series of points",
+       R"({"T_degC":[{"ts":1795676100000,"value":"20"},{"ts":1795676160000,"value":"21"}],)"
+       R"("z_um":[{"ts":1795676100000,"value":"1"},{"ts":1795676160000,"value":"2"}]})",
+       "time_s,T_degC,z_um\n0,20,1\n60,21,2\n", ""},
+      {"addresses",
+       "Time [s],Box,T "
+       "[C]\n0,1,20\n5,2,30\n60,1,21\n65,2,31\n120,1,21\n125,2,31\n180,1,21\n185,2,31\n",
+       "column 2 = Box: may say which sensor a row is of", ""},
+      {"MTConnect's adapter",
+       "2026-02-01T10:00:00Z|T1|20|T2|UNAVAILABLE\n2026-02-01T10:01:00Z|T1|21\n"
+       "2026-02-01T10:02:00Z|T2|22\n",
+       "time_s,T1,T2\n0,20,\n60,21,\n120,,22\n", ""},
+      {"LabVIEW without times",
+       "LabVIEW Measurement\t\nX_Columns\tNo\n***End_of_Header***\t\n\nChannels\t1\t\n"
+       "Y_Unit_Label\tDeg C\nDelta_X\t60.0\n***End_of_Header***\t\nX_Value\tT\tComment\n"
+       "\t20\t\n\t21\t\n",
+       run, ""},
+      {"references of an export",
+       "# by export\ntime_s,T [C]\n0,20\n# 30.000 s: command reference\n60,21\n",
+       "time_s,T_degC\n0,20\n# 60 s: command reference\n60,21\n", ""},
+  });
+}

@@ -355,6 +355,93 @@ TEST_CASE("stuck, coarse and duplicate readings are reported", "[inspection]") {
   CHECK(find(inspection, "copy")->other == "t4_degC");
 }
 
+TEST_CASE("a displacement that keeps one value is stuck, and has no step at its end",
+          "[inspection]") {
+  RunFile run = recording();
+  std::fill_n(column(run, "z_um").begin() + 300, 120, column(run, "z_um")[300]);
+  const Inspection inspection = inspect({run});
+  REQUIRE(find(inspection, "stuck") != nullptr);
+  CHECK(find(inspection, "stuck")->column == "z_um");
+  CHECK(find(inspection, "stuck")->at_s == 300 * 60.0);
+  CHECK(find(inspection, "displacement_step") == nullptr);
+}
+
+TEST_CASE("hours of noise of one reading are named; of all, or with a speed, they are not",
+          "[inspection]") {
+  RunFile run = recording();
+  std::mt19937 random(5);
+  std::normal_distribution<double> noise(0.0, 0.4);
+  const auto add_to = [&](const std::string& name) {
+    for (std::size_t row = 240; row < 320; ++row) column(run, name)[row] += noise(random);
+  };
+  add_to("t3_degC");
+  const Inspection inspection = inspect({run});
+  REQUIRE(find(inspection, "noise") != nullptr);
+  CHECK(find(inspection, "noise")->column == "t3_degC");
+  CHECK(find(inspection, "noise")->at_s == Approx(240 * 60.0).margin(900.0));
+  CHECK(find(inspection, "noise")->size == Approx(20.0).margin(8.0));
+  SECTION("with a speed that no other rows have") {
+    for (std::size_t row = 240; row < 320; ++row) column(run, "spindle_rpm")[row] = 9000.0;
+    CHECK(find(inspect({run}), "noise") == nullptr);
+  }
+  SECTION("of all") {
+    for (const char* name : {"t1_degC", "t2_degC", "t4_degC", "t5_degC", "t6_degC"}) add_to(name);
+    CHECK(find(inspect({run}), "noise") == nullptr);
+  }
+}
+
+TEST_CASE("a reading that is tenfold or negative is named, a cold and a hot one are not",
+          "[inspection]") {
+  const auto factor = GENERATE(10.0, -1.0, 0.1);
+  RunFile run = recording();
+  for (double& value : column(run, "t3_degC")) value *= factor;
+  const Inspection inspection = inspect({run});
+  INFO(inspection_text(inspection));
+  REQUIRE(find(inspection, "unit") != nullptr);
+  CHECK(find(inspection, "unit")->column == "t3_degC");
+  CHECK(find(inspection, "unit")->size == factor);
+  run = recording();
+  for (double& value : column(run, "t1_degC")) value += 180.0;
+  for (double& value : column(run, "t2_degC")) value -= 40.0;
+  CHECK(find(inspect({run}), "unit") == nullptr);
+}
+
+TEST_CASE("a displacement that agrees with other runs only when multiplied is named",
+          "[inspection]") {
+  const auto factor = GENERATE(10.0, -1.0);
+  std::vector<RunFile> runs{recording(1), recording(2), recording(3)};
+  CHECK(find(inspect(runs), "unit") == nullptr);
+  for (double& value : column(runs[1], "z_um")) value *= factor;
+  const Inspection inspection = inspect(runs);
+  REQUIRE(find(inspection, "unit") != nullptr);
+  CHECK(find(inspection, "unit")->column == "z_um");
+  CHECK(find(inspection, "unit")->run == 1);
+  CHECK(find(inspection, "unit")->size == factor);
+}
+
+TEST_CASE("a time in minutes is named beside a run in seconds, rows each second are not",
+          "[inspection]") {
+  RunFile minutes = recording(2);
+  for (double& at : minutes.values[0]) at /= 60.0;
+  const Inspection inspection = inspect({recording(1), minutes});
+  REQUIRE(find(inspection, "clock") != nullptr);
+  CHECK(find(inspection, "clock")->run == 1);
+  CHECK(find(inspection, "clock")->size == 60.0);
+  RunFile seconds = recording(3);
+  for (std::size_t i = 0; i < seconds.columns.size(); ++i)
+    for (std::size_t row = 0; row < rows; ++row)
+      seconds.values[i][row] = i == 0 ? static_cast<double>(row) : seconds.values[i][row / 60];
+  CHECK(find(inspect({recording(1), seconds}), "clock") == nullptr);
+}
+
+TEST_CASE("rows of a sensor's code are spikes", "[inspection]") {
+  RunFile run = recording();
+  std::fill_n(column(run, "t3_degC").begin() + 300, 20, 85.0);
+  const Inspection inspection = inspect({run});
+  REQUIRE(find(inspection, "spikes") != nullptr);
+  CHECK(find(inspection, "spikes")->times_s.size() == 20);
+}
+
 TEST_CASE("a gap and a clock set forward are distinguished", "[inspection]") {
   RunFile run = recording();
   RunFile gap = run;
