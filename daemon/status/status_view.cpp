@@ -189,8 +189,9 @@ UnitStatus unit_of(const StatusView& view, const UnitHealth& unit) {
     status.sensors.push_back(view.config.estimator.sensors[i].name);
     newest = std::max(newest, view.report.sensors[i].taken_at);
     // A unit that sends by itself may do so rarely.
-    const bool is_valid = view.report.sensors[i].fault == Fault::none && unit.requests == 0;
-    status.answering = status.answering || (unit.answers != 0 && is_valid);
+    const Fault fault = view.report.sensors[i].fault;
+    if (unit.requests == 0 && unit.answers != 0)
+      status.answering |= fault == Fault::none || fault == Fault::unconfirmed;
     for (std::string& block : blocks_of(view, i))
       if (std::find(status.blocks.begin(), status.blocks.end(), block) == status.blocks.end())
         status.blocks.push_back(std::move(block));

@@ -61,6 +61,8 @@ TEST_CASE("a module that sends rarely answers while its values are valid", "[sta
     return status_of(view).buses[0].units[0].answering;
   };
   CHECK(answers());
+  report.sensors[0].fault = Fault::unconfirmed;
+  CHECK(answers());
   report.sensors[0].fault = Fault::stale;
   CHECK_FALSE(answers());
   report.sensors[0].fault = Fault::none;

@@ -12,56 +12,6 @@
 using namespace thermocomp;
 using namespace std::chrono_literals;
 
-// ------------------------------------------------------------------ EMCY
-
-TEST_CASE("EMCY: listed codes fault a channel until no error is left", "[canopen][emergency]") {
-  CanopenNodeConfig node = node_5({in_pdo(0, 0x185, 0), in_pdo(1, 0x185, 16)});
-  node.channels[0].emergency_codes = {0x4210};
-  Bus bus(bus_of({node}));
-  bus.put(0x585, {0x4F, 0x01, 0x10, 0x00, 0, 0, 0, 0});  // error register: none
-  bus.put(0x185, {0xE1, 0x00, 0xE2, 0x00});
-  CHECK(bus.temp_degC(0) == Approx(22.5));
-  bus.put(0x085, {0x10, 0x42, 0x09, 0, 0, 0, 0, 0});
-  CHECK(bus.fault(0) == Fault::device_error);
-  CHECK(bus.fault(1) == Fault::none);
-  CHECK(bus.error() == "emergency 0x4210 temperature (register 0x09)");
-  bus.put(0x185, {0xE1, 0x00, 0xE2, 0x00});
-  CHECK(bus.fault(0) == Fault::device_error);
-  bus.put(0x085, {0, 0, 0x01, 0, 0, 0, 0, 0});  // reset, but another error is left
-  bus.put(0x185, {0xE1, 0x00, 0xE2, 0x00});
-  CHECK(bus.fault(0) == Fault::device_error);
-  bus.put(0x085, {0, 0, 0, 0, 0, 0, 0, 0});
-  CHECK(bus.fault(0) == Fault::device_error);  // the old value does not return
-  bus.put(0x185, {0xE3, 0x00, 0xE2, 0x00});
-  CHECK(bus.temp_degC(0) == Approx(22.7));
-  CHECK(bus.error().empty());
-}
-
-TEST_CASE("EMCY: an error register that is not empty at the set-up is an emergency unheard",
-          "[canopen][emergency]") {
-  CanopenNodeConfig node = node_5({in_pdo(0, 0x185, 0), in_pdo(1, 0x185, 16)});
-  node.channels[0].emergency_codes = {0x5030};
-  Bus bus(bus_of({node}));
-  bus.put(0x585, {0x4F, 0x01, 0x10, 0x00, 0x09, 0, 0, 0});
-  bus.put(0x185, {0xE1, 0x00, 0xE2, 0x00});
-  CHECK(bus.fault(0) == Fault::device_error);
-  CHECK(bus.fault(1) == Fault::none);
-  CHECK_THAT(bus.error(), Catch::StartsWith("error register 1001:00 is 0x09"));
-  SECTION("until a reset with an empty one") {
-    bus.put(0x085, {0, 0, 0x01, 0, 0, 0, 0, 0});
-    bus.put(0x185, {0xE1, 0x00, 0xE2, 0x00});
-    CHECK(bus.fault(0) == Fault::device_error);
-    bus.put(0x085, {0, 0, 0, 0, 0, 0, 0, 0});
-  }
-  SECTION("until a reboot") {
-    bus.put(0x705, {0x00});
-    bus.put(0x585, {0x4F, 0x01, 0x10, 0x00, 0, 0, 0, 0});
-  }
-  bus.put(0x185, {0xE1, 0x00, 0xE2, 0x00});
-  CHECK(bus.temp_degC(0) == Approx(22.5));
-  CHECK(bus.error().empty());
-}
-
 // ------------------------------------------------------------------ states of a node
 
 TEST_CASE("a node is started at once and again after its reboot", "[canopen][node]") {
