@@ -242,8 +242,7 @@ void Operations::note_refused(const std::string& why) {
   if (!reload_->is_asked)
     spdlog::error("reload refused, the running configuration stays:\n{}", why);
   const std::string line = why.substr(0, why.find('\n'));
-  if (reload_->candidate == candidate_)
-    reload_problem_ = "the last reload was refused, the configuration before runs: " + line;
+  if (reload_->candidate == candidate_) reload_problem_ = "the last reload was refused: " + line;
   if (parts_.journal == nullptr) return;
   Event event = command_event("reload", reload_->by);
   event.detail = "refused: " + line;

@@ -254,7 +254,8 @@ StatusView Supervisor::view() {
         "the machine's reference is lost, compensation stays off: when the machine is cold and "
         "even, give `thermocomp reference`, then `thermocomp enable`");
   if (!parts_.keeper.error().empty()) all.push_back(parts_.keeper.error());
-  if (!parts_.operations.reload_problem().empty()) all.push_back(parts_.operations.reload_problem());
+  if (!parts_.operations.reload_problem().empty())
+    all.push_back(parts_.operations.reload_problem());
   const std::vector<AxisReport>& axes = parts_.cycle.report().axes;
   for (std::size_t i = 0; i < axes.size() && !parts_.keeper.error().empty(); ++i)
     if (axes[i].waits_for_disk)

@@ -90,8 +90,8 @@ struct OffsetCommand {
   std::array<bool, axes_max> valid{};        ///< false: this axis must not be driven
   /// Link epoch of these offsets; a controller link sends only offsets of its own epoch.
   std::uint32_t link_epoch{0};
-  /// ControllerState::read_back_number that they were computed from; the link does not use them to move an axis
-  /// away from a newer read-back.
+  /// ControllerState::read_back_number that they were computed from; the link does not use them to
+  /// move an axis away from a newer read-back.
   std::uint64_t read_back_number{0};
 };
 

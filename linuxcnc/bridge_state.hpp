@@ -61,7 +61,7 @@ class BridgeState {
   Outputs outputs_;
   std::string mode_;
   std::optional<nanoseconds> answered_at_;
-  std::optional<nanoseconds> driven_at_;  ///< newest answer that drives every axis
+  std::optional<nanoseconds> driven_at_;   ///< newest answer that drives every axis
   std::optional<nanoseconds> idle_since_;  ///< taking, but not compensating
 };
 

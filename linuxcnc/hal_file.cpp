@@ -100,7 +100,8 @@ class Writer {
   }
   /// Signal that is true while offsets are taken. Joint: all joints are homed.
   [[nodiscard]] std::string taking() {
-    return options_.way == Way::external ? "tc-taking" : signal_of("motion.is-all-homed", "tc-homed");
+    return options_.way == Way::external ? "tc-taking"
+                                         : signal_of("motion.is-all-homed", "tc-homed");
   }
   [[nodiscard]] std::string bridge(const std::string& pin) const {
     return options_.name + "." + pin;

@@ -62,7 +62,7 @@ struct Answer {
   bool anew{false};                              ///< offsets continue from the reported ones
   std::string mode;                              ///< daemon's mode: "compensating", "holding", ...
   std::vector<std::optional<double>> offset_mm;  ///< by axis; none: unchanged
-  bool all_driven{true};  ///< every axis of the daemon has an offset
+  bool all_driven{true};                         ///< every axis of the daemon has an offset
 };
 
 /// @param axes  letters, in the order of view.axes

@@ -55,7 +55,8 @@ constexpr std::array<Entry<Reason>, reasons_count> reason_table{{
      "nothing to do during a cut; else look at the controller's cutting_signal"},
     {Reason::at_bound, warning,
      "an offset is at its bound, so that part of the displacement remains",
-     "check the sensors and the reference; if the warming is real, raise offset_um_max"},
+     "check the sensors and the reference; do not finish a precise cut. Raise offset_um_max only "
+     "where the warming is real"},
     {Reason::applied_out_of_bound, fault,
      "the controller applies an offset beyond the bound that is configured here",
      "that axis is not driven; set the offset at the controller to zero and find out what set it"},
@@ -73,7 +74,7 @@ constexpr std::array<Entry<Reason>, reasons_count> reason_table{{
     {Reason::sensor_suspected, warning, "a sensor disagrees with its neighbours",
      "check its contact, its place and its wiring; compare it with a hand-held thermometer"},
     {Reason::not_written, fault, "the controller answers, but takes no offset",
-     "see below which write failed and how; check the function, the addresses and who may write"},
+     "see which write failed and how; check the function, the addresses and who may write"},
     {Reason::sensor_unconfirmed, fault, "a reading jumped and nothing confirms the new value",
      "compare it with a hand-held thermometer; where it is right, accept it",
      "thermocomp accept SENSOR"},

@@ -251,7 +251,10 @@ class Causes {
       const Subject subject{SubjectKind::axis, axis.name};
       if (axis.latched)
         add(name + " is not driven: " + fixed(axis.latched->sent_um, 1) + " um was sent, " +
-                fixed(axis.latched->read_um, 1) + " um is read back (" + axis.latched->likely + ")",
+                fixed(axis.latched->read_um, 1) + " um was read back (" + axis.latched->likely +
+                ")" +
+                (std::isfinite(axis.applied) ? ", now " + fixed(axis.applied, 1) + " " + axis.unit
+                                             : std::string()),
             "remove the cause, then release the axis", "thermocomp release " + axis.name, subject);
       else if (axis.disagrees)
         add(name + ": the controller " +
@@ -343,12 +346,13 @@ Verdict verdict(const Status& status) {
   }
   const auto idle = axes_not_driven(status);
   const bool some_stay = status.mode == Mode::disabled && !idle.empty();
-  return {false,
-          status.mode == Mode::disabled,
-          "no",
-          std::string(mode.meaning) + (some_stay ? ", not driven and staying: " + joined(idle) : ""),
-          status.mode_since_s,
-          std::string(mode.remedy)};
+  return {
+      false,
+      status.mode == Mode::disabled,
+      "no",
+      std::string(mode.meaning) + (some_stay ? ", not driven and staying: " + joined(idle) : ""),
+      status.mode_since_s,
+      std::string(mode.remedy)};
 }
 
 std::string detail_of(const Verdict& verdict) {

@@ -162,13 +162,14 @@ int run_release(const GlobalOptions& global, const std::string& axis) {
                  "allow it (thermocomp status)\n";
     return exit_no;
   }
-  std::cout << "axis " << axis << ": NOT released: it reads back "
-            << fixed_signed(number_of(after, "applied_um"), 2) << " um where "
-            << fixed_signed(number_of(after, "sent_um"), 2) << " um was sent last ("
-            << text_of(after, "likely")
-            << ").\nCorrect that, wait until it reads back what was sent, and release again. Where the "
-               "controller\nkeeps its value while the axis is not driven, set its offset to 0 there "
-               "first.\n";
+  std::cout
+      << "axis " << axis << ": NOT released: it reads back "
+      << fixed_signed(number_of(after, "applied_um"), 2) << " um where "
+      << fixed_signed(number_of(after, "sent_um"), 2) << " um was sent last ("
+      << text_of(after, "likely")
+      << ").\nCorrect that, wait until it reads back what was sent, and release again. Where the "
+         "controller\nkeeps its value while the axis is not driven, set its offset to 0 there "
+         "first.\n";
   return exit_no;
 }
 

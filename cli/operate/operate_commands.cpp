@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <filesystem>
@@ -56,11 +57,13 @@ void print_moves(const GlobalOptions& global) {
   }
   for (const json& axis : status.value("axes", json::array())) {
     const double from = number_of(axis, "offset");
-    const double to = number_of(axis, "target");
+    const double most = number_of(axis, "offset_max");
+    const double to = std::clamp(number_of(axis, "target"), -most, most);
     const std::string subject = "axis " + text_of(axis, "name");
     const std::string unit = " " + text_of(axis, "unit");
     if (!flag_of(axis, "driven"))
-      std::cout << subject << " is not driven and stays at " << fixed_signed(from, 2) << unit << '\n';
+      std::cout << subject << " is not driven and stays at " << fixed_signed(from, 2) << unit
+                << '\n';
     else if (std::abs(to - from) >= shown_um)
       std::cout << subject << " moves from " << fixed_signed(from, 2) << " to "
                 << fixed_signed(to, 2) << unit << " at its slew rate\n";

@@ -65,14 +65,23 @@ bool is_absent(const StatusView& view) {
   return has_reason(view.report.reasons, Reason::controller_offline);
 }
 
-AxisStatus axis_of(const StatusView& view, const AxisConfig& config, const AxisReport& report) {
+/// A dry run's own offset comes back to the estimator; what the controller applies is beside it.
+double applied_um(const StatusView& view, std::size_t axis) {
+  if (is_absent(view)) return not_a_number;
+  if (!view.config.dry_run) return view.report.axes[axis].applied_um;
+  return view.controller_health.shown_um ? (*view.controller_health.shown_um)[axis] : not_a_number;
+}
+
+AxisStatus axis_of(const StatusView& view, std::size_t index) {
+  const AxisConfig& config = view.config.estimator.axes[index];
+  const AxisReport& report = view.report.axes[index];
   AxisStatus axis{.name = config.name,
                   .unit = unit_of(config.output),
                   .displacement = report.displacement_um,
                   .target = report.target_um,
                   .offset = report.offset_um,
                   .offset_max = config.limiter.offset_um_max,
-                  .applied = is_absent(view) ? not_a_number : report.applied_um,
+                  .applied = applied_um(view, index),
                   .measured = report.measured_um,
                   .synced = report.synced,
                   .driven = report.driven,
@@ -98,8 +107,7 @@ AxisStatus axis_of(const StatusView& view, const AxisConfig& config, const AxisR
 
 std::vector<AxisStatus> axes_of(const StatusView& view) {
   std::vector<AxisStatus> list;
-  for (std::size_t i = 0; i < view.report.axes.size(); ++i)
-    list.push_back(axis_of(view, view.config.estimator.axes[i], view.report.axes[i]));
+  for (std::size_t i = 0; i < view.report.axes.size(); ++i) list.push_back(axis_of(view, i));
   return list;
 }
 

@@ -100,7 +100,8 @@ bool WriteGate::check_read_back(const std::array<double, axes_max>& applied_um) 
 
 /// True if the axis has moved since its first command was computed.
 bool WriteGate::moved_since_command(std::size_t axis) const noexcept {
-  return command_.valid[axis] && sent_[axis].count == 0 && command_.read_back_number < unchanged_since_[axis];
+  return command_.valid[axis] && sent_[axis].count == 0 &&
+         command_.read_back_number < unchanged_since_[axis];
 }
 
 void WriteGate::offered(const OffsetCommand& command, nanoseconds computed_at) noexcept {

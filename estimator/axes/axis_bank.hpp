@@ -299,7 +299,7 @@ class AxisBank {
   explicit AxisBank(const EstimatorConfig& config);
 
   /// @param online   true if the controller's report is fresh
-  /// @param command  overwritten: offsets of all axes, with the number of the read-back that they were computed from
+  /// @param command  overwritten: offsets of all axes, with the number of the read-back used
   void step(const StepTime& time, const Targets& targets, bool online,
             const ControllerState& controller, OffsetCommand& command) noexcept;
 

@@ -57,11 +57,11 @@ struct OrderOptions {
   bool takes_back{false};
 };
 
-/// The machine's last step with this release; empty: none.
+/// The machine's last step with this release, or its withdrawal; empty: none.
 std::string done_with(pqxx::work& work, std::uint64_t release) {
   const pqxx::result steps = work.exec_params(
       "SELECT step FROM fleet.release_step WHERE release = $1 AND step IN ('checked', 'refused',"
-      " 'candidate', 'promoted', 'rolled_back') ORDER BY id DESC LIMIT 1",
+      " 'candidate', 'promoted', 'rolled_back', 'withdrawn') ORDER BY id DESC LIMIT 1",
       release);
   return steps.empty() ? "" : steps[0][0].as<std::string>();
 }
@@ -83,8 +83,9 @@ int order(const std::string& conninfo, const OrderOptions& options) {
   if (found.empty()) throw cli::Failure(name + ": does not exist");
   const auto machine = found[0][0].as<std::string>();
   const std::string done = done_with(work, options.release);
-  if (done == "refused" || done == "rolled_back")
-    throw cli::Failure(name + ": " + machine + " has finished it (" + done + ")", cli::exit_no);
+  if (done == "refused" || done == "rolled_back" || done == "withdrawn")
+    throw cli::Failure(name + ": " + machine + " has finished it (" + done + "): offer another",
+                       cli::exit_no);
   if (options.takes_back && done != "promoted") {
     add_step(work, options.release, "withdrawn", "");
     work.commit();

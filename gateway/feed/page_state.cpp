@@ -67,9 +67,10 @@ void round_numbers(json& value, double steps_per_unit) {
 
 /// Drops counters and digits that the page does not show, so that they cause no changes.
 void keep_what_is_shown(json& state) {
-  keep(state, {"time_s", "here",      "since_s",   "why",      "machine", "verdict", "problems",
-               "mode",   "axes",      "probe_due", "warm",     "sensors", "buses",   "controller",
-               "model",  "reference", "version",   "uptime_s", "cycle",   "history", "candidate"});
+  keep(state, {"time_s",   "here",       "since_s",   "why",       "machine", "verdict",
+               "problems", "mode",       "axes",      "probe_due", "warm",    "sensors",
+               "buses",    "controller", "model",     "reference", "version", "uptime_s",
+               "cycle",    "history",    "candidate", "dry_run"});
   for (json& axis : state["axes"])
     keep(axis, {"name", "unit", "offset", "offset_max", "offset_sd", "applied", "driven",
                 "disagrees", "mismatch", "at_bound", "proving"});
@@ -134,6 +135,7 @@ json problems_json(const Snapshot& snapshot) {
   }
   for (const Trouble& trouble : troubles(snapshot.status, &snapshot.sensors)) {
     json entry = {{"what", trouble.what}, {"remedy", trouble.remedy}};
+    if (!trouble.command.empty()) entry["command"] = trouble.command;
     if (!trouble.detail.empty()) entry["detail"] = trouble.detail;
     if (trouble.subject.kind != SubjectKind::nothing)
       entry["about"] = std::string(to_string(trouble.subject.kind)) + "-" + trouble.subject.name;

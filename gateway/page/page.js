@@ -137,7 +137,8 @@ function showProblems(now) {
     if (problem.about) what.href = '#' + encodeURIComponent(problem.about);
     item.append(what);
     if (problem.detail) item.append(make('div', withUnits(problem.detail), 'small'));
-    if (problem.remedy) item.append(make('div', withUnits(problem.remedy), 'remedy'));
+    const remedy = [problem.remedy, problem.command].filter(Boolean).join(': ');
+    if (remedy) item.append(make('div', withUnits(remedy), 'remedy'));
     return item;
   }));
 }
@@ -185,7 +186,7 @@ function axisSentence(axis, now_s) {
   const of = isNumber(axis.offset_max) ? ' of at most ' + axis.offset_max : '';
   const is = !state.here ? 'last known: ' : axis.proving ? 'moved to show its sign, '
     : state.mode === 'holding' ? 'held since ' + shortTime(state.verdict.since_s) + ' at '
-    : axis.driven ? 'taken out ' : 'not driven, last ';
+    : state.dry_run ? 'would take out ' : axis.driven ? 'taken out ' : 'not driven, last ';
   const last = lastProbing(axis);
   return is + fixed(Math.abs(axis.offset), 1) + of + unit + (last ?
     '; ' + fixed(Math.abs(last.left_um), 1) + unit + ' left at the last probing, ' + duration(now_s - last.time_s) + ' ago'
@@ -409,10 +410,16 @@ async function command(request) {
 }
 
 function proveRequest() {
-  const axis = prompt('Axis to prove?', state && state.axes.length ? state.axes[0].name : '');
-  if (!axis) return null;
-  const value_um = Number(prompt('By how many \u00b5m?', '5'));
-  return isNumber(value_um) ? {method: 'prove', axis: axis, value_um: value_um} : null;
+  const axes = state ? state.axes.map(each => each.name) : [];
+  const asked = prompt('Axis to prove: ' + axes.join(', ') + '?', axes[0] || '');
+  if (!asked) return null;
+  const axis = axes.find(name => name.toLowerCase() === asked.trim().toLowerCase());
+  const size = axis && prompt('By how many \u00b5m?', '5');
+  if (axis && !size) return null;
+  const value_um = Number((size || '').replace(',', '.'));
+  if (axis && isNumber(value_um) && value_um) return {method: 'prove', axis: axis, value_um: value_um};
+  setText(place('command-answer'), axis ? size + ' is no number other than 0' : 'there is no axis ' + asked);
+  return null;
 }
 
 let offered = {commands: [], names: {}};

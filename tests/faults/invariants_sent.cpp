@@ -22,8 +22,8 @@ void Invariants::check_move(const CycleSeen& seen, const Move& move,
   // of an answer that has begun may take as long again.
   const double looked_s_max = 2.0 * (link_timeout_s_ + std::min(link_timeout_s_, 0.7)) + 0.05;
   demand(to_s(move.at - move.looked_at) <= looked_s_max, "looked_before_written", seen.now, [&] {
-    return fmt::format("axis {}: written {:.3f} s after the last read-back, {:.3f} allowed", move.axis,
-                       to_s(move.at - move.looked_at), looked_s_max);
+    return fmt::format("axis {}: written {:.3f} s after the last read-back, {:.3f} allowed",
+                       move.axis, to_s(move.at - move.looked_at), looked_s_max);
   });
   Budget& budget = budgets_[move.axis];
   const double rate_um = rate_um_per_s_[move.axis];

@@ -24,8 +24,9 @@ TEST_CASE("values that are being confirmed after an outage are named, with the t
   const CycleTiming timing;
   double uptime_s = 0.0;
   const auto confirming = [&] {
-    return status_of(StatusView{
-                         config, report, controller, timing, {}, {}, {}, {}, {}, uptime_s, false, {}})
+    return status_of(
+               StatusView{
+                   config, report, controller, timing, {}, {}, {}, {}, {}, uptime_s, false, {}})
         .confirming;
   };
   REQUIRE(confirming().size() == 1);

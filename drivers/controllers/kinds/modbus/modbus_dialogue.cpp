@@ -248,8 +248,8 @@ bool ModbusDialogue::has_restarted() {
   return false;
 }
 
-/// A controller whose program starts again may keep the link; its registers are then 0. One axis with
-/// an offset shows it.
+/// A controller whose program starts again may keep the link; its registers are then 0. One axis
+/// with an offset shows it.
 bool ModbusDialogue::is_cleared() {
   for (const std::optional<WrittenOffsets>& written : written_) {
     if (!written || !written->holds_an_offset()) continue;
@@ -289,10 +289,10 @@ bool ModbusDialogue::compare_written() {
 }
 
 /// One period: reads, and writes only if the offsets written explain the read-back. So no command
-/// computed before a re-homing was seen is written after it (a command carries the number of the read-back it was
-/// computed from), and a slow controller still gets the newest command. A write without answer is
-/// not repeated before another read, since the controller can restart during the time-out. A
-/// refused write waits for the next period.
+/// computed before a re-homing was seen is written after it (a command carries the number of the
+/// read-back it was computed from), and a slow controller still gets the newest command. A write
+/// without answer is not repeated before another read, since the controller can restart during the
+/// time-out. A refused write waits for the next period.
 void ModbusDialogue::exchange() {
   write_failed_ = false;
   take_command();
