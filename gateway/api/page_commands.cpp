@@ -63,14 +63,14 @@ void require_waiting(const SensorsAnswer& sensors, const std::string& name) {
   throw std::invalid_argument("there is no sensor " + name + " with an unconfirmed reading");
 }
 
-/// "z from +1.2 um, y ..."
-std::string offsets_text(const Status& status) {
+/// "z from +1.2 um to 0 um, y ..."
+std::string moves_text(const Status& status, const std::string& to) {
   std::string text;
   for (const AxisStatus& axis : status.axes) {
     const std::string unit = " " + axis.unit;
     text.append(text.empty() ? "" : ", ").append(axis.name).append(" from ");
     text.append(fixed_signed(axis.offset, 1)).append(unit);
-    if (!axis.driven) text.append(" (not driven: it stays)");
+    text.append(axis.driven ? " to " + to + (to == "0" ? unit : "") : " (not driven: it stays)");
   }
   return text;
 }
@@ -81,10 +81,10 @@ std::string confirmation_text(const CommandRequest& asked, const Status& status)
   const std::string& method = asked.method;
   if (method == "enable")
     return "Switch the compensation on. The axes will move, no faster than their slew rates: " +
-           offsets_text(status) + ", to the model's offsets, which they then follow.";
+           moves_text(status, "the model's offset") + ", and then follow it.";
   if (method == "disable")
     return "Switch the compensation off. The axes will move, no faster than their slew rates: " +
-           offsets_text(status) + ", to 0.";
+           moves_text(status, "0") + ".";
   if (method == "reference")
     return "Take the present state of the machine as the reference: displacement counts from here "
            "on. Only with the machine cold and even and the offsets at zero.";
