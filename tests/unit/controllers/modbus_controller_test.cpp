@@ -271,6 +271,9 @@ TEST_CASE("registers that are cleared on a link that lives begin another link", 
   REQUIRE(eventually([&] { return !is_same_link(cycle.state().link_epoch, epoch); }));
   CHECK(cycle.state().applied_um[0] == 0.0);
   CHECK(int32_of(machine, 0) == 0);
+  cycle.fixed_epoch = 0;
+  cycle.want(0, -0.5);
+  CHECK(eventually([&] { return cycle.state().written && int32_of(machine, 0) == -50; }));
   link.stop();
 }
 

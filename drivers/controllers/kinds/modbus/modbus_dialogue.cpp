@@ -198,6 +198,7 @@ bool ModbusDialogue::read_written() {
   constexpr int asked_max = 3;
   for (std::size_t axis = 0; axis < written_.size(); ++axis) {
     if (!written_[axis]) continue;
+    written_[axis]->left_out();  // nothing is written on this link yet
     std::vector<std::uint16_t> words;
     if (written_[axis]->count()) {
       const ReadRequest& request = written_[axis]->request();
