@@ -1,10 +1,12 @@
 #!/bin/bash
-# Checks that each fuzz target compiles: syntax only, about a minute. scripts/fuzz.sh runs them.
+# Checks that each fuzz target and the readers of foreign tables compile with clang: syntax only, about
+# a minute. scripts/fuzz.sh runs them.
 set -euo pipefail
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
 source scripts/common.sh
 
 targets=(tests/fuzz/*.cpp)
-printf '%s\0' "${targets[@]}" | xargs -0 -n 1 -P "$(build_jobs)" \
+mapfile -t readers < <(find config/run_forms config/runs -name '*.cpp')
+printf '%s\0' "${targets[@]}" "${readers[@]}" | xargs -0 -n 1 -P "$(build_jobs)" \
   clang++ -std=c++20 -fsyntax-only -I. -Itests/fuzz -isystem /usr/include/eigen3
-echo "${#targets[@]} fuzz targets compile"
+echo "${#targets[@]} fuzz targets and ${#readers[@]} readers compile"

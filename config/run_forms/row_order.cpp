@@ -137,7 +137,8 @@ std::optional<LongForm> long_form(const TextTable& table, const std::vector<doub
   const bool has_number = found.numbers.size() == 1;
   LongForm form{found.words, has_number ? found.numbers[0] : 0, found.unit};
   for (std::vector<std::size_t>* names : {&form.names, &found.one_word})
-    std::ranges::stable_partition(*names, names_series, header);
+    std::stable_partition(names->begin(), names->end(),
+                          [&](std::size_t column) { return names_series(header(column)); });
   // A single series has the same name in all rows.
   if (form.names.empty() && found.values.size() == 1)
     for (const std::size_t i : found.one_word)
@@ -373,9 +374,7 @@ std::string remedy(const TextTable& table, const std::vector<double>& time_s, st
          "give the lines from this one on a file of their own";
 }
 
-}  // namespace
-
-/// A row that was sent twice.
+/// Leaves out rows that were sent twice.
 void leave_repeated_rows_out(TextTable& table, std::vector<double>& time_s) {
   const auto repeats = [&](std::size_t row) {
     return time_s[row] == time_s[row - 1] &&
@@ -398,6 +397,8 @@ void leave_repeated_rows_out(TextTable& table, std::vector<double>& time_s) {
   table.lines.resize(kept);
   for (TextColumn& column : table.columns) column.fields.resize(kept);
 }
+
+}  // namespace
 
 void order_rows(TextTable& table, RunTime& time, const TimeColumns& columns) {
   std::vector<double>& time_s = time.time_s;

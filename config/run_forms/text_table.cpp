@@ -442,9 +442,10 @@ class TableReader {
     header_text_ = lines_[line].text;
     note_left_out("above the header in line " + std::to_string(table_.header_line), line,
                   lines_[0].text);
-    note_left_out("between the header and the first row",
-                  row_begin_ - line - 1 - (units_line_ > line ? 1 : 0),
-                  lines_[units_line_ == line + 1 ? line + 2 : line + 1].text);
+    const std::size_t below = units_line_ == line + 1 ? line + 2 : line + 1;
+    if (below < row_begin_)
+      note_left_out("between the header and the first row",
+                    row_begin_ - below - (units_line_ > below ? 1 : 0), lines_[below].text);
     return true;
   }
 

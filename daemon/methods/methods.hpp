@@ -23,7 +23,7 @@ struct DaemonActions {
   std::function<RpcPending(const Command&)> command;
   /// Reloads. The result is complete once the cycle runs with the new configuration and, if given,
   /// this candidate (an empty path: none).
-  /// @throws ConfigurationError or RpcError; the running configuration then stays in use
+  /// @throws RpcError, the result also ConfigurationError; the running configuration stays in use
   std::function<RpcPending(const std::optional<std::filesystem::path>& candidate)> reload;
   /// A bridge's report and its answer; empty if the controller is not a bridge. @throws RpcError
   std::function<nlohmann::json(const nlohmann::json&)> controller_state{};

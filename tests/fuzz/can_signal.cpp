@@ -83,7 +83,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     FUZZ_REQUIRE(!error.key().empty() && !error.rule().empty());
     return 0;
   }
-  std::vector<std::uint8_t> payload = feed.take(feed.u8() % (signal.fd ? 65 : 9));
+  std::vector<std::uint8_t> payload = feed.take(feed.u8() % (signal.fd ? 65U : 9U));
   check_pages(signal, payload);
   const CanValue decoded = decode(payload, signal);
   FUZZ_REQUIRE(std::isfinite(decoded.value) == (decoded.fault == Fault::none));

@@ -138,6 +138,9 @@ def run_seeds():
     write("run_file", "unclear.csv", "Time;z;p [bar]\n03/04/2026 08:00;1,234;-\n")
     write("run_file", "wide.csv", ",".join(["time_s"] + [f"t{i}_degC" for i in range(40)]) + "\n" +
           ",".join("0" * 41) + "\n")
+    tables = ROOT / "tests/unit/import"
+    for path in [*tables.glob("logs/*"), *tables.glob("forms/*/in.*")]:
+        write("run_file", "_".join(path.relative_to(tables).parts), path.read_bytes()[:8192])
 
 
 def request(method, params=None, number=1):

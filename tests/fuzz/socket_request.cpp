@@ -49,7 +49,9 @@ class Rig {
     add_operator_methods(
         server_, {[this] { return view(); }, [this](const Command& asked) { return take(asked); },
                   [](const std::optional<std::filesystem::path>&) -> RpcPending {
-                    throw ConfigurationError({{"config.toml", 3, "format", "2", "must be 1"}});
+                    return []() -> std::optional<json> {
+                      throw ConfigurationError({{"config.toml", 3, "format", "2", "must be 1"}});
+                    };
                   }});
   }
   StatusServer& server() { return server_; }

@@ -163,7 +163,7 @@ std::optional<PlainTable> halscope(const Log& log) {
   constexpr std::string_view mark = "Sampling period is ";
   std::string_view rest = trimmed(log.text);
   if (!rest.starts_with(mark)) return std::nullopt;
-  const std::string_view first = trimmed(take_line(rest)).substr(mark.size());
+  const std::string_view first = trimmed(take_line(rest).substr(mark.size()));
   const auto period_ns = finite_number(first.substr(0, first.find(' ')));
   if (!period_ns || !(*period_ns > 0))
     log.refuse(1, "", std::string(first), "must be the sampling period in ns");

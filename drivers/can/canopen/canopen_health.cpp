@@ -47,7 +47,8 @@ std::string CanopenNode::trouble(nanoseconds now) const {
 
 UnitHealth CanopenNode::health(nanoseconds now) const {
   UnitHealth health = counters_;
-  health.answering = good_at_ != nanoseconds{0} && now - good_at_ < silent_after;
+  health.answering =
+      phase_ != Phase::closed && good_at_ != nanoseconds{0} && now - good_at_ < silent_after;
   health.last_error = trouble(now);
   return health;
 }

@@ -88,8 +88,12 @@ void ScratchFile::write(std::span<const std::uint8_t> bytes) const {
 
 namespace {
 
+/// Zeros that a logger left end a line, too.
 int lines_of(std::string_view text) {
-  return 1 + static_cast<int>(std::count(text.begin(), text.end(), '\n'));
+  int lines = 1;
+  for (std::size_t i = 0; i < text.size(); ++i)
+    if (text[i] == '\n' || (text[i] == '\0' && (i == 0 || text[i - 1] != '\0'))) ++lines;
+  return lines;
 }
 
 }  // namespace

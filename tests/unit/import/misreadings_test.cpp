@@ -472,6 +472,8 @@ TEST_CASE("lines and bytes that are no rows", "[import]") {
        ""},
       {"which cut a row", "Time [s],T [C]\n0,2" + std::string(9, '\0') + "60,21\n",
        "time_s,T_degC\n0,2\n60,21\n", ""},
+      {"a scope's log that ends in its first line", "Sampling period is \n0\n",
+       "log:1: must be the sampling period in ns", ""},
       {"UTF-16 without a mark",
        [] {
          std::string wide;
