@@ -87,10 +87,15 @@ struct CanSocket::Buffers {
   }
 };
 
-std::string to_string(const CanId& id) {
-  std::array<char, 16> text{};
-  std::snprintf(text.data(), text.size(), id.extended ? "0x%08X" : "0x%03X", id.id);
+std::string hexadecimal(std::uint64_t number, int digits) {
+  std::array<char, 20> text{};
+  std::snprintf(text.data(), text.size(), "0x%0*llX", digits,
+                static_cast<unsigned long long>(number));
   return text.data();
+}
+
+std::string to_string(const CanId& id) {
+  return hexadecimal(id.id, id.extended ? 8 : 3);
 }
 
 std::string_view to_string(CanState state) noexcept {

@@ -26,6 +26,8 @@ struct CanId {
   // NOLINTNEXTLINE(modernize-use-nullptr): clang-tidy 14 sees a null pointer in every default <=>
   auto operator<=>(const CanId&) const = default;
 };
+/// "0x0F" with two digits
+[[nodiscard]] std::string hexadecimal(std::uint64_t number, int digits);
 /// "0x281", "0x18FF2F31"
 [[nodiscard]] std::string to_string(const CanId& id);
 

@@ -134,10 +134,10 @@ bool ModbusFrames::is_full() const noexcept {
 }
 
 ModbusFrames::Found ModbusFrames::find() {
-  return rtu_ ? look_rtu() : look_tcp();
+  return rtu_ ? find_rtu() : find_tcp();
 }
 
-ModbusFrames::Found ModbusFrames::look_rtu() {
+ModbusFrames::Found ModbusFrames::find_rtu() {
   const auto asked = std::span(request_).first(request_bytes_);
   for (std::size_t at = begin_; at < received_; ++at) {
     const auto rest = received().subspan(at);
@@ -178,7 +178,7 @@ bool ModbusFrames::take_tcp() noexcept {
   return true;
 }
 
-ModbusFrames::Found ModbusFrames::look_tcp() {
+ModbusFrames::Found ModbusFrames::find_tcp() {
   while (received_ >= head_bytes) {
     const std::size_t size = word_at(received(), 4) + std::size_t{6};
     if (word_at(received(), 2) != 0 || size <= head_bytes || size > frame_.size()) {

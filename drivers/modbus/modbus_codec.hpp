@@ -80,8 +80,8 @@ class ModbusFrames {
   [[nodiscard]] std::span<const std::uint8_t> received() const noexcept {
     return std::span(stream_).first(received_);
   }
-  [[nodiscard]] Found look_rtu();
-  [[nodiscard]] Found look_tcp();
+  [[nodiscard]] Found find_rtu();
+  [[nodiscard]] Found find_tcp();
   bool take_tcp() noexcept;
   [[nodiscard]] Found judge_tcp();
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "drivers/bus_thread.hpp"
 #include "drivers/can/signal_codec.hpp"
@@ -46,10 +45,12 @@ std::span<const std::uint8_t> bytes_of(std::span<const std::uint8_t> data,
   return data.subspan(first, std::min(bytes, data.size() - first));
 }
 
+bool supports_emergencies(const CanopenChannel& channel) {
+  return channel.emergency_channel != 0 || !channel.emergency_codes.empty();
+}
+
 std::string unheard_text(std::uint64_t error_register) {
-  std::array<char, 8> number{};
-  std::snprintf(number.data(), number.size(), "0x%02X", static_cast<unsigned>(error_register));
-  return std::string("error register 1001:00 is ") + number.data() +
+  return "error register 1001:00 is " + hexadecimal(error_register, 2) +
          ": an emergency was sent unheard; mend its cause, or switch the node off and on";
 }
 
@@ -141,11 +142,8 @@ void CanopenNode::begin_setup(nanoseconds now) {
     jobs_.push_back({Work::ask_count, static_cast<std::size_t>(number), 0});
   }
   // Emergencies and their resets may have been sent unheard.
-  for (std::size_t i = 0; i < channels_.size(); ++i) {
-    if (!supports_emergencies(i)) continue;
+  if (std::any_of(channels_.begin(), channels_.end(), supports_emergencies))
     jobs_.push_back({Work::ask_errors, 0, 0});
-    break;
-  }
   phase_ = Phase::setting_up;
   // Some nodes refuse settings while operational.
   if (!writes_.empty() && starts_) command(command_pre_operational);
@@ -291,11 +289,6 @@ void CanopenNode::setup_done(nanoseconds now) {
   }
 }
 
-bool CanopenNode::supports_emergencies(std::size_t channel) const {
-  const CanopenChannel& asked = channels_[channel];
-  return asked.emergency_channel != 0 || !asked.emergency_codes.empty();
-}
-
 void CanopenNode::forget_emergencies() {
   errors_unheard_ = 0;
   emergencies_.assign(emergencies_.size(), std::nullopt);
@@ -424,7 +417,7 @@ bool CanopenNode::take_pdo(std::uint32_t cob_id, std::span<const std::uint8_t> d
 /// Publishes a value unless an emergency or a second sender makes it invalid.
 void CanopenNode::show(std::size_t channel, const CanValue& decoded, nanoseconds at) {
   if (emergencies_[channel]) return lose(channel, *emergencies_[channel], at);
-  const bool is_unheard = errors_unheard_ != 0 && supports_emergencies(channel);
+  const bool is_unheard = errors_unheard_ != 0 && supports_emergencies(channels_[channel]);
   if (is_unheard || is_doubtful(channel)) return lose(channel, Fault::device_error, at);
   readings_[channel] = {decoded.value, at, decoded.fault};
 }

@@ -141,7 +141,6 @@ class CanopenNode {
   void watch_duplicates(nanoseconds now);
   void renew_pdos(nanoseconds at);
   void command(std::uint8_t what);
-  [[nodiscard]] bool supports_emergencies(std::size_t channel) const;
   void forget_emergencies();
   void show(std::size_t channel, const CanValue& decoded, nanoseconds at);
   void lose(std::size_t channel, Fault fault, nanoseconds at);

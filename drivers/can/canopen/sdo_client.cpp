@@ -74,12 +74,6 @@ constexpr std::array<AbortName, 31> abort_names{{
     {0x08000024, "no data available"},
 }};
 
-std::string hexadecimal(std::uint32_t code) {
-  std::array<char, 12> text{};
-  std::snprintf(text.data(), text.size(), "0x%08X", code);
-  return text.data();
-}
-
 }  // namespace
 
 std::string_view sdo_abort_name(std::uint32_t code) noexcept {
@@ -115,7 +109,7 @@ std::string to_string(const SdoResult& result) {
       text.append(": not an answer to the request: ");
       break;
   }
-  return text.append(hexadecimal(result.abort_code))
+  return text.append(hexadecimal(result.abort_code, 8))
       .append(" ")
       .append(sdo_abort_name(result.abort_code));
 }

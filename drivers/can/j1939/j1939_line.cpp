@@ -26,13 +26,6 @@ std::vector<std::uint32_t> groups(const J1939BusConfig& config) {
   return pgns;
 }
 
-std::string hexadecimal(std::uint64_t number, int digits) {
-  std::array<char, 20> text{};
-  std::snprintf(text.data(), text.size(), "0x%0*llX", digits,
-                static_cast<unsigned long long>(number));
-  return text.data();
-}
-
 std::string name_text(std::uint64_t name) {
   return hexadecimal(name, 16);
 }

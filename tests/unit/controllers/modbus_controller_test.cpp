@@ -235,40 +235,33 @@ TEST_CASE("a register that a program sets back after each write is not written",
   link.stop();
 }
 
-TEST_CASE("a controller that restarts while another end of the link answers is another link",
-          "[controllers]") {
+TEST_CASE("a controller that restarts on a living link is another link", "[controllers]") {
   ModbusMachine machine;
   ModbusController link(without_read_back(three_axes(machine.port())));
   Cycle cycle(link);
-  cycle.want(0, -5.46);
-  REQUIRE(eventually([&] { return cycle.state().written && int32_of(machine, 0) == -546; }));
-  std::this_thread::sleep_for(100ms);
+  for (const int count : {-300, -546}) {  // two, since the last but one may be read as well
+    cycle.want(0, 0.01 * count);
+    REQUIRE(eventually([&] { return cycle.state().written && int32_of(machine, 0) == count; }));
+  }
+  std::this_thread::sleep_for(100ms);  // compared: the registers hold what is written
   const std::uint32_t epoch = cycle.state().link_epoch;
-  machine.refuse_reads = true;
-  machine.refuse_writes = true;
-  REQUIRE(eventually([&] { return !cycle.state().written; }));
-  CHECK(is_same_link(cycle.state().link_epoch, epoch));
+  const bool is_silent = GENERATE(true, false);
+  INFO((is_silent ? "another end of the link answers" : "its registers are cleared in between"));
+  if (is_silent) {
+    machine.refuse_reads = machine.refuse_writes = true;
+    REQUIRE(eventually([&] { return !cycle.state().written; }));
+    CHECK(is_same_link(cycle.state().link_epoch, epoch));
+  }
+  cycle.fixed_epoch = epoch;  // commands for the link before are not sent on another
   for (const int address : {0, 1}) machine.set_holding(address, 0);
+  machine.refuse_writes = false;
+  std::this_thread::sleep_for(100ms);  // it may be restarting, and is not written unread
+  CHECK(int32_of(machine, 0) == 0);
   machine.refuse_reads = false;
   REQUIRE(eventually([&] {
     const ControllerState state = cycle.state();
     return state.online && !is_same_link(state.link_epoch, epoch);
   }));
-  CHECK(cycle.state().applied_um[0] == 0.0);
-  link.stop();
-}
-
-TEST_CASE("registers that are cleared on a link that lives begin another link", "[controllers]") {
-  ModbusMachine machine;
-  ModbusController link(without_read_back(three_axes(machine.port())));
-  Cycle cycle(link);
-  cycle.want(0, -5.46);
-  REQUIRE(eventually([&] { return cycle.state().written && int32_of(machine, 0) == -546; }));
-  std::this_thread::sleep_for(100ms);  // compared: the registers hold what is written
-  const std::uint32_t epoch = cycle.state().link_epoch;
-  cycle.fixed_epoch = epoch;  // commands for the link before are not sent on another
-  for (const int address : {0, 1}) machine.set_holding(address, 0);
-  REQUIRE(eventually([&] { return !is_same_link(cycle.state().link_epoch, epoch); }));
   CHECK(cycle.state().applied_um[0] == 0.0);
   CHECK(int32_of(machine, 0) == 0);
   cycle.fixed_epoch = 0;

@@ -163,7 +163,14 @@ bool ModbusDialogue::synchronise() {
     const std::scoped_lock lock(health_mutex_);
     ++health_.connects;
   }
-  if (!gate_.link_is_new() && has_restarted()) gate_.lost();
+  if (!gate_.link_is_new()) {
+    const std::optional<bool> restarted = has_restarted();
+    if (!restarted) {
+      lose(refused_);
+      return false;
+    }
+    if (*restarted) gate_.lost();
+  }
   if (!read_set_numbers() || (gate_.link_is_new() && !read_written()) || !read_all()) {
     lose(refused_);
     return false;
@@ -202,9 +209,7 @@ bool ModbusDialogue::read_written() {
     std::vector<std::uint16_t> words;
     if (written_[axis]->count()) {
       const ReadRequest& request = written_[axis]->request();
-      words.resize(request.count);
-      const Exchange exchange = with_retries(
-          [&] { return connection_.read(config_.unit, request.table, request.address, words); });
+      const Exchange exchange = read_registers(request, words);
       // A device may lack these registers: it answers with an exception or not at all.
       const bool goes_without = refused_ && exchange.fault() == Fault::device_error;
       if (!exchange.ok() && !goes_without && ++written_asked_ < asked_max) {
@@ -233,16 +238,35 @@ void ModbusDialogue::show_written(std::size_t axis, std::span<const std::uint16_
             state_.applied_um.begin() + static_cast<std::ptrdiff_t>(first_[axis]));
 }
 
+/// @return nullopt: the registers of the offset could not be read
+std::optional<std::vector<std::uint16_t>> ModbusDialogue::registers_now(
+    const WrittenOffsets& written) {
+  const ReadRequest& request = written.request();
+  std::vector<std::uint16_t> words(request.count);
+  const Exchange exchange = connection_.read(config_.unit, request.table, request.address, words);
+  return exchange.ok() ? std::optional(std::move(words)) : std::nullopt;
+}
+
+Exchange ModbusDialogue::read_registers(const ReadRequest& request,
+                                        std::vector<std::uint16_t>& words) {
+  words.resize(request.count);
+  return with_retries(
+      [&] { return connection_.read(config_.unit, request.table, request.address, words); });
+}
+
 /// Behind a gateway that answers for it, a controller restarts without a new link; its registers
-/// then hold none of the offsets written.
-bool ModbusDialogue::has_restarted() {
+/// then hold none of the offsets written. While a register that held them cannot be read, it may
+/// be restarting: nothing is written.
+std::optional<bool> ModbusDialogue::has_restarted() {
   for (std::size_t axis = 0; axis < written_.size(); ++axis) {
     const std::optional<WrittenOffsets>& written = written_[axis];
     if (!written || !written->holds_known_offset()) continue;
-    const ReadRequest& request = written->request();
-    std::vector<std::uint16_t> words(request.count);
-    const Exchange exchange = connection_.read(config_.unit, request.table, request.address, words);
-    if (!exchange.ok()) continue;
+    std::vector<std::uint16_t> words;
+    const Exchange exchange = read_registers(written->request(), words);
+    if (!exchange.ok()) {
+      note_unread(written->request(), exchange);
+      return std::nullopt;
+    }
     if (!written->is_one_written(words)) return true;
     show_written(axis, words);
   }
@@ -254,10 +278,8 @@ bool ModbusDialogue::has_restarted() {
 bool ModbusDialogue::is_cleared() {
   for (const std::optional<WrittenOffsets>& written : written_) {
     if (!written || !written->holds_an_offset()) continue;
-    const ReadRequest& request = written->request();
-    std::vector<std::uint16_t> words(request.count);
-    const Exchange exchange = connection_.read(config_.unit, request.table, request.address, words);
-    return exchange.ok() && written->is_cleared(words);
+    const auto words = registers_now(*written);
+    return words && written->is_cleared(*words);
   }
   return false;
 }
@@ -276,12 +298,10 @@ bool ModbusDialogue::compare_written() {
   for (std::size_t axis = 0; axis < written_.size(); ++axis) {
     std::optional<WrittenOffsets>& written = written_[axis];
     if (!written || !written->is_to_be_compared(is_due)) continue;
-    const ReadRequest& request = written->request();
-    std::vector<std::uint16_t> words(request.count);
-    const Exchange exchange = connection_.read(config_.unit, request.table, request.address, words);
-    if (!exchange.ok()) continue;
-    written->compare(words);
-    show_written(axis, words);
+    const auto words = registers_now(*written);
+    if (!words) continue;
+    written->compare(*words);
+    show_written(axis, *words);
     held = held && written->count();
   }
   // At the start of the link the registers did not contain a written offset.

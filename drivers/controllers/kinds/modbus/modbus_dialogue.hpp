@@ -69,14 +69,16 @@ class ModbusDialogue final : public LineUser {
   bool read_written();
   void show_written(std::size_t axis, std::span<const std::uint16_t> words);
   void forget_written() noexcept;
-  /// True if registers without read-back hold none of the offsets written.
-  [[nodiscard]] bool has_restarted();
+  /// True if registers without read-back hold none of the offsets written; nullopt: unreadable.
+  [[nodiscard]] std::optional<bool> has_restarted();
   /// Checks that registers without read-back hold the values just written: of the first command,
   /// then once in WriteGate::patience(). @return false: the link is lost
   [[nodiscard]] bool compare_written();
   void exchange();
   /// Reads all; begins a new epoch if the read-back is unexplained. @return false if reading failed
   bool read_and_judge();
+  Exchange read_registers(const ReadRequest& request, std::vector<std::uint16_t>& words);
+  std::optional<std::vector<std::uint16_t>> registers_now(const WrittenOffsets& written);
   bool is_cleared();
   [[nodiscard]] bool shows_piezos() const noexcept;
   void take_command();

@@ -171,10 +171,6 @@ ReadRequest request_of(const ModbusAxis& axis) {
   return {ModbusTable::holding, begin, end.address + registers_of(end.encoding) - begin};
 }
 
-}  // namespace
-
-namespace {
-
 bool is_zero(std::span<const std::uint16_t> words) noexcept {
   return std::all_of(words.begin(), words.end(), [](std::uint16_t word) { return word == 0; });
 }
