@@ -53,7 +53,8 @@ bool is_done(Outcome outcome, const char* asked) {
           asked));
 }
 
-/// What a reload changed of the models: "model SHA-256 3f...", "candidate FILE". Empty: nothing.
+/// Names the model and the candidate if a reload changed them: "model SHA-256 3f..., candidate
+/// FILE".
 std::string changes_of(const DaemonConfig& before, const DaemonConfig& after) {
   std::string text;
   if (after.model_checksum != before.model_checksum)
@@ -236,13 +237,13 @@ void Operations::finish_loading() {
   }
 }
 
-/// Recorded for those who do not see the client's answer or the log: the daemon would not start
-/// again with these files.
+/// A client is answered; after a SIGHUP the log, an event and the status tell the reason.
 void Operations::note_refused(const std::string& why) {
-  if (!reload_->is_asked)
-    spdlog::error("reload refused, the running configuration stays:\n{}", why);
   const std::string line = why.substr(0, why.find('\n'));
-  if (reload_->candidate == candidate_) reload_problem_ = "the last reload was refused: " + line;
+  if (!reload_->is_asked) {
+    spdlog::error("reload refused, the running configuration stays:\n{}", why);
+    reload_problem_ = "the last reload was refused: " + line;
+  }
   if (parts_.journal == nullptr) return;
   Event event = command_event("reload", reload_->by);
   event.detail = "refused: " + line;

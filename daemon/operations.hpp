@@ -57,7 +57,7 @@ class Operations {
       const std::optional<std::filesystem::path>& candidate = std::nullopt);
   /// Reload by SIGHUP. Any number of signals during a reload cause one further reload.
   void reload_by_signal();
-  /// Why the configuration on disk does not run; empty: it does, as far as known.
+  /// Reason for which the last SIGHUP was refused; empty after a reload that was done.
   [[nodiscard]] const std::string& reload_problem() const noexcept { return reload_problem_; }
 
   void poll();

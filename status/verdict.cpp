@@ -337,22 +337,19 @@ Verdict verdict(const Status& status) {
   }
   if (is_compensating(status))
     return {true, true, "yes", "", status.compensating_s, distance_to_target_text(status.axes)};
-  if (status.mode == Mode::compensating) {
-    const auto idle = axes_not_driven(status);
+  const auto idle = axes_not_driven(status);
+  if (status.mode == Mode::compensating)
     return {false, false, "no",
             !idle.empty()         ? "axes not driven: " + joined(idle)
             : !status.model.moves ? std::string(moves_nothing)
                                   : "the controller takes no offsets"};
-  }
-  const auto idle = axes_not_driven(status);
-  const bool some_stay = status.mode == Mode::disabled && !idle.empty();
-  return {
-      false,
-      status.mode == Mode::disabled,
-      "no",
-      std::string(mode.meaning) + (some_stay ? ", not driven and staying: " + joined(idle) : ""),
-      status.mode_since_s,
-      std::string(mode.remedy)};
+  const bool has_idle = status.mode == Mode::disabled && !idle.empty();
+  return {false,
+          status.mode == Mode::disabled,
+          "no",
+          std::string(mode.meaning) + (has_idle ? "; not driven: " + joined(idle) : ""),
+          status.mode_since_s,
+          std::string(mode.remedy)};
 }
 
 std::string detail_of(const Verdict& verdict) {

@@ -62,8 +62,7 @@ void print_moves(const GlobalOptions& global) {
     const std::string subject = "axis " + text_of(axis, "name");
     const std::string unit = " " + text_of(axis, "unit");
     if (!flag_of(axis, "driven"))
-      std::cout << subject << " is not driven and stays at " << fixed_signed(from, 2) << unit
-                << '\n';
+      std::cout << subject << " is not driven: nothing is sent\n";
     else if (std::abs(to - from) >= shown_um)
       std::cout << subject << " moves from " << fixed_signed(from, 2) << " to "
                 << fixed_signed(to, 2) << unit << " at its slew rate\n";

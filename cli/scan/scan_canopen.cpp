@@ -27,7 +27,7 @@ std::string why_not(const CanopenChannel& channel, Fault fault, const RawReading
   if (status && bytes.size() >= bytes_needed(status->field)) {
     const std::uint64_t number = extract_raw(bytes, status->field);
     if (fault_of(*status, number) == fault) {
-      return hexadecimal("its status is ", static_cast<std::uint32_t>(number), 2);
+      return "its status is " + hexadecimal(static_cast<std::uint32_t>(number), 2);
     }
   }
   return "the bytes would be a value, but the node is in trouble, see above";
@@ -105,11 +105,11 @@ std::string strangers_text(const CanopenBusConfig& config, const FrameCounts& fr
 
 std::string place_of(const CanopenChannel& channel) {
   if (channel.way == CanopenWay::pdo_bits) {
-    return hexadecimal("TPDO ", channel.signal.id, 3) + " bit " +
+    return "TPDO " + hexadecimal(channel.signal.id, 3) + " bit " +
            std::to_string(channel.signal.start_bit);
   }
   const char* way = channel.way == CanopenWay::sdo ? "SDO " : "TPDO object ";
-  return hexadecimal(way, channel.object.index, 4) + " sub " + std::to_string(channel.object.sub);
+  return way + hexadecimal(channel.object.index, 4) + " sub " + std::to_string(channel.object.sub);
 }
 
 }  // namespace

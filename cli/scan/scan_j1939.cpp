@@ -49,7 +49,7 @@ ScanBus scan_bus(const J1939BusConfig& config, const ScanSensors& sensors, const
                             }});
     }
     const std::string address =
-        node.address ? hexadecimal("address ", static_cast<std::uint32_t>(*node.address), 2)
+        node.address ? "address " + hexadecimal(static_cast<std::uint32_t>(*node.address), 2)
                      : "by its NAME";
     bus.devices.push_back({node.name, address, false, "", {}});
   }

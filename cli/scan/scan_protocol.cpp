@@ -97,12 +97,6 @@ ScanChannel show(const Reading& reading, const RawReading& raw, const Why& why, 
 
 }  // namespace
 
-std::string hexadecimal(const char* before, std::uint32_t value, int digits) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%s0x%0*X", before, digits, value);
-  return text;
-}
-
 std::string too_few(const RawReading& raw) {
   return "only " + std::to_string(raw.value.size()) + " bytes received";
 }

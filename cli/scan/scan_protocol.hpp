@@ -40,8 +40,6 @@ using Afterwards = std::function<void(CanSocket&, const FrameCounts&, ScanBus&)>
                                     const ScanSensors& sensors, const ScanTask& task,
                                     const Afterwards& afterwards = nullptr);
 
-/// `before`, then "0x" and at least `digits` digits.
-[[nodiscard]] std::string hexadecimal(const char* before, std::uint32_t value, int digits);
 /// Reason for a reading that the device marks as invalid.
 inline constexpr const char* its_code = "the device's code for it";
 [[nodiscard]] std::string too_few(const RawReading& raw);

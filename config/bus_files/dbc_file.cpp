@@ -382,7 +382,8 @@ class DbcReader {
 
   void read_value_names(int line) {
     constexpr std::size_t names_max = 4096;
-    if (!scan_.next_word().empty()) return scan_.skip_statement();  // of an environment variable
+    // The statement names the values of an environment variable.
+    if (!scan_.next_word().empty()) return scan_.skip_statement();
     ValueRemark remark{read_signal_remark(line), {}};
     std::optional<double> code;
     while (remark.names.size() < names_max && (code = scan_.accept_real()) && scan_.next_is('"')) {

@@ -135,7 +135,7 @@ class J1939Section final : public BusSection {
     channel.sensor = tables.index;
     const J1939Parameter& place = channel.parameter;
     const auto first = static_cast<std::size_t>(8 * place.start_byte + place.start_bit);
-    FrameBits bits;  // of a part of the group
+    FrameBits bits;  // one part of the group, as long as a frame
     for (std::size_t i = first % bits.size(); i < bits.size(); ++i)
       bits.set(i, i < first % bits.size() + static_cast<std::size_t>(place.length_bits));
     files_.note_bits(tables,

@@ -70,7 +70,8 @@ std::string moves_text(const Status& status, const std::string& to) {
     const std::string unit = " " + axis.unit;
     text.append(text.empty() ? "" : ", ").append(axis.name).append(" from ");
     text.append(fixed_signed(axis.offset, 1)).append(unit);
-    text.append(axis.driven ? " to " + to + (to == "0" ? unit : "") : " (not driven: it stays)");
+    text.append(axis.driven ? " to " + to + (to == "0" ? unit : "")
+                            : " (not driven: nothing is sent)");
   }
   return text;
 }

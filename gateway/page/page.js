@@ -409,17 +409,21 @@ async function command(request) {
   }
 }
 
+function refuse(why) {
+  setText(place('command-answer'), why);
+  return null;
+}
+
 function proveRequest() {
   const axes = state ? state.axes.map(each => each.name) : [];
   const asked = prompt('Axis to prove: ' + axes.join(', ') + '?', axes[0] || '');
   if (!asked) return null;
   const axis = axes.find(name => name.toLowerCase() === asked.trim().toLowerCase());
-  const size = axis && prompt('By how many \u00b5m?', '5');
-  if (axis && !size) return null;
-  const value_um = Number((size || '').replace(',', '.'));
-  if (axis && isNumber(value_um) && value_um) return {method: 'prove', axis: axis, value_um: value_um};
-  setText(place('command-answer'), axis ? size + ' is no number other than 0' : 'there is no axis ' + asked);
-  return null;
+  if (!axis) return refuse('there is no axis ' + asked);
+  const size = prompt('By how many \u00b5m?', '5');
+  if (!size) return null;
+  const value_um = Number(size.replace(',', '.'));
+  return isNumber(value_um) && value_um ? {method: 'prove', axis: axis, value_um: value_um} : refuse(size + ' is no number other than 0');
 }
 
 let offered = {commands: [], names: {}};
