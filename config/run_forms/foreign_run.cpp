@@ -227,16 +227,18 @@ RunFile read_foreign_run(std::string_view text, const std::string& name, const C
   PlainTable plain = plain_table(std::move(read.text), name, own_map);
   if (!run.wall_zero) run.wall_zero = stated_wall_zero(plain.text);
   if (plain.has_own_names) own_map.names.clear();  // already used by the form
-  TextTable table = read_text_table(std::move(plain.text), own_map, plain.lines_above, problems);
+  std::vector<std::string> notes = std::move(plain.notes);
+  const bool has_own_names = plain.has_own_names;
+  TextTable table = read_text_table(std::move(plain), own_map, problems);
   problems.throw_any();
-  table.has_own_names = plain.has_own_names;
+  table.has_own_names = has_own_names;
   leave_empty_columns_out(table);
   leave_repeated_times_out(table);
   join_calendar(table);
   read_units(table);
   table.form = number_form(table);
   problems.throw_any();
-  note_layout(table, std::move(plain.notes), read.from_latin1);
+  note_layout(table, std::move(notes), read.from_latin1);
   const auto columns = find_time(table);
   problems.throw_any();
   if (own_map.period_s && !columns->columns.empty() && !table.has_own_names)

@@ -18,6 +18,7 @@ struct PlainTable {
   std::string text;
   std::vector<std::string> notes;  ///< how it was read, one line each
   int lines_above{0};              ///< lines of the file before the first line of `text`
+  std::vector<int> numbers{};      ///< of each line of `text` in the file; empty: they follow
   bool has_own_names{false};       ///< columns have names of our own form
 };
 

@@ -172,11 +172,14 @@ class TableReader {
   TableReader(const ColumnMap& map, ProblemList& problems)
       : map_(map), problems_(problems), table_(map, problems) {}
 
-  TextTable read(std::string text, int lines_above) {
-    table_.text = std::move(text);
+  TextTable read(PlainTable plain) {
+    table_.text = std::move(plain.text);
     // Heap-allocated, so that moving the table keeps pointers into it valid.
     table_.text.reserve(64);
-    found_ = find_lines(table_.text, lines_above, map_.header_line);
+    found_ = find_lines(table_.text, plain.lines_above, map_.header_line);
+    for (TextLine& line : found_.lines)
+      if (!plain.numbers.empty())
+        line.number = plain.numbers.at(static_cast<std::size_t>(line.number - 1));
     table_.references = found_.references;
     if (lines_.empty()) {
       problems_.add(0, "", "", "has no header row");
@@ -580,9 +583,8 @@ void TextTable::refuse_column(std::size_t column, std::string rule) const {
                header.empty() ? "(empty)" : header, std::move(rule));
 }
 
-TextTable read_text_table(std::string text, const ColumnMap& map, int lines_above,
-                          ProblemList& problems) {
-  return TableReader(map, problems).read(std::move(text), lines_above);
+TextTable read_text_table(PlainTable plain, const ColumnMap& map, ProblemList& problems) {
+  return TableReader(map, problems).read(std::move(plain));
 }
 
 }  // namespace thermocomp

@@ -12,6 +12,7 @@
 
 #include "config/run_forms/column_map.hpp"
 #include "config/run_forms/field_text.hpp"
+#include "config/run_forms/log_form.hpp"
 #include "config/run_forms/spelled_unit.hpp"
 #include "config/text/problems.hpp"
 
@@ -103,8 +104,7 @@ struct TextTable {
 /// The separator is the one of `;`, tab, `,`, `|` and blank that gives rows of equal length with
 /// mostly numbers or times. The header precedes the first row of values, possibly with a row of
 /// units between; title lines may precede it, and comments may be anywhere.
-/// @param lines_above  lines of the file before `text`
-[[nodiscard]] TextTable read_text_table(std::string text, const ColumnMap& map, int lines_above,
+[[nodiscard]] TextTable read_text_table(PlainTable plain, const ColumnMap& map,
                                         ProblemList& problems);
 
 }  // namespace thermocomp

@@ -44,7 +44,7 @@ class PartReader {
   explicit PartReader(const std::string& path)
       : path_(path),
         problems_(path),
-        table_(read_text_table(read_text_file(path, run_bytes_max), no_map_, 0, problems_)) {
+        table_(read_text_table({read_text_file(path, run_bytes_max), {}}, no_map_, problems_)) {
     problems_.throw_any();
     table_.form = number_form(table_);
     problems_.throw_any();

@@ -76,7 +76,7 @@ void check_line(CanopenLine& line, nanoseconds now, bool open) {
     FUZZ_REQUIRE(++sent <= frames_at_once_max);
   }
   for (const UnitHealth& unit : line.health(now)) {
-    FUZZ_REQUIRE(unit.last_error.size() < 200);
+    FUZZ_REQUIRE(unit.last_error.size() < 300);
     for (const char c : unit.last_error) FUZZ_REQUIRE(c >= 0x20 && c < 0x7F);
     FUZZ_REQUIRE(open || !unit.answering);
   }

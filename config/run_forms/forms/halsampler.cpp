@@ -172,7 +172,7 @@ std::optional<PlainTable> halscope(const Log& log) {
   std::map<std::size_t, std::size_t> rows;  // of each column
   for (int line = 2; !rest.empty(); ++line) {
     std::vector<std::string_view> words = words_of(take_line(rest));
-    words.resize(words.size() + words.size() % 2);
+    if (words.size() % 2 == 1) words.emplace_back("(missing)");
     for (std::size_t i = 0; i < words.size(); i += 2) {
       if (!finite_number(words[i + 1]))
         log.refuse(line, std::string(words[i]), std::string(words[i + 1]),

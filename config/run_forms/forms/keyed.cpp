@@ -153,8 +153,11 @@ std::optional<PlainTable> twincat(const Log& log) {
   }
   const NumberForm form{separator != ',' && rows.find(',') != std::string_view::npos ? ',' : '.',
                         '\0'};
-  table.lines_above = line - 2;
-  while (!rows.empty()) {
+  if (many_times)
+    table.numbers = {line - 1};
+  else
+    table.lines_above = line - 2;
+  for (; !rows.empty(); ++line) {
     const std::vector<std::string> fields = fields_of(take_line(rows), separator);
     if (fields.size() < 2) continue;  // "EOF"
     std::string time;
@@ -170,6 +173,7 @@ std::optional<PlainTable> twincat(const Log& log) {
       } else if (!field.empty() && !time.empty()) {
         table.text.append("\n").append(time).append(";").append(labels[i]).append(";").append(
             field);
+        table.numbers.push_back(line);
       }
     }
   }

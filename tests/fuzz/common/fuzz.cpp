@@ -88,11 +88,14 @@ void ScratchFile::write(std::span<const std::uint8_t> bytes) const {
 
 namespace {
 
-/// Zeros that a logger left end a line, too.
+/// Zeros that a logger left end a line, too, and carriage returns where there is no line feed. In
+/// JSON each record counts.
 int lines_of(std::string_view text) {
-  int lines = 1;
+  const char end = text.find('\n') == std::string_view::npos ? '\r' : '\n';
+  int lines = 1 + static_cast<int>(std::count(text.begin(), text.end(), '{') +
+                                   std::count(text.begin(), text.end(), '['));
   for (std::size_t i = 0; i < text.size(); ++i)
-    if (text[i] == '\n' || (text[i] == '\0' && (i == 0 || text[i - 1] != '\0'))) ++lines;
+    if (text[i] == end || (text[i] == '\0' && (i == 0 || text[i - 1] != '\0'))) ++lines;
   return lines;
 }
 

@@ -392,6 +392,8 @@ TEST_CASE("TwinCAT's scope: groups of thousands are read, a scale is refused", "
   check_all(
       {{"groups", head + "\n0\t20,5\t0\t1.234,5\n500\t20,75\t500\t1.234,6\n",
         "time_s,Bed,Way\n0,20.5,1234.5\n0.5,20.75,1234.6\n", ""},
+       {"a value that is none", head + "\n0\t20,5\t0\t1,5\n500\tx\t500\t2\n",
+        "log:6: Bed = x: must be a number", ""},
        {"a scale", head + "ScaleFactor\t0,1\tScaleFactor\t1\n\n0\t205\t0\t1\n500\t206\t500\t2\n",
         "log:4: ScaleFactor = 0,1: may be in the values or not", ""},
        {"blanks and an empty line", "Name Bed\n\nSampleTime[ms] 500\n0 20.5\n500 20.75\n",
@@ -472,6 +474,8 @@ TEST_CASE("lines and bytes that are no rows", "[import]") {
        ""},
       {"which cut a row", "Time [s],T [C]\n0,2" + std::string(9, '\0') + "60,21\n",
        "time_s,T_degC\n0,2\n60,21\n", ""},
+      {"a scope's label without a value", "Sampling period is 1000 ns\nCH1 20\nCH1\n",
+       "log:3: CH1 = (missing): must be a label and its value, in turn", ""},
       {"a scope's log that ends in its first line", "Sampling period is \n0\n",
        "log:1: must be the sampling period in ns", ""},
       {"UTF-16 without a mark",
