@@ -68,7 +68,8 @@ function machineRow(machine) {
     make('td', machine.verdict, {class: 'verdict ' + machine.level}),
     cell('hall', machine.hall || '\u2013'),
     cell('type', machine.type),
-    cell('probed', isNumber(machine.remainder_um) ? fixed(off, 1) + ' of \u00b1' + fixed(machine.claimed_um, 1) +
+    cell('probed', isNumber(machine.remainder_um) ? fixed(off, 1) +
+         (isNumber(machine.claimed_um) ? ' of \u00b1' + fixed(machine.claimed_um, 1) : '') +
          ' \u00b5m, ' + ago(machine.probed_s) : 'never', 'number'),
     cell('outside', machine.outside_days + ' d', 'number'),
     cell('rank', isNumber(machine.rank) ? machine.rank + ' of ' + machine.ranked : '\u2013', 'number'),

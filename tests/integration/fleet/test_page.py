@@ -182,6 +182,15 @@ def test_a_machine_is_compared_with_its_sisters(page):
     assert len(apart) > 300 and all(4.0 < each < 6.0 for each in apart)
 
 
+def test_each_output_is_judged_that_of_a_model_without_a_claimed_error_too(page):
+    page.store.ask(
+        "INSERT INTO fleet.probing (machine, at, output, displacement_um, measured_um, modelled_um)"
+        " SELECT id, now() - interval '2 hours', 'x_um', 90, 90, -0.1 FROM fleet.machine WHERE name = 'mill_011'")
+    machine = {each["name"]: each for each in page.json("/api/machines")}["mill_011"]
+    assert (machine["verdict"], machine["level"]) == ("the model gives less than half of what was probed", "warning")
+    assert (machine["output"], round(machine["remainder_um"], 1), machine["claimed_um"]) == ("x_um", 90.1, None)
+
+
 def test_missing_objects_are_refused(page):
     for path, status in (("/api/machine?name=nobody", 404), ("/api/machine", 404), ("/api/other", 404),
                          ("/api/curves?name=nobody&column=head_degC&seconds=86400", 404),
