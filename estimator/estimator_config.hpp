@@ -157,6 +157,7 @@ inline constexpr double offset_um_max_of_any_axis = 500.0;
 struct LimiterConfig {
   double offset_um_max{50.0};
   double rate_um_per_s_max{1.0};
+  double step_s_max{1.0};  ///< time that one step uses at most, so that an overrun causes no jump
 
   static constexpr auto numbers() {
     using Key = NumberKey<LimiterConfig>;

@@ -251,6 +251,8 @@ sections::BindingTables read_daemon(const TomlTable& root, const fs::path& folde
   config.estimator.sensors = sections::read_sensors(root, sensors);
   config.estimator.blocks = sections::read_blocks(tables.blocks, config.estimator.sensors);
   config.estimator.axes = sections::read_axes(tables.axes);
+  for (AxisConfig& axis : config.estimator.axes)
+    axis.limiter.step_s_max = std::min(axis.limiter.step_s_max, 2.0 / config.loop.rate_hz);
   config.buses =
       sections::read_buses(root, {sensors, config.estimator.sensors}, presets, bus_files);
   note_raw_zeros(config);

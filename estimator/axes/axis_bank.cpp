@@ -115,12 +115,11 @@ Limiter::Limiter(const LimiterConfig& config) : config_(config) {
 }
 
 void Limiter::step(double target_um, double dt_s) noexcept {
-  constexpr double dt_s_max = 1.0;
   const double wanted_um = std::isfinite(target_um) ? target_um : offset_um_;
   const double bounded_um = std::clamp(wanted_um, -bound_um(), bound_um());
   at_bound_ = bounded_um != wanted_um;
   if (!(dt_s > 0)) return;
-  const double step_um_max = rate_um_per_s() * std::min(dt_s, dt_s_max);
+  const double step_um_max = rate_um_per_s() * std::min(dt_s, config_.step_s_max);
   const double way_um = bounded_um - offset_um_;
   // Ends exactly on the target, so that a settled offset equals it to the last bit.
   offset_um_ = std::abs(way_um) <= step_um_max ? bounded_um

@@ -66,7 +66,7 @@ class Limiter {
   explicit Limiter(const LimiterConfig& config);  ///< @throws InvalidValue
 
   /// @param target_um  NaN or infinite: stay
-  /// @param dt_s       time since the last step; used up to 1 s, so that an overrun causes no jump
+  /// @param dt_s       time since the last step; used up to LimiterConfig::step_s_max
   void step(double target_um, double dt_s) noexcept;
   /// Starts from the applied offset: the only permitted jump, since the axis is already there.
   void start_from(double offset_um) noexcept { offset_um_ = offset_um; }

@@ -11,8 +11,8 @@ from planting import write_copies, write_if_new  # noqa: E402
 # (name, file, original text, replacement)
 BUGS = [
     ("slew_doubled", "estimator/axes/axis_bank.cpp",
-     "rate_um_per_s() * std::min(dt_s, dt_s_max);",
-     "({P} ? 2.0 : 1.0) * rate_um_per_s() * std::min(dt_s, dt_s_max);"),
+     "rate_um_per_s() * std::min(dt_s, config_.step_s_max);",
+     "({P} ? 2.0 : 1.0) * rate_um_per_s() * std::min(dt_s, config_.step_s_max);"),
     ("bound_forgotten", "estimator/axes/axis_bank.cpp",
      "std::clamp(wanted_um, -bound_um(), bound_um());",
      "{P} ? wanted_um : std::clamp(wanted_um, -bound_um(), bound_um());"),

@@ -62,6 +62,7 @@ TEST_CASE("every kind of bus has a commented example", "[config]") {
 TEST_CASE("the small machine is loaded as in its file", "[config]") {
   const DaemonConfig config = load_daemon_config(examples / "small_machine.toml");
   CHECK(config.loop.rate_hz == 100);
+  CHECK(config.estimator.axes[0].limiter.step_s_max == 0.02);  // two cycles
   CHECK(config.model_file == examples / "small_machine_model.toml");
   CHECK(config.text == example("small_machine.toml"));
   CHECK(config.model_text == example("small_machine_model.toml"));
