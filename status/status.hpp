@@ -34,6 +34,18 @@ struct LatchedMismatch {
   }
 };
 
+/// A probing of which the model explains less than half.
+struct UnexplainedProbing {
+  double measured{not_a_number};  ///< displacement without the offset
+  double modelled{not_a_number};
+
+  template <class Self, class Visitor>
+  static void fields(Self& self, Visitor& visit) {
+    visit("measured", self.measured);
+    visit("modelled", self.modelled);
+  }
+};
+
 struct GainStatus {
   std::vector<std::string> inputs{};
   double gain{not_a_number};
@@ -101,6 +113,7 @@ struct AxisStatus {
   std::optional<double> at_mm{};      ///< of a node: its position
   std::optional<double> held{};       ///< update = each_cycle: displacement at the held state
   std::optional<CorrectionStatus> correction{};
+  std::optional<UnexplainedProbing> unexplained{};  ///< the last probing, if nothing learns from it
 
   template <class Self, class Visitor>
   static void fields(Self& self, Visitor& visit) {
@@ -125,6 +138,7 @@ struct AxisStatus {
     visit.if_any("at_mm", self.at_mm);
     visit.if_any("held", self.held);
     visit.if_any("correction", self.correction);
+    visit.if_any("unexplained", self.unexplained);
   }
 };
 

@@ -262,6 +262,12 @@ class Causes {
                                              : "shows no number for what it applies") +
                 ", " + fixed(axis.offset, 1) + " was sent",
             code_text(Reason::mismatch).remedy, "", subject);
+      if (axis.unexplained)
+        add(name + ": the last probing found a displacement of " +
+                fixed(axis.unexplained->measured, 1) + " " + axis.unit +
+                ", of which the model gives " + fixed(axis.unexplained->modelled, 1),
+            "measure again; if it is right, fit the model to measured runs of this machine",
+            "thermocomp fit", subject);
       if (axis.at_bound)
         add(name + " at its bound" + remaining_text(axis), code_text(Reason::at_bound).remedy, "",
             subject);

@@ -100,8 +100,11 @@ AxisStatus axis_of(const StatusView& view, std::size_t index) {
     axis.at_mm = config.node->position_mm;
   }
   if (std::isfinite(report.held_um)) axis.held = report.held_um;
-  if (view.config.estimator.correction.form != CorrectionForm::off)
-    axis.correction = correction_of(view.config.estimator.correction, report.correction);
+  const CorrectionConfig& correction = view.config.estimator.correction;
+  if (correction.form != CorrectionForm::off)
+    axis.correction = correction_of(correction, report.correction);
+  else if (report.last_probing.is_unexplained(correction.noise_um))
+    axis.unexplained = {report.last_probing.without_offset_um, report.last_probing.model_um};
   return axis;
 }
 

@@ -17,6 +17,7 @@ Probings::Probings(const EstimatorConfig& config, const ThermalModel& model,
       is_on_(config.correction.form != CorrectionForm::off),
       meaning_(config.correction.measured),
       errors_(config.axes.size()),
+      last_(config.axes.size()),
       measured_um_(config.axes.size(), not_a_number),
       operator_um_(config.axes.size()),
       past_(is_on_ ? past_moments * config.axes.size() : 0),
@@ -38,6 +39,7 @@ void Probings::learn(std::size_t axis, const MeasuredValue& measured,
   OperatorOffset& entered = operator_um_[axis];
   const double total_um = without_offset_um(measured.value_um, moment);
   errors_[axis].take(total_um - moment.model_um);
+  last_[axis] = {total_um, moment.model_um};
   const double before_um = corrections_[axis].learned_um();
   corrections_[axis].measured({total_um, moment.model_um, measured.sd_um, moment.contributions_um});
   if (measured.source != MeasuredSource::wear || !is_on_ || !std::isfinite(measured.value_um))
@@ -79,6 +81,7 @@ void Probings::remember(std::size_t axis, const PastMoment& moment) noexcept {
 void Probings::restart() noexcept {
   for (RunningCorrection& correction : corrections_) correction.restart();
   std::fill(operator_um_.begin(), operator_um_.end(), OperatorOffset{});
+  std::fill(last_.begin(), last_.end(), LastProbing{});
   std::fill(past_.begin(), past_.end(), PastMoment{});
   remembered_ = 0;
 }
@@ -93,6 +96,8 @@ void Probings::restore(const std::map<std::string, double>& corrections) {
     };
     operator_um_[i].entered_um = bounded(".entered_um");
     operator_um_[i].absorbed_um = operator_um_[i].learned_um = bounded(".absorbed_um");
+    take_if_finite(corrections, axis_names_[i] + ".probed_um", last_[i].without_offset_um);
+    take_if_finite(corrections, axis_names_[i] + ".probed_model_um", last_[i].model_um);
   }
 }
 
@@ -106,6 +111,7 @@ void Probings::adopt(const Probings& previous, const std::vector<int>& axes) noe
 
 void Probings::adopt_errors(const Probings& previous, const std::vector<int>& axes) noexcept {
   take_by_plan(axes, previous.errors_, errors_);
+  take_by_plan(axes, previous.last_, last_);
 }
 
 void Probings::visit_learned(StateArchive& archive) {

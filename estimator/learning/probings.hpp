@@ -195,6 +195,21 @@ class ProbedError {
   double mean_square_um2_{0.0};
 };
 
+/// Standard deviations beyond which the operator is asked.
+inline constexpr double question_sigma = 3.0;
+
+/// What the newest probing showed [um]; NaN: none since the reference.
+struct LastProbing {
+  double without_offset_um{not_a_number};  ///< displacement
+  double model_um{not_a_number};           ///< of the model alone, at that time
+
+  /// True if the model explains less than half of the displacement, beyond the noise of a probing.
+  [[nodiscard]] bool is_unexplained(double noise_um) const noexcept {
+    const double error_um = std::abs(without_offset_um - model_um);
+    return error_um > question_sigma * noise_um && error_um > 0.5 * std::abs(without_offset_um);
+  }
+};
+
 /// Input error that explains a value which contradicts the model's claimed error.
 enum class EntryError : std::uint8_t {
   none,     ///< the value agrees
@@ -203,9 +218,6 @@ enum class EntryError : std::uint8_t {
   tenth,    ///< ten times it agrees
   unexplained
 };
-
-/// Standard deviations beyond which the operator is asked.
-inline constexpr double question_sigma = 3.0;
 
 /// @param sd_um  of the difference between model and measurement; NaN: no claimed error
 [[nodiscard]] inline EntryError entry_error_of(double value_um, double expected_um,
@@ -318,6 +330,7 @@ class Probings {
   [[nodiscard]] const OperatorOffset& operator_um(std::size_t axis) const noexcept {
     return operator_um_[axis];
   }
+  [[nodiscard]] const LastProbing& last(std::size_t axis) const noexcept { return last_[axis]; }
   [[nodiscard]] double rms_um(std::size_t axis) const noexcept { return errors_[axis].rms_um(); }
   [[nodiscard]] std::uint64_t count(std::size_t axis) const noexcept {
     return errors_[axis].count();
@@ -341,8 +354,9 @@ class Probings {
   const bool is_on_;
   const MeasuredMeaning meaning_;
 
-  std::vector<RunningCorrection> corrections_;  ///< one per axis, as are the next two
+  std::vector<RunningCorrection> corrections_;  ///< one per axis, as are the next three
   std::vector<ProbedError> errors_;
+  std::vector<LastProbing> last_;  ///< in the state file only: nothing is computed from it
   std::vector<double> measured_um_;
   std::vector<OperatorOffset> operator_um_;
   std::vector<PastMoment> past_;  ///< rings of past_moments, one per axis; empty: no correction

@@ -348,6 +348,7 @@ void report_axis(const Stages& stages, std::size_t axis, AxisReport& out) noexce
   out.claimed_sd_um = stages.prediction.claimed_sd_um(axis);
   out.probed_rms_um = stages.learned.rms_um(axis);
   out.probings = stages.learned.count(axis);
+  out.last_probing = stages.learned.last(axis);
   out.entered_um = stages.learned.operator_um(axis).entered_um;
   out.absorbed_um = stages.learned.operator_um(axis).learned_um;
   out.correction = stages.learned.report(axis);

@@ -34,6 +34,8 @@ void add_axis(const std::string& name, const AxisReport& axis, PersistentState& 
   };
   for (const auto& [key, value] : RunningCorrection::persistent(axis.correction))
     add_learned(key, value);
+  add(state.correction, name + ".probed_um", axis.last_probing.without_offset_um);
+  add(state.correction, name + ".probed_model_um", axis.last_probing.model_um);
   if (axis.entered_um == 0.0 && axis.absorbed_um == 0.0) return;
   add_learned("entered_um", axis.entered_um);
   add_learned("absorbed_um", axis.absorbed_um);

@@ -59,8 +59,9 @@ struct AxisReport {
   /// RMS of probed displacement minus the model's, without the running correction; NaN: none yet.
   double probed_rms_um{not_a_number};
   std::uint64_t probings{0};  ///< number of measured displacements
-  double entered_um{0.0};     ///< at the controller since the reference, as displacement
-  double absorbed_um{0.0};    ///< part of it included in the correction
+  LastProbing last_probing;
+  double entered_um{0.0};   ///< at the controller since the reference, as displacement
+  double absorbed_um{0.0};  ///< part of it included in the correction
   CorrectionReport correction;
 };
 

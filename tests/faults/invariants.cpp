@@ -88,7 +88,9 @@ void Invariants::restored(const PersistentState& saved, const Report& report,
   note_learned(report);
   for (std::size_t axis = 0; axis < axes_count; ++axis) {
     const std::string name(1, static_cast<char>('x' + axis));
-    const auto learned = RunningCorrection::persistent(report.axes[axis].correction);
+    auto learned = RunningCorrection::persistent(report.axes[axis].correction);
+    learned["probed_um"] = report.axes[axis].last_probing.without_offset_um;
+    learned["probed_model_um"] = report.axes[axis].last_probing.model_um;
     for (const auto& [key, value] : saved.correction) {
       // A restored standard deviation may be larger: drift was added.
       if (!key.starts_with(name + ".") || key.ends_with("_sd")) continue;

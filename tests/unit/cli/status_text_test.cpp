@@ -214,6 +214,16 @@ TEST_CASE("an axis at its bound is named with what remains of its displacement",
   CHECK(list[0].subject == Subject{SubjectKind::axis, "z"});
 }
 
+TEST_CASE("a probing that the model does not explain is a problem of its axis", "[cli][status]") {
+  Status status = good_status();
+  status.axes[0].unexplained = {90.0, -0.1};
+  const std::vector<Trouble> list = troubles(status);
+  REQUIRE(list.size() == 1);
+  CHECK(list[0].what ==
+        "axis z: the last probing found a displacement of 90.0 um, of which the model gives -0.1");
+  CHECK(list[0].subject == Subject{SubjectKind::axis, "z"});
+}
+
 TEST_CASE("an estimated block is reported with its standard deviation", "[cli][status]") {
   Status status = good_status();
   status.reasons = only(Reason::block_estimated);

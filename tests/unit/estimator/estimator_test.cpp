@@ -279,6 +279,34 @@ TEST_CASE("the error of probings is that of a model: another one begins anew", "
   CHECK(std::isnan(machine.report().axes[0].probed_rms_um));
 }
 
+TEST_CASE("a probing of which the model explains less than half is kept over a restart",
+          "[estimator]") {
+  const double noise_um = small_config().correction.noise_um;
+  const auto probed = [&](Machine& machine, double left_um) {
+    machine.estimator.apply({CommandKind::measured, 0, left_um});
+    machine.step({21.0, 30.0});
+    return machine.report().axes[0].last_probing;
+  };
+  Machine machine;
+  machine.step({20.0, 30.0});
+  machine.steps(20, {21.0, 30.0});
+  REQUIRE(machine.offset_um() == -5.0);
+  CHECK_FALSE(probed(machine, 0.0).is_unexplained(noise_um));
+  CHECK_FALSE(probed(machine, 4.0).is_unexplained(noise_um));  // 5 of 9 um are explained
+  CHECK_FALSE(LastProbing{2.0, 0.0}.is_unexplained(noise_um));
+  const LastProbing last = probed(machine, 90.0);
+  CHECK(last.is_unexplained(noise_um));
+  CHECK(last.model_um == Approx(5.0));
+  Machine again;
+  again.now = machine.now + 5s;
+  REQUIRE(again.estimator.restore(machine.estimator.persistent_state(machine.report())).empty());
+  again.step({21.0, 30.0});
+  CHECK(again.report().axes[0].last_probing.without_offset_um == last.without_offset_um);
+  again.estimator.apply({CommandKind::reference});
+  again.step({21.0, 30.0});
+  CHECK_FALSE(again.report().axes[0].last_probing.is_unexplained(noise_um));
+}
+
 TEST_CASE("a reload takes new numbers as the reference and keeps an old one", "[estimator]") {
   Machine machine;
   machine.step({20.0, 30.0});
