@@ -265,7 +265,7 @@ class Causes {
       if (axis.unexplained)
         add(name + ": the last probing found a displacement of " +
                 fixed(axis.unexplained->measured, 1) + " " + axis.unit +
-                ", of which the model gives " + fixed(axis.unexplained->modelled, 1),
+                ", of which the model gave " + fixed(axis.unexplained->modelled, 1),
             "measure again; if it is right, fit the model to measured runs of this machine",
             "thermocomp fit", subject);
       if (axis.at_bound)

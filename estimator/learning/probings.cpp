@@ -103,6 +103,7 @@ void Probings::restore(const std::map<std::string, double>& corrections) {
 
 void Probings::adopt(const Probings& previous, const std::vector<int>& axes) noexcept {
   take_by_plan(axes, previous.measured_um_, measured_um_);
+  take_by_plan(axes, previous.last_, last_);
   take_by_plan(axes, previous.operator_um_, operator_um_);
   for (std::size_t i = 0; i < axes.size(); ++i)
     if (axes[i] >= 0)
@@ -111,7 +112,6 @@ void Probings::adopt(const Probings& previous, const std::vector<int>& axes) noe
 
 void Probings::adopt_errors(const Probings& previous, const std::vector<int>& axes) noexcept {
   take_by_plan(axes, previous.errors_, errors_);
-  take_by_plan(axes, previous.last_, last_);
 }
 
 void Probings::visit_learned(StateArchive& archive) {

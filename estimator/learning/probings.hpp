@@ -201,7 +201,7 @@ inline constexpr double question_sigma = 3.0;
 /// What the newest probing showed [um]; NaN: none since the reference.
 struct LastProbing {
   double without_offset_um{not_a_number};  ///< displacement
-  double model_um{not_a_number};           ///< of the model alone, at that time
+  double model_um{not_a_number};           ///< of the model in use at that time, alone
 
   /// True if the model explains less than half of the displacement, beyond the noise of a probing.
   [[nodiscard]] bool is_unexplained(double noise_um) const noexcept {

@@ -220,7 +220,7 @@ TEST_CASE("a probing that the model does not explain is a problem of its axis", 
   const std::vector<Trouble> list = troubles(status);
   REQUIRE(list.size() == 1);
   CHECK(list[0].what ==
-        "axis z: the last probing found a displacement of 90.0 um, of which the model gives -0.1");
+        "axis z: the last probing found a displacement of 90.0 um, of which the model gave -0.1");
   CHECK(list[0].subject == Subject{SubjectKind::axis, "z"});
 }
 
