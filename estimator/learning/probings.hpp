@@ -208,6 +208,7 @@ struct LastProbing {
     const double error_um = std::abs(without_offset_um - model_um);
     return error_um > question_sigma * noise_um && error_um > 0.5 * std::abs(without_offset_um);
   }
+  void visit_state(StateArchive& archive) { archive(without_offset_um, model_um); }
 };
 
 /// Input error that explains a value which contradicts the model's claimed error.
@@ -346,7 +347,7 @@ class Probings {
   /// Takes over the error of probings, which belongs to a model.
   void adopt_errors(const Probings& previous, const std::vector<int>& axes) noexcept;
   void visit_learned(StateArchive& archive);
-  void visit_measured(StateArchive& archive) { archive(measured_um_); }
+  void visit_measured(StateArchive& archive) { archive(measured_um_, last_); }
   void visit_operators(StateArchive& archive);
 
  private:
@@ -356,7 +357,7 @@ class Probings {
 
   std::vector<RunningCorrection> corrections_;  ///< one per axis, as are the next three
   std::vector<ProbedError> errors_;
-  std::vector<LastProbing> last_;  ///< in the state file only: nothing is computed from it
+  std::vector<LastProbing> last_;
   std::vector<double> measured_um_;
   std::vector<OperatorOffset> operator_um_;
   std::vector<PastMoment> past_;  ///< rings of past_moments, one per axis; empty: no correction
