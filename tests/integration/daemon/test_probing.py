@@ -188,10 +188,11 @@ def test_a_model_of_zeros_refuses_no_measured_value_and_a_promoted_one_begins_it
     daemon = machine.start()
     machine.module.show(24.0, 20.0)
     eventually(lambda: "all its coefficients are 0" in daemon.cli("status")[1], "it is said")
-    for value in ("300.0", "-300.0", "0.0"):
+    for value in ("0.0", "-300.0", "300.0"):
         status, _, errors = daemon.cli("measured", "z", value)
         assert status == 0, errors
     eventually(lambda: (daemon.status()["model"]["probed_rms_um"].get("z") or 0.0) > 100.0, "it is counted")
+    assert "found a displacement of 300.0 um, of which the model gave 0.0" in daemon.cli("status")[1]
     machine.model.write_text(zeros.replace("[[0.0, 0.0]]", "[[3.0, -1.5]]"))
     assert daemon.cli("reload")[0] == 0
     state = eventually(lambda: (now := daemon.status())["model"]["moves"] and now, "the model is in use")
