@@ -114,9 +114,10 @@ std::string why_not_admitted(const DaemonConfig& config, const RunFile& days,
       const double one_um = stated_um(config.model, output);
       const double other_um = stated_um(candidate.model, output);
       const Pair probed = pair_of(in_use, offered, output);
+      const bool is_probed = probed.offered_um.size() >= rules.probings_min;
       std::string line;
       std::string why;
-      if (probed.offered_um.size() >= rules.probings_min) {
+      if (is_probed) {
         why = judge_probed(probed, or_none(std::fmin(one_um, other_um)), line);
       } else {
         const RunFile all = unmeasured(days, outputs);
@@ -125,10 +126,9 @@ std::string why_not_admitted(const DaemonConfig& config, const RunFile& days,
             std::hypot(or_none(one_um), or_none(other_um)), line);
       }
       if (!why.empty())
-        return std::string("is worse here than the model in use: ")
-            .append(output)
-            .append(": ")
-            .append(why);
+        return fmt::format("{} the model in use: {}: {}",
+                           is_probed ? "is worse here than" : "cannot be compared here with",
+                           output, why);
       found.append(found.empty() ? "" : "; ").append(output).append(": ").append(line);
     }
   } catch (const ConfigurationError& error) {
