@@ -198,7 +198,7 @@ class ProbedError {
 /// Standard deviations beyond which the operator is asked.
 inline constexpr double question_sigma = 3.0;
 
-/// What the newest probing showed [um]; NaN: none since the reference.
+/// Displacements at the newest probing [um]; NaN: the axis has none since the reference.
 struct LastProbing {
   double without_offset_um{not_a_number};  ///< displacement
   double model_um{not_a_number};           ///< of the model in use at that time, alone

@@ -41,7 +41,8 @@ CREATE OR REPLACE FUNCTION fleet.page_machines() RETURNS json LANGUAGE sql STABL
     FROM shown)
   SELECT coalesce(json_agg(json_build_object('name', name, 'type', type, 'hall', hall, 'verdict', verdict,
     'level', CASE WHEN verdict IN ('departs from its sisters') THEN 'bad'
-                  WHEN verdict = 'often outside of its model' OR verdict LIKE '%probed%' THEN 'warning'
+                  WHEN verdict IN ('probed further off than claimed', 'often outside of its model',
+                    'the model gives less than half of what was probed') THEN 'warning'
                   WHEN verdict = 'as its sisters' THEN 'good' ELSE 'unknown' END,
     'seen_s', extract(epoch FROM seen), 'probed_s', extract(epoch FROM at), 'output', output,
     'remainder_um', remainder_um, 'claimed_um', claimed_um, 'outside_days', outside_days, 'rank', rank,
