@@ -22,6 +22,9 @@
 namespace thermocomp {
 namespace {
 
+/// The kernel withdraws the carrier up to a second after a bus-off, and accepts frames until then.
+constexpr nanoseconds carrier_delay = std::chrono::seconds{2};
+
 nanoseconds to_nanoseconds(const timespec& time) noexcept {
   return std::chrono::seconds{time.tv_sec} + nanoseconds{time.tv_nsec};
 }
@@ -233,7 +236,7 @@ bool CanSocket::open() {
   }
   if (!configure()) return false;
   enter(CanState::active);
-  carrier_known_at_ = monotonic_now() + std::chrono::seconds{2};
+  carrier_known_at_ = monotonic_now() + carrier_delay;
   look_for_carrier();
   return true;
 }
@@ -314,7 +317,7 @@ std::span<const CanFrame> CanSocket::receive() {
       received_.pop_back();
       continue;
     }
-    if (bus_off()) returned();
+    if (bus_off() && monotonic - state_since_ >= carrier_delay) returned();
     // The kernel returns a frame of this socket once the interface has sent it.
     if ((buffers_->messages[i].msg_hdr.msg_flags & MSG_CONFIRM) != 0) {
       ++sent_out_;

@@ -140,8 +140,10 @@ class CanSocket {
   void enter(CanState state);
   void report_state();
   void look_for_carrier();
-  /// Ends bus-off: a frame or the kernel has shown that the interface is on the bus again. Its
-  /// carrier may follow a second later.
+  /// Ends bus-off: the kernel has restarted the interface, or a frame has come later than
+  /// carrier_delay after the bus-off. An earlier one may have been on its way; of an interface that
+  /// returns no sent frames itself (a serial adapter), the kernel returns them although nothing is
+  /// sent.
   void returned();
   void fail(const char* what, int code);
   /// Kernel time stamp of a frame; also records the kernel's count of dropped frames.
@@ -159,8 +161,7 @@ class CanSocket {
   nanoseconds state_since_;
   /// Opened without a carrier, as after a bus-off; no error frame reports the past.
   bool without_carrier_{false};
-  /// The kernel withdraws the carrier up to a second after a bus-off: an opened socket checks it
-  /// until then.
+  /// An opened socket checks the carrier until then.
   nanoseconds carrier_known_at_{};
   bool send_failed_{false};
   std::string error_;

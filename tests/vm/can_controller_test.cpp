@@ -194,11 +194,26 @@ TEST_CASE("a bus-off that is over before the link looks takes a new epoch", "[vm
   for (std::uint64_t round = 1; round <= 20; ++round) {
     const std::uint32_t epoch = cycle.state().link_epoch;
     REQUIRE(bus.send(CAN_ERR_FLAG | CAN_ERR_BUSOFF, {0, 0, 0, 0, 0, 0, 0, 0}));
-    REQUIRE(bus.send(0x201, {0xE0, 0x2E}));  // ended by the next frame
+    REQUIRE(bus.send(CAN_ERR_FLAG | CAN_ERR_RESTARTED, {0, 0, 0, 0, 0, 0, 0, 0}));
     REQUIRE(eventually([&] { return cycle.state().link_epoch > epoch; }));
     REQUIRE(eventually([&] { return cycle.state().online; }));
     CHECK(link.health().bus_offs == round);
   }
+}
+
+TEST_CASE("frames that were on their way do not end a bus-off", "[vm][controller]") {
+  CanController link(two_axes("vcan0"));
+  Cycle cycle(link);
+  RawSender bus("vcan0");
+  const std::initializer_list<int> applied{0, 0, 0, 0}, speed{0xE0, 0x2E};
+  REQUIRE(eventually(
+      [&] { return bus.send(0x200, applied) && bus.send(0x201, speed) && cycle.state().online; }));
+  const std::uint64_t reads = link.health().reads;
+  REQUIRE(bus.send(CAN_ERR_FLAG | CAN_ERR_BUSOFF, {0, 0, 0, 0, 0, 0, 0, 0}));
+  REQUIRE(bus.send(0x200, applied));
+  REQUIRE(bus.send(0x201, speed));
+  REQUIRE(eventually([&] { return link.health().reads > reads && !cycle.state().online; }));
+  CHECK(link.health().state == "bus_off");
 }
 
 TEST_CASE("a controller made with python-can takes offsets and shows them applied",
