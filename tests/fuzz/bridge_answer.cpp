@@ -17,9 +17,9 @@ constexpr std::string_view axes = "xyz";
 constexpr std::uint64_t id = 7;
 constexpr double offset_mm_max = 0.5;
 
-void check_answer(std::string_view line) {
+void check_bridge_answer(std::string_view line) {
   try {
-    const Answer answer = read_answer(line, id, axes, offset_mm_max);
+    const thermocomp_linuxcnc::Answer answer = read_answer(line, id, axes, offset_mm_max);
     FUZZ_REQUIRE(answer.offset_mm.size() == axes.size());
     for (const auto& offset_mm : answer.offset_mm)
       FUZZ_REQUIRE(!offset_mm || std::abs(*offset_mm) <= offset_mm_max);
@@ -53,7 +53,7 @@ void check_request(fuzz::ByteFeed& feed) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  check_answer({reinterpret_cast<const char*>(data), size});
+  check_bridge_answer({reinterpret_cast<const char*>(data), size});
   fuzz::ByteFeed feed(data, size);
   check_request(feed);
   return 0;

@@ -10,7 +10,7 @@ using namespace std::chrono_literals;
 
 namespace {
 
-constexpr int frames_at_once_max = 64;
+constexpr int canopen_frames_at_once_max = 64;
 
 CanopenChannel channel_of(CanopenWay way, std::size_t sensor, ObjectAddress object) {
   CanopenChannel channel;
@@ -23,7 +23,7 @@ CanopenChannel channel_of(CanopenWay way, std::size_t sensor, ObjectAddress obje
   return channel;
 }
 
-CanopenBusConfig configuration(std::uint8_t kind) {
+CanopenBusConfig canopen_configuration(std::uint8_t kind) {
   CanopenBusConfig bus;
   bus.name = "bus";
   bus.interface = "can0";
@@ -73,7 +73,7 @@ void check_line(CanopenLine& line, nanoseconds now, bool open) {
   while (const auto frame = line.next_frame()) {
     FUZZ_REQUIRE(open);
     FUZZ_REQUIRE(!frame->id.extended && frame->id.id <= 0x7FF && frame->size <= 8);
-    FUZZ_REQUIRE(++sent <= frames_at_once_max);
+    FUZZ_REQUIRE(++sent <= canopen_frames_at_once_max);
   }
   for (const UnitHealth& unit : line.health(now)) {
     FUZZ_REQUIRE(unit.last_error.size() < 300);
@@ -83,7 +83,7 @@ void check_line(CanopenLine& line, nanoseconds now, bool open) {
 }
 
 /// Mostly identifiers used on this line.
-std::uint32_t identifier_from(fuzz::ByteFeed& feed) {
+std::uint32_t canopen_identifier_from(fuzz::ByteFeed& feed) {
   constexpr std::uint32_t ours[] = {0x585, 0x705, 0x085, 0x185, 0x186, 0x706, 0x586, 0x195};
   const std::uint8_t which = feed.u8();
   return which < 0xF0 ? ours[which % std::size(ours)] : feed.u16() & 0x7FFu;
@@ -93,7 +93,7 @@ std::uint32_t identifier_from(fuzz::ByteFeed& feed) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   fuzz::ByteFeed feed(data, size);
-  CanopenLine line(configuration(feed.u8()));
+  CanopenLine line(canopen_configuration(feed.u8()));
   nanoseconds now = 1000s;
   bool open = true;
   line.opened(now);
@@ -102,7 +102,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const std::uint8_t step = feed.u8();
     if (step < 0xC0) {
       CanFrame frame;
-      frame.id = {identifier_from(feed), step == 0xBF};
+      frame.id = {canopen_identifier_from(feed), step == 0xBF};
       const auto bytes = feed.take(step < 0xB0 ? 8 : step % 9);
       frame.size = bytes.size();
       std::copy(bytes.begin(), bytes.end(), frame.data.begin());

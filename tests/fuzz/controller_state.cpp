@@ -64,7 +64,7 @@ class Daemon {
   void take(std::string_view line) {
     const ControllerState before = state();
     results_ = 0;
-    const Answer answer = dispatcher_.answer({true, true, true}, line);
+    const thermocomp::Answer answer = dispatcher_.answer({true, true, true}, line);
     check_line(answer);
     // A refused report has changed nothing.
     if (results_ == 0) {
@@ -94,7 +94,7 @@ class Daemon {
     return state_;
   }
 
-  static void check_line(const Answer& answer) {
+  static void check_line(const thermocomp::Answer& answer) {
     if (answer.text.empty()) return;
     FUZZ_REQUIRE(std::count(answer.text.begin(), answer.text.end(), '\n') == 1);
     const json line = json::parse(answer.text, nullptr, false);

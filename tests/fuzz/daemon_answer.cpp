@@ -48,7 +48,7 @@ std::set<std::string> names_of(const std::vector<Part>& parts) {
 
 void check_gateway(const Status& status, const SensorsAnswer& sensors_answer,
                    const EventsAnswer& events) {
-  Snapshot snapshot;
+  gateway::Snapshot snapshot;
   snapshot.is_here = true;
   snapshot.status = status;
   snapshot.sensors = sensors_answer;

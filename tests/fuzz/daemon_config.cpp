@@ -20,7 +20,7 @@ using namespace thermocomp;
 
 namespace {
 
-constexpr std::string_view border = "#### model\n";
+constexpr std::string_view model_border = "#### model\n";
 constexpr const char* config_name = "/etc/thermocompd.toml";
 constexpr const char* model_name = "/etc/model.toml";
 
@@ -66,9 +66,10 @@ void step_some(const DaemonConfig& config) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string text(reinterpret_cast<const char*>(data), size);
-  const std::size_t at = text.find(border);
+  const std::size_t at = text.find(model_border);
   const std::string config_text = text.substr(0, at);
-  const std::string model_text = at == std::string::npos ? "" : text.substr(at + border.size());
+  const std::string model_text =
+      at == std::string::npos ? "" : text.substr(at + model_border.size());
   DaemonConfig config;
   try {
     config = parse_daemon_config(config_text, config_name, model_text, model_name);

@@ -11,20 +11,20 @@ using namespace std::chrono_literals;
 
 namespace {
 
-constexpr int frames_at_once_max = 8;
-constexpr std::uint64_t name = 0x8000FF0012345678;
+constexpr int j1939_frames_at_once_max = 8;
+constexpr std::uint64_t j1939_name = 0x8000FF0012345678;
 
-J1939BusConfig configuration(std::uint8_t kind) {
+J1939BusConfig j1939_configuration(std::uint8_t kind) {
   J1939BusConfig bus;
   bus.name = "bus";
   bus.interface = "can0";
   if ((kind & 1) != 0) bus.own_address = 0xF9;
-  bus.own_name = name + 1;
+  bus.own_name = j1939_name + 1;
   bus.nodes.resize(2);
   bus.nodes[0].name = "placed";
   bus.nodes[0].address = 0x80;
   bus.nodes[1].name = "named";
-  bus.nodes[1].name_claimed = name;
+  bus.nodes[1].name_claimed = j1939_name;
   constexpr int lengths[] = {8, 16, 24, 32, 10, 2};
   for (std::size_t i = 0; i < 6; ++i) {
     J1939Parameter parameter;
@@ -48,7 +48,7 @@ void check_line(J1939Line& line, nanoseconds now, bool open) {
   while (const auto frame = line.next_frame()) {
     FUZZ_REQUIRE(open);
     FUZZ_REQUIRE(frame->id.extended && frame->id.id <= 0x1FFFFFFF && frame->size <= 8);
-    FUZZ_REQUIRE(++sent <= frames_at_once_max);
+    FUZZ_REQUIRE(++sent <= j1939_frames_at_once_max);
   }
   FUZZ_REQUIRE(!line.address_of(1) || *line.address_of(1) <= address_max);
   for (const UnitHealth& unit : line.health(now)) {
@@ -58,7 +58,7 @@ void check_line(J1939Line& line, nanoseconds now, bool open) {
 }
 
 /// Mostly identifiers used on this line.
-std::uint32_t identifier_from(fuzz::ByteFeed& feed) {
+std::uint32_t j1939_identifier_from(fuzz::ByteFeed& feed) {
   constexpr std::uint32_t ours[] = {0x18FEEE80, 0x1CECFF80, 0x1CEBFF80, 0x1CECF980, 0x1CEBF980,
                                     0x18EEFF80, 0x18EAFF80, 0x18EEFFF9, 0x18FEEE90, 0x18EEFF90};
   const std::uint8_t which = feed.u8();
@@ -87,7 +87,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   fuzz::ByteFeed feed(data, size);
   const std::uint8_t kind = feed.u8();
   if ((kind & 2) != 0) check_transport(feed.rest());
-  J1939Line line(configuration(kind));
+  J1939Line line(j1939_configuration(kind));
   nanoseconds now = 1000s;
   bool open = true;
   line.opened(now);
@@ -96,7 +96,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const std::uint8_t step = feed.u8();
     if (step < 0xC0) {
       CanFrame frame;
-      frame.id = {identifier_from(feed), step != 0xBF};
+      frame.id = {j1939_identifier_from(feed), step != 0xBF};
       const auto bytes = feed.take(step < 0xB0 ? 8 : step % 9);
       frame.size = bytes.size();
       std::copy(bytes.begin(), bytes.end(), frame.data.begin());

@@ -13,7 +13,7 @@ using namespace thermocomp;
 
 namespace {
 
-constexpr std::string_view border = "#### configuration\n";
+constexpr std::string_view configuration_border = "#### configuration\n";
 constexpr std::string_view model = R"(format = 1
 inputs = ["t_degC"]
 outputs = ["z_um"]
@@ -51,9 +51,10 @@ void make_sources(const DaemonConfig& config) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const Files files;
   const std::string text(reinterpret_cast<const char*>(data), size);
-  const std::size_t at = text.find(border);
+  const std::size_t at = text.find(configuration_border);
   const std::string preset = text.substr(0, at);
-  const std::string own = at == std::string::npos ? "" : text.substr(at + border.size());
+  const std::string own =
+      at == std::string::npos ? "" : text.substr(at + configuration_border.size());
   files.preset.write(bytes_of(preset));
   files.configuration.write(bytes_of(own));
   try {

@@ -11,7 +11,7 @@ using namespace thermocomp;
 
 namespace {
 
-constexpr const char* name = "run.csv";
+constexpr const char* run_name = "run.csv";
 
 void check_loaded(const RunFile& run) {
   FUZZ_REQUIRE(run.rows() > 0);
@@ -28,7 +28,7 @@ void check_loaded(const RunFile& run) {
 }
 
 void check_written(const RunFile& run) {
-  const RunFile again = parse_run(write_run(run), name);
+  const RunFile again = parse_run(write_run(run), run_name);
   FUZZ_REQUIRE(again.columns == run.columns && again.rows() == run.rows());
   for (std::size_t i = 0; i < run.columns.size(); ++i) {
     for (std::size_t row = 0; row < run.rows(); ++row) {
@@ -57,10 +57,10 @@ RunSelection selection_from(std::string_view text) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string text(reinterpret_cast<const char*>(data), size);
-  const fuzz::NamedText files[] = {{name, text}};
+  const fuzz::NamedText files[] = {{run_name, text}};
   bool loads = false;
   try {
-    const RunFile run = parse_run(text, name);
+    const RunFile run = parse_run(text, run_name);
     loads = true;
     check_loaded(run);
     check_written(run);
@@ -71,7 +71,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   if (!loads) return 0;
   try {
-    check_loaded(parse_run(text, name, selection_from(text)));
+    check_loaded(parse_run(text, run_name, selection_from(text)));
   } catch (const ConfigurationError& error) {
     fuzz::check_problems(error.problems(), files);
   }

@@ -11,7 +11,7 @@ for source in *.cpp; do
   target=$(basename "$source" .cpp)
   folders=("$work/seeds/$target")
   if [[ -d seeds/$target ]]; then folders+=("seeds/$target"); fi
-  if text=$("$bin/fuzz_$target" "${folders[@]}" 2>&1); then
+  if text=$("$bin/fuzz_seeds" "$target" "${folders[@]}" 2>&1); then
     echo "$target: $(tail -n 1 <<<"$text")"
   else
     echo "$target: BROKEN"

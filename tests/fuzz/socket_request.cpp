@@ -27,7 +27,7 @@ namespace {
 
 /// Largest change of modelled displacement per step, with any gains.
 constexpr double rise_um_a_step = 0.5;
-constexpr std::uint8_t waits = 0xFF;  ///< not part of UTF-8: the client waits one round
+constexpr std::uint8_t client_waits = 0xFF;  ///< not part of UTF-8: the client waits one round
 
 /// A daemon without threads: commands are checked and reach an estimator that learns from probings
 /// and follows cycle ends.
@@ -228,7 +228,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     Client client(rig.path());
     rig.server().handle(milliseconds(0));
     while (!bytes.empty()) {
-      const auto end = std::find(bytes.begin(), bytes.end(), waits);
+      const auto end = std::find(bytes.begin(), bytes.end(), client_waits);
       const auto length = static_cast<std::size_t>(end - bytes.begin());
       client.send(bytes.first(length), rig);
       bytes = bytes.subspan(std::min(length + 1, bytes.size()));
