@@ -86,7 +86,9 @@ std::vector<std::byte> ChunkEncoder::take() {
 }
 
 ChunkDecoder::ChunkDecoder(std::vector<std::byte> bytes, std::uint64_t count)
-    : bytes_(std::move(bytes)), reader_(bytes_), left_(count) {}
+    : bytes_(std::move(bytes)), reader_(bytes_), left_(count) {
+  require_sound(count <= bytes_.size(), "more records than bytes");
+}
 
 bool ChunkDecoder::next(Record& out) {
   if (left_ == 0) {

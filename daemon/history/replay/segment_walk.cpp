@@ -7,7 +7,6 @@
 #include "config/daemon/daemon_config.hpp"
 #include "config/text/printable_text.hpp"
 #include "daemon/history/format/chunk_codec.hpp"
-#include "estimator/checks.hpp"
 
 namespace thermocomp {
 
@@ -54,19 +53,6 @@ InputsInForce inputs_at(const SegmentStart& start, const EstimatorConfig& config
   return {start.readings, start.controller};
 }
 
-HistoryClock::HistoryClock(const HistoryReader& reader) {
-  for (const SegmentInfo& segment : reader.segments()) {
-    const std::string why = places_.add(segment);
-    THERMOCOMP_ENSURE(why.empty());  // the reader has dropped segments without a place
-  }
-}
-
-double HistoryClock::seconds_at(const SegmentInfo& segment, std::uint64_t cycle) const {
-  const std::int64_t time_ns =
-      segment.grid.time_of(cycle).count() + places_.grid_to_history_ns(segment.run);
-  return static_cast<double>(time_ns) * 1e-9;
-}
-
 ReplaySetup parse_setup(const SegmentSetup& setup) {
   DaemonConfig config = parse_daemon_config(setup.config_text, "configuration of the segment",
                                             setup.model_text, "model of the segment");
@@ -85,11 +71,13 @@ ParsedSetups::ParsedSetups(const HistoryReader& reader, const SetupParser& parse
 }
 
 const ReplaySetup& ParsedSetups::of(const SegmentInfo& segment) const {
-  const auto failure = failures_.find(segment.setup);
-  if (failure != failures_.end()) {
-    throw HistoryError("its configuration cannot be used: " + failure->second);
-  }
-  return setups_.at(segment.setup);
+  if (const ReplaySetup* setup = find(segment)) return *setup;
+  throw HistoryError("its configuration cannot be used: " + failures_.at(segment.setup));
+}
+
+const ReplaySetup* ParsedSetups::find(const SegmentInfo& segment) const {
+  const auto found = setups_.find(segment.setup);
+  return found == setups_.end() ? nullptr : &found->second;
 }
 
 std::string damage_line(const HistoryDamage& damage) {
@@ -122,7 +110,7 @@ SegmentSteps::SegmentSteps(const HistoryReader& reader, const SegmentInfo& segme
                            const ReplaySetup& setup)
     : segment_(segment),
       estimator_(setup.estimator, setup.model),
-      cursor_(reader.records(segment)),
+      cursor_(reader, segment),
       next_cycle_(segment.first_cycle) {
   const SegmentStart start = reader.start(segment);
   estimator_.load_state(start.estimator_state);
