@@ -149,9 +149,7 @@ std::vector<RecordedEvent> read_events(const std::filesystem::path& history,
     const std::int64_t wall_ns = rows.number(2);
     if (!first_ns) first_ns = wall_ns;
     const double since_first_s = 1e-9 * static_cast<double>(wall_ns - *first_ns);
-    if (from && is_before(since_first_s, wall_ns, *from)) continue;
-    if (to && !is_before(since_first_s, wall_ns, *to)) continue;
-    events.push_back(event_from(rows));
+    if (is_within(since_first_s, wall_ns, from, to)) events.push_back(event_from(rows));
   }
   note_absences(events, database);
   return events;

@@ -120,13 +120,10 @@ class RunExport {
         report_damage();
         const double time_s = reader_.seconds_at(segment, cycle);
         const std::int64_t wall_ns = walk.wall_ns(cycle);
-        const bool is_wanted = !(from_ && is_before(time_s, wall_ns, *from_)) &&
-                               !(to_ && !is_before(time_s, wall_ns, *to_));
-        if (!is_wanted) {
+        if (is_within(time_s, wall_ns, from_, to_))
+          write(segment, cycle, time_s, wall_ns, walk);
+        else
           walk.skip();
-          continue;
-        }
-        write(segment, cycle, time_s, wall_ns, walk);
       }
     } catch (const std::exception& error) {
       summary_.damage.push_back({segment.id, error.what()});

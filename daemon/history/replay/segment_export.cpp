@@ -15,12 +15,6 @@ namespace {
 
 constexpr std::size_t none = ExportPlaces::none;
 
-bool is_in_a_block(const EstimatorConfig& config, std::size_t sensor) {
-  return std::any_of(config.blocks.begin(), config.blocks.end(), [&](const BlockConfig& block) {
-    return std::find(block.sensors.begin(), block.sensors.end(), sensor) != block.sensors.end();
-  });
-}
-
 double good_value(const Reading& reading) {
   return reading.fault == Fault::none ? reading.temp_degC : not_a_number;
 }

@@ -11,20 +11,18 @@
 namespace thermocomp {
 
 void InputsInForce::apply(const Record& record) {
-  const bool has_time = record.kind == RecordKind::reading || record.kind == RecordKind::link;
-  if (has_time && !is_grid_time(record.time_ns)) throw HistoryError("damaged: an impossible time");
   const auto require_below = [&](std::size_t size) {
-    if (record.index >= size) throw HistoryError("damaged: a record names what does not exist");
+    require_sound(record.index < size, "a record names what does not exist");
   };
   switch (record.kind) {
-    case RecordKind::reading:
+    case RecordKind::reading: {
+      const nanoseconds taken_at = grid_time_from(record.time_ns);
       require_below(readings.size());
-      if (record.detail >= faults_count) throw HistoryError("damaged: unknown fault");
-      readings[record.index] = {record.value, nanoseconds(record.time_ns),
-                                static_cast<Fault>(record.detail)};
+      readings[record.index] = {record.value, taken_at, fault_from(record.detail)};
       break;
+    }
     case RecordKind::link:
-      controller.taken_at = nanoseconds(record.time_ns);
+      controller.taken_at = grid_time_from(record.time_ns);
       controller.link_epoch = record.index;
       set_link_bits(record.detail, controller);
       break;
@@ -51,6 +49,12 @@ InputsInForce inputs_at(const SegmentStart& start, const EstimatorConfig& config
   require_sound(start.readings.size() == config.sensors.size(),
                 "the inputs at its start do not fit its configuration");
   return {start.readings, start.controller};
+}
+
+bool is_in_a_block(const EstimatorConfig& config, std::size_t sensor) {
+  return std::any_of(config.blocks.begin(), config.blocks.end(), [&](const BlockConfig& block) {
+    return std::find(block.sensors.begin(), block.sensors.end(), sensor) != block.sensors.end();
+  });
 }
 
 ReplaySetup parse_setup(const SegmentSetup& setup) {

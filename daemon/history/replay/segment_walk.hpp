@@ -16,6 +16,8 @@
 
 namespace thermocomp {
 
+[[nodiscard]] bool is_in_a_block(const EstimatorConfig& config, std::size_t sensor);
+
 /// Configuration and model of a segment's estimator.
 struct ReplaySetup {
   EstimatorConfig estimator;
