@@ -85,9 +85,7 @@ std::vector<std::byte> ChunkEncoder::take() {
 }
 
 ChunkDecoder::ChunkDecoder(std::vector<std::byte> bytes, std::uint64_t count)
-    : bytes_(std::move(bytes)), reader_(bytes_), left_(count) {
-  require_sound(count <= bytes_.size(), "more records than bytes");
-}
+    : bytes_(std::move(bytes)), reader_(bytes_), left_(count) {}
 
 bool ChunkDecoder::next(Record& out) {
   if (left_ == 0) {

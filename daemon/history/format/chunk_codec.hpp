@@ -114,7 +114,6 @@ class ChunkEncoder {
 
 class ChunkDecoder {
  public:
-  /// @throws HistoryError when so many records cannot be in the bytes
   ChunkDecoder(std::vector<std::byte> bytes, std::uint64_t count);
   ChunkDecoder(const ChunkDecoder&) = delete;
   ChunkDecoder& operator=(const ChunkDecoder&) = delete;

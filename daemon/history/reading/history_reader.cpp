@@ -226,9 +226,10 @@ RecordCursor::RecordCursor(const HistoryReader& reader, SegmentInfo segment)
 
 /// Decodes the whole chunk before any record is returned.
 void RecordCursor::decode(std::vector<std::byte> bytes, std::uint64_t count) {
+  require_sound(count <= bytes.size(), "more records than bytes");
   std::vector<Record> decoded;
-  ChunkDecoder chunk(std::move(bytes), count);
   decoded.reserve(count);
+  ChunkDecoder chunk(std::move(bytes), count);
   RecordOrder order_then = order_;
   for (Record record; chunk.next(record); decoded.push_back(record))
     require_sound(order_then.admits(record), "records are out of order");

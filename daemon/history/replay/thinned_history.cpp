@@ -233,13 +233,15 @@ class Thinning {
   }
 
   void add_records(const SegmentInfo& segment, ChunkContent content) {
+    const auto count = static_cast<std::uint64_t>(content.count);
+    require_sound(count <= content.records.size(), "more records than bytes");
     const bool is_sound =
         content.wall_minus_grid_ns >= -grid_ns_max && content.wall_minus_grid_ns <= wall_ns_max;
     const std::int64_t difference_ns =
         is_sound ? content.wall_minus_grid_ns
                  : segment.wall_ns - segment.grid.time_of(segment.first_cycle).count();
     const Places& places = places_.at(segment.setup);
-    ChunkDecoder chunk(std::move(content.records), static_cast<std::uint64_t>(content.count));
+    ChunkDecoder chunk(std::move(content.records), count);
     for (Record record; chunk.next(record);) {
       if (record.cycle > static_cast<std::uint64_t>(segment.last_cycle)) break;
       const std::optional<std::size_t> place = place_of(record, places);
