@@ -1,5 +1,6 @@
 #include <algorithm>
-#include <cstdio>
+#include <fmt/format.h>
+#include <iostream>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -29,12 +30,10 @@ struct ExportOptions {
 /// @return the exit status
 int report_damage(const std::string& history, const std::vector<HistoryDamage>& damage) {
   constexpr std::size_t shown_max = 20;
-  for (std::size_t i = 0; i < std::min(damage.size(), shown_max); ++i) {
-    std::fprintf(stderr, "%s: %s\n", history.c_str(), to_string(damage[i]).c_str());
-  }
-  if (damage.size() > shown_max) {
-    std::fprintf(stderr, "%s: and %zu more\n", history.c_str(), damage.size() - shown_max);
-  }
+  for (std::size_t i = 0; i < std::min(damage.size(), shown_max); ++i)
+    std::cerr << fmt::format("{}: {}\n", history, to_string(damage[i]));
+  if (damage.size() > shown_max)
+    std::cerr << fmt::format("{}: and {} more\n", history, damage.size() - shown_max);
   return damage.empty() ? exit_success : exit_no;
 }
 
@@ -55,12 +54,10 @@ int run_export(const ExportOptions& options) {
     throw Failure(options.history + ": nothing was recorded in this period");
   }
   file.commit();
-  std::fprintf(stderr, "%llu rows, %zu columns\n", static_cast<unsigned long long>(summary.rows),
-               summary.columns.size());
-  if (summary.gaps > 0) {
-    std::fprintf(stderr, "%llu gap%s, each marked by a comment line in the file\n",
-                 static_cast<unsigned long long>(summary.gaps), summary.gaps == 1 ? "" : "s");
-  }
+  std::cerr << fmt::format("{} rows, {} columns\n", summary.rows, summary.columns.size());
+  if (summary.gaps > 0)
+    std::cerr << fmt::format("{} gap{}, each marked by a comment line in the file\n", summary.gaps,
+                             summary.gaps == 1 ? "" : "s");
   return report_damage(options.history, summary.damage);
 }
 
@@ -84,18 +81,14 @@ int run_history_replay(const ReplayOptions& options) {
     throw Failure(options.input + ": no segment can be replayed");
   }
   file.commit();
-  std::fprintf(
-      stderr, "%llu segments (%llu after a gap), %llu cycles, %llu offsets compared, %llu differ\n",
-      static_cast<unsigned long long>(summary.segments),
-      static_cast<unsigned long long>(summary.gaps),
-      static_cast<unsigned long long>(summary.cycles),
-      static_cast<unsigned long long>(summary.compared),
-      static_cast<unsigned long long>(summary.different));
+  std::cerr << fmt::format(
+      "{} segments ({} after a gap), {} cycles, {} offsets compared, {} differ\n", summary.segments,
+      summary.gaps, summary.cycles, summary.compared, summary.different);
   if (summary.different == 0) return status;
-  std::fprintf(stderr, "first at %.3f s, cycle %llu; largest difference %g um\n",
-               summary.first_different_time_s.value_or(0.0),
-               static_cast<unsigned long long>(summary.first_different_cycle.value_or(0)),
-               summary.largest_difference_um);
+  std::cerr << fmt::format("first at {:.3f} s, cycle {}; largest difference {:g} um\n",
+                           summary.first_different_time_s.value_or(0.0),
+                           summary.first_different_cycle.value_or(0),
+                           summary.largest_difference_um);
   return exit_no;
 }
 
@@ -105,10 +98,9 @@ int run_file_replay(const ReplayOptions& options) {
   OutputFile file(options.output);
   const RunReplaySummary summary = replay_run_file(config, run, file.stream());
   file.commit();
-  for (const std::string& note : summary.notes) std::fprintf(stderr, "note: %s\n", note.c_str());
-  std::fprintf(stderr, "%llu rows, %llu steps of %g s\n",
-               static_cast<unsigned long long>(summary.rows),
-               static_cast<unsigned long long>(summary.steps), summary.step_period_s);
+  for (const std::string& note : summary.notes) std::cerr << fmt::format("note: {}\n", note);
+  std::cerr << fmt::format("{} rows, {} steps of {:g} s\n", summary.rows, summary.steps,
+                           summary.step_period_s);
   return exit_success;
 }
 
@@ -121,22 +113,17 @@ int run_history_check(const std::string& history) {
   std::size_t sound = 0;
   for (const SegmentCheck& part : check.segments) {
     const SegmentInfo& segment = part.segment;
-    std::printf("segment %lld: run %lld, cycles %llu to %lld, from %s, %llu records: %s\n",
-                static_cast<long long>(segment.id), static_cast<long long>(segment.run),
-                static_cast<unsigned long long>(segment.first_cycle),
-                static_cast<long long>(segment.last_cycle), utc_text(segment.wall_ns).c_str(),
-                static_cast<unsigned long long>(part.records),
-                part.damage.empty() ? "sound" : "damaged");
-    for (const HistoryDamage& damage : part.damage) {
-      std::printf("  %s\n", damage.why.c_str());
-    }
+    std::cout << fmt::format("segment {}: run {}, cycles {} to {}, from {}, {} records: {}\n",
+                             segment.id, segment.run, segment.first_cycle, segment.last_cycle,
+                             utc_text(segment.wall_ns), part.records,
+                             part.damage.empty() ? "sound" : "damaged");
+    for (const HistoryDamage& damage : part.damage) std::cout << fmt::format("  {}\n", damage.why);
     if (part.damage.empty()) ++sound;
   }
-  for (const HistoryDamage& damage : check.damage) {
-    std::printf("%s: cannot be read\n", to_string(damage).c_str());
-  }
-  std::printf("%s: %zu of %zu segments sound\n", history.c_str(), sound,
-              check.segments.size() + check.damage.size());
+  for (const HistoryDamage& damage : check.damage)
+    std::cout << fmt::format("{}: cannot be read\n", to_string(damage));
+  std::cout << fmt::format("{}: {} of {} segments sound\n", history, sound,
+                           check.segments.size() + check.damage.size());
   return check.is_sound() ? exit_success : exit_no;
 }
 

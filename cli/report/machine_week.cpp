@@ -1,13 +1,15 @@
 #include "cli/report/machine_week.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <initializer_list>
 #include <limits>
+#include <utility>
 
-#include "daemon/history/replay/segment_walk.hpp"
+#include <Eigen/Core>
+#include <Eigen/LU>
 
 namespace thermocomp::cli {
 namespace {
@@ -22,22 +24,22 @@ constexpr double probing_half_s = 2.0;
 /// Longest gap between contiguous segments.
 constexpr double apart_s = 1.0;
 
-double end_s(const SegmentInfo& segment) {
+WallSpan span_of(const SegmentInfo& segment) {
+  const auto begin_ns = static_cast<double>(segment.wall_ns);
   const double cycles =
       static_cast<double>(segment.last_cycle + 1) - static_cast<double>(segment.first_cycle);
-  return s_per_ns * (static_cast<double>(segment.wall_ns) +
-                     cycles * static_cast<double>(segment.grid.period.count()));
+  const double length_ns = cycles * static_cast<double>(segment.grid.period.count());
+  return {s_per_ns * begin_ns, s_per_ns * (begin_ns + length_ns)};
 }
 
 std::vector<WallSpan> recorded_spans(const std::vector<SegmentInfo>& segments) {
   std::vector<WallSpan> spans;
   spans.reserve(segments.size());
-  for (const SegmentInfo& segment : segments)
-    spans.push_back({s_per_ns * static_cast<double>(segment.wall_ns), end_s(segment)});
+  for (const SegmentInfo& segment : segments) spans.push_back(span_of(segment));
   return spans;
 }
 
-/// Merges spans separated by time without a daemon, or by time skipped when the clock was set.
+/// In order; overlapping and contiguous ones are merged.
 std::vector<WallSpan> merged(std::vector<WallSpan> spans) {
   std::sort(spans.begin(), spans.end(),
             [](const WallSpan& a, const WallSpan& b) { return a.from_s < b.from_s; });
@@ -57,57 +59,34 @@ const std::vector<double>* column_of(const ThinnedHistory& course, const std::st
   return nullptr;
 }
 
-/// Setup in force at a given time: that of the last segment that began before it.
-class Setups {
- public:
-  Setups(const HistoryReader& reader, const SetupParser& parser, std::vector<HistoryDamage>& damage)
-      : segments_(reader.segments()) {
-    for (const SegmentInfo& segment : segments_) {
-      if (setups_.contains(segment.setup)) continue;
-      try {
-        setups_.emplace(segment.setup, parser(reader.setup(segment)));
-      } catch (const std::exception& error) {
-        damage.push_back({segment.id, error.what()});
-      }
-    }
+/// Usable setup in force at a given time: that of the last segment that began before it.
+const ReplaySetup* in_force(double moment_s, const std::vector<SegmentInfo>& segments,
+                            const ParsedSetups& setups) {
+  const ReplaySetup* setup = nullptr;
+  for (const SegmentInfo& segment : segments) {
+    if (span_of(segment).from_s > moment_s && setup != nullptr) break;
+    if (const ReplaySetup* found = setups.find(segment)) setup = found;
   }
+  return setup;
+}
 
-  [[nodiscard]] const ReplaySetup* of(const SegmentInfo& segment) const {
-    const auto found = setups_.find(segment.setup);
-    return found == setups_.end() ? nullptr : &found->second;
-  }
-
-  [[nodiscard]] const ReplaySetup* at(double moment_s) const {
-    const ReplaySetup* setup = nullptr;
-    for (const SegmentInfo& segment : segments_) {
-      if (s_per_ns * static_cast<double>(segment.wall_ns) > moment_s && setup != nullptr) break;
-      if (const ReplaySetup* found = of(segment)) setup = found;
-    }
-    return setup;
-  }
-
- private:
-  const std::vector<SegmentInfo>& segments_;
-  std::map<std::int64_t, ReplaySetup> setups_;
-};
-
-/// Spans of segments with such a setup; contiguous segments are merged.
-std::vector<WallSpan> spans_of(const std::vector<SegmentInfo>& segments, const Setups& setups,
+/// Spans of segments with such a setup.
+std::vector<WallSpan> spans_of(const std::vector<SegmentInfo>& segments, const ParsedSetups& setups,
                                const std::function<bool(const ReplaySetup&)>& is_such,
                                const WallSpan& span) {
   std::vector<WallSpan> spans;
   for (const SegmentInfo& segment : segments) {
-    const ReplaySetup* setup = setups.of(segment);
-    if (setup == nullptr || !is_such(*setup)) continue;
-    const WallSpan one =
-        WallSpan{s_per_ns * static_cast<double>(segment.wall_ns), end_s(segment)}.within(span);
-    if (!(one.length_s() > 0.0)) continue;
-    if (!spans.empty() && std::abs(one.from_s - spans.back().to_s) < apart_s)
-      spans.back().to_s = one.to_s;
-    else
-      spans.push_back(one);
+    const ReplaySetup* setup = setups.find(segment);
+    const WallSpan one = span_of(segment).within(span);
+    if (setup != nullptr && is_such(*setup) && one.length_s() > 0.0) spans.push_back(one);
   }
-  return spans;
+  return merged(std::move(spans));
+}
+
+const AxisConfig* axis_named(const ReplaySetup& setup, const std::string& name) {
+  for (const AxisConfig& axis : setup.estimator.axes)
+    if (axis.name == name) return &axis;
+  return nullptr;
 }
 
 /// Adds the spells while something was recorded, with `zero_model` where it applies.
@@ -131,11 +110,8 @@ void add_modes(MachineWeek& week, const std::vector<ModeSpell>& spells,
 
 /// Blanks the offsets during a proving move, which compensates nothing.
 void leave_out(const RecordedEvent& prove, const ReplaySetup& setup, ThinnedHistory& course) {
-  const auto& axes = setup.estimator.axes;
-  const auto axis = std::find_if(axes.begin(), axes.end(), [&](const AxisConfig& each) {
-    return each.name == prove.subject.name;
-  });
-  if (axis == axes.end() || course.time_s.size() < 2) return;
+  const AxisConfig* axis = axis_named(setup, prove.subject.name);
+  if (axis == nullptr || course.time_s.size() < 2) return;
   const double half_s = 0.5 * (course.time_s[1] - course.time_s[0]);
   const double moves_s = 2.0 * std::abs(prove.value) / axis->limiter.rate_um_per_s_max +
                          setup.estimator.compensation.prove_hold_s;
@@ -143,7 +119,7 @@ void leave_out(const RecordedEvent& prove, const ReplaySetup& setup, ThinnedHist
     for (std::size_t i = 0; i < column.values.size(); ++i)
       if (column.name == axis->name + "_offset_um" && course.time_s[i] > prove.wall_s - half_s &&
           course.time_s[i] < prove.wall_s + moves_s + half_s)
-        column.values[i] = std::nan("");
+        column.values[i] = not_a_number;
 }
 
 /// Range over the points with the given place.
@@ -186,17 +162,15 @@ double offset_at(const std::filesystem::path& history, double moment_s, const st
   const ThinnedHistory there = thin_history(history, moment_s - probing_half_s,
                                             moment_s + probing_half_s, 1, ThinningLimits{}, parser);
   const auto* offsets = column_of(there, axis + "_offset_um");
-  return offsets == nullptr || offsets->empty() ? std::nan("") : offsets->front();
+  return offsets == nullptr || offsets->empty() ? not_a_number : offsets->front();
 }
 
 ProbingWeek probing_of(const std::filesystem::path& history, const ReplaySetup& setup,
                        double moment_s, const std::string& axis, double value_um,
                        const SetupParser& parser) {
-  ProbingWeek probing{moment_s, axis, std::nan(""), value_um, setup.dry_run};
-  const auto& axes = setup.estimator.axes;
-  const auto of = std::find_if(axes.begin(), axes.end(),
-                               [&](const AxisConfig& one) { return one.name == axis; });
-  if (of == axes.end()) return probing;
+  ProbingWeek probing{moment_s, axis, not_a_number, value_um, setup.dry_run};
+  const AxisConfig* of = axis_named(setup, axis);
+  if (of == nullptr) return probing;
   probing.offset_um = offset_at(history, moment_s, axis, parser);
   // A total measured value (always total in a dry run) includes the compensated displacement.
   if (setup.estimator.correction.measured == MeasuredMeaning::total || setup.dry_run)
@@ -204,71 +178,56 @@ ProbingWeek probing_of(const std::filesystem::path& history, const ReplaySetup& 
   return probing;
 }
 
+/// The rows in which every column has a value, less the columns' means; none if they are too few
+/// for a correlation or drift.
+Eigen::MatrixXd centred(std::initializer_list<const std::vector<double>*> columns) {
+  const std::size_t rows = (*columns.begin())->size();
+  Eigen::MatrixXd table(rows, columns.size());
+  Eigen::Index kept = 0;
+  for (std::size_t row = 0; row < rows; ++row) {
+    Eigen::Index column = 0;
+    for (const std::vector<double>* values : columns) table(kept, column++) = (*values)[row];
+    if (table.row(kept).allFinite()) ++kept;
+  }
+  constexpr Eigen::Index rows_min = 30;
+  if (kept < rows_min) return {};
+  table.conservativeResize(kept, Eigen::NoChange);
+  const Eigen::RowVectorXd mean = table.colwise().mean();
+  return table.rowwise() - mean;
+}
+
 struct Line {
   double slope{0.0};
-  double slope_sd{0.0};
+  double slope_sd{not_a_number};
 };
 
 /// Drift of sensor minus neighbour over the whole stretch: least squares on constant, neighbour and
 /// time. The standard error counts six hours as one independent sample.
 Line drift_of(const std::vector<double>& time_s, const std::vector<double>& sensor,
               const std::vector<double>& neighbour) {
-  double sums[3][4] = {};
-  double count = 0.0;
-  double mean_n = 0.0;
-  double mean_t = 0.0;
-  for (std::size_t i = 0; i < time_s.size(); ++i) {
-    if (!std::isfinite(sensor[i] + neighbour[i])) continue;
-    mean_n += neighbour[i];
-    mean_t += time_s[i];
-    count += 1.0;
-  }
-  if (count < 30.0) return {0.0, std::nan("")};
-  mean_n /= count;
-  mean_t /= count;
+  const Eigen::MatrixXd rows = centred({&neighbour, &time_s, &sensor});
+  if (rows.rows() == 0) return {};
   const double length_s = time_s.back() - time_s.front();
-  std::vector<std::array<double, 4>> rows;
-  for (std::size_t i = 0; i < time_s.size(); ++i) {
-    if (!std::isfinite(sensor[i] + neighbour[i])) continue;
-    rows.push_back(
-        {1.0, neighbour[i] - mean_n, (time_s[i] - mean_t) / length_s, sensor[i] - neighbour[i]});
-    for (std::size_t a = 0; a < 3; ++a)
-      for (std::size_t b = 0; b < 4; ++b) sums[a][b] += rows.back()[a] * rows.back()[b];
-  }
-  // Neighbour and time are centred, so the constant decouples.
-  const double determinant = sums[1][1] * sums[2][2] - sums[1][2] * sums[1][2];
-  if (!(determinant > 1e-9 * sums[1][1] * sums[2][2])) return {0.0, std::nan("")};
-  const double gain = (sums[1][3] * sums[2][2] - sums[2][3] * sums[1][2]) / determinant;
-  const double slope = (sums[2][3] * sums[1][1] - sums[1][3] * sums[1][2]) / determinant;
-  const double constant = sums[0][3] / count;
-  double squares = 0.0;
-  for (const auto& row : rows)
-    squares += std::pow(row[3] - constant - gain * row[1] - slope * row[2], 2);
+  Eigen::MatrixX2d design = rows.leftCols<2>();
+  design.col(1) /= length_s;
+  const Eigen::VectorXd difference = rows.col(2) - rows.col(0);
+  const Eigen::Matrix2d normal = design.transpose() * design;
+  if (!(normal.determinant() > 1e-9 * normal(0, 0) * normal(1, 1))) return {};
+  const Eigen::Matrix2d inverse = normal.inverse();
+  const Eigen::Vector2d fit = inverse * (design.transpose() * difference);
   constexpr double independent_s = 6.0 * 3600.0;
   const double independent = std::max(1.0, length_s / independent_s);
-  const double variance = squares / count;
-  return {slope, std::sqrt(variance * count / independent * sums[1][1] / determinant)};
+  const double squares = (difference - design * fit).squaredNorm();
+  return {fit(1), std::sqrt(squares / independent * inverse(1, 1))};
 }
 
 double correlation(const std::vector<double>& a, const std::vector<double>& b) {
-  double n = 0.0;
-  double sums[5] = {};
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    if (!std::isfinite(a[i] + b[i])) continue;
-    const double x = a[i] - 20.0;
-    const double y = b[i] - 20.0;
-    n += 1.0;
-    sums[0] += x;
-    sums[1] += y;
-    sums[2] += x * x;
-    sums[3] += y * y;
-    sums[4] += x * y;
-  }
-  if (n < 30.0) return 0.0;
-  const double xx = sums[2] / n - sums[0] * sums[0] / n / n;
-  const double yy = sums[3] / n - sums[1] * sums[1] / n / n;
-  const double xy = sums[4] / n - sums[0] * sums[1] / n / n;
-  return xx > 0.0 && yy > 0.0 ? xy / std::sqrt(xx * yy) : 0.0;
+  const Eigen::MatrixXd rows = centred({&a, &b});
+  if (rows.rows() == 0) return 0.0;
+  constexpr double still_K2 = 1e-12;  // of a constant, what rounding leaves
+  const double norms = rows.col(0).norm() * rows.col(1).norm();
+  const bool both_vary = norms > still_K2 * static_cast<double>(rows.rows());
+  return both_vary ? rows.col(0).dot(rows.col(1)) / norms : 0.0;
 }
 
 std::size_t recorded_points(const ThinnedHistory& course) {
@@ -283,10 +242,6 @@ std::size_t recorded_points(const ThinnedHistory& course) {
 }
 
 }  // namespace
-
-WallSpan WallSpan::within(const WallSpan& other) const noexcept {
-  return {std::max(from_s, other.from_s), std::min(to_s, other.to_s)};
-}
 
 double MachineWeek::dry_run_s() const {
   double sum = 0.0;
@@ -366,25 +321,20 @@ std::vector<Outages> outages_of(const WeekEvents& events, const WallSpan& span) 
     const auto end = events.run_ends_s.find(list[i].run);
     double until_s = end == events.run_ends_s.end() ? span.to_s : end->second;
     bool ended = false;
-    for (std::size_t j = i + 1; j < list.size(); ++j) {
-      if (list[j].run != list[i].run) break;
-      if (list[j].subject != list[i].subject) continue;
-      until_s = list[j].wall_s;  // recovery or next fault of the subject
-      ended = true;
-      break;
+    for (std::size_t j = i + 1; j < list.size() && list[j].run == list[i].run && !ended; ++j) {
+      ended = list[j].subject == list[i].subject;
+      if (ended) until_s = list[j].wall_s;  // recovery or next fault of the subject
     }
     const WallSpan within = WallSpan{list[i].wall_s, until_s}.within(span);
     if (!(within.to_s >= within.from_s)) continue;
     Outages& outages = found[list[i].subject];
     outages.subject = list[i].subject;
     outages.last = list[i];
-    ++outages.count;
-    outages.lasted_s += within.length_s();
-    outages.lasts = !ended && until_s >= span.to_s - 1.0;
-    Outages::Kind& kind = outages.kinds[list[i].code];
-    ++kind.count;
-    kind.lasted_s += within.length_s();
-    kind.lasts = outages.lasts;
+    for (OutageTimes* times : {static_cast<OutageTimes*>(&outages), &outages.kinds[list[i].code]}) {
+      ++times->count;
+      times->lasted_s += within.length_s();
+      times->lasts = !ended && until_s >= span.to_s - 1.0;
+    }
   }
   std::vector<Outages> sorted;
   sorted.reserve(found.size());
@@ -466,23 +416,27 @@ MachineWeek machine_week(const std::filesystem::path& history, const WallSpan& s
   week.span = span;
   week.damage = reader.damage();
   WeekEvents events{read_events(history), {}};
+  const ParsedSetups setups(reader, parser);
   for (const SegmentInfo& segment : reader.segments()) {
-    events.run_ends_s[segment.run] = end_s(segment);  // end of its last segment
+    events.run_ends_s[segment.run] = span_of(segment).to_s;  // end of its last segment
+    if (const auto failure = setups.failures().find(segment.setup);
+        failure != setups.failures().end())
+      week.damage.push_back({segment.id, failure->second});
   }
+  const auto setup_at = [&](double moment_s) {
+    return in_force(moment_s, reader.segments(), setups);
+  };
   const auto points = static_cast<std::size_t>(
       std::clamp(span.length_s() / point_s_min, 60.0, static_cast<double>(points_max)));
   week.course = thin_history(history, span.from_s, span.to_s, points, ThinningLimits{}, parser);
   week.modes = daemon_pauses(events, recorded_spans(reader.segments()), span);
   week.recorded_s = span.length_s();
   for (const ModeSpell& pause : week.modes) week.recorded_s -= pause.span.length_s();
-  const Setups setups(reader, parser, week.damage);
+  const auto has_zero_model = [](const ReplaySetup& setup) {
+    return !has_gain(setup.model) && !setup.estimator.correction.learns_bias();
+  };
   add_modes(week, mode_spells(events, span), merged(recorded_spans(reader.segments())),
-            merged(spans_of(
-                reader.segments(), setups,
-                [](const ReplaySetup& setup) {
-                  return !has_gain(setup.model) && !setup.estimator.correction.learns_bias();
-                },
-                span)));
+            spans_of(reader.segments(), setups, has_zero_model, span));
   week.outages = outages_of(events, span);
   week.sensors = sensors_of(week.course);
   const auto is_dry_run = [](const ReplaySetup& setup) { return setup.dry_run; };
@@ -490,8 +444,8 @@ MachineWeek machine_week(const std::filesystem::path& history, const WallSpan& s
   week.dry_runs = spans_of(reader.segments(), setups, is_dry_run, span);
   for (const RecordedEvent& event : events.events)
     if (event.kind == EventKind::command && event.code == to_string(CommandKind::prove))
-      if (const ReplaySetup* setup = setups.at(event.wall_s)) leave_out(event, *setup, week.course);
-  if (const ReplaySetup* setup = setups.at(span.to_s)) {
+      if (const ReplaySetup* setup = setup_at(event.wall_s)) leave_out(event, *setup, week.course);
+  if (const ReplaySetup* setup = setup_at(span.to_s)) {
     week.dry_run = setup->dry_run;
     const std::vector<PointPlace> places = places_of(week.course, week.sent, week.dry_runs);
     for (const AxisConfig& axis : setup->estimator.axes)
@@ -503,7 +457,7 @@ MachineWeek machine_week(const std::filesystem::path& history, const WallSpan& s
     if (event.kind == EventKind::daemon && event.code == "started") ++week.starts;
     if (event.kind != EventKind::command) continue;
     week.commands.push_back(event);
-    const ReplaySetup* setup = setups.at(event.wall_s);
+    const ReplaySetup* setup = setup_at(event.wall_s);
     if (event.candidate) {
       week.candidate = event.candidate;
       scored = setup;
@@ -513,7 +467,7 @@ MachineWeek machine_week(const std::filesystem::path& history, const WallSpan& s
           probing_of(history, *setup, event.wall_s, event.subject.name, event.value, parser));
   }
   // The score of a model other than the present one, as before a promotion, is outdated.
-  const ReplaySetup* last = setups.at(span.to_s);
+  const ReplaySetup* last = setup_at(span.to_s);
   if (scored != nullptr && last != nullptr && !predict_the_same(scored->model, last->model))
     week.candidate.reset();
   return week;

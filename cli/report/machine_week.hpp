@@ -1,10 +1,10 @@
 /// Summary of a period of a machine's history, for its owner.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -13,6 +13,7 @@
 #include "daemon/history/reading/history_reader.hpp"
 #include "daemon/history/replay/segment_walk.hpp"
 #include "daemon/history/replay/thinned_history.hpp"
+#include "estimator/types.hpp"
 
 namespace thermocomp::cli {
 
@@ -24,7 +25,9 @@ struct WallSpan {
   [[nodiscard]] bool overlaps(const WallSpan& other) const noexcept {
     return from_s < other.to_s && other.from_s < to_s;
   }
-  [[nodiscard]] WallSpan within(const WallSpan& other) const noexcept;
+  [[nodiscard]] WallSpan within(const WallSpan& other) const noexcept {
+    return {std::max(from_s, other.from_s), std::min(to_s, other.to_s)};
+  }
 };
 
 /// Replaces a mode while nothing was recorded: the daemon was stopped, ended without a stop, or ran
@@ -40,28 +43,23 @@ struct ModeSpell {
   std::string mode;  ///< "compensating", "holding", ..., or one of the above
 };
 
-/// Faults of one subject.
-struct Outages {
-  struct Kind {
-    std::size_t count{0};
-    double lasted_s{0.0};
-    bool lasts{false};
-    bool operator==(const Kind&) const = default;
-  };
-  Subject subject;
-  Event last;
+struct OutageTimes {
   std::size_t count{0};
   double lasted_s{0.0};
-  bool lasts{false};                  ///< at the end of the period
-  std::map<std::string, Kind> kinds;  ///< by fault code
+  bool lasts{false};  ///< at the end of the period
+};
+/// Faults of one subject.
+struct Outages : OutageTimes {
+  Subject subject;
+  Event last;
+  std::map<std::string, OutageTimes> kinds;  ///< by fault code
 };
 
 struct OffsetRange {
-  double low_um{std::numeric_limits<double>::quiet_NaN()};
-  double high_um{std::numeric_limits<double>::quiet_NaN()};
-  double mean_size_um{std::numeric_limits<double>::quiet_NaN()};  ///< of |offset|
-  double at_bound_share{0.0};                                     ///< share of the time with an
-                                                                  ///< offset
+  double low_um{not_a_number};
+  double high_um{not_a_number};
+  double mean_size_um{not_a_number};  ///< of |offset|
+  double at_bound_share{0.0};         ///< share of the time with an offset
   [[nodiscard]] bool is_there() const noexcept { return low_um <= high_um; }
 };
 
@@ -76,21 +74,20 @@ struct AxisWeek {
 struct ProbingWeek {
   double wall_s{0.0};
   std::string axis;
-  double offset_um{std::numeric_limits<double>::quiet_NaN()};  ///< as sent
-  double left_um{std::numeric_limits<double>::quiet_NaN()};    ///< remaining displacement at the
-                                                               ///< tool
-  bool dry_run{false};  ///< not sent: both values are hypothetical
+  double offset_um{not_a_number};  ///< as sent
+  double left_um{not_a_number};    ///< remaining displacement at the tool
+  bool dry_run{false};             ///< not sent: both values are hypothetical
 };
 
 /// A sensor and its most strongly correlated neighbour.
 struct SensorWeek {
   std::string name;
   std::string neighbour;  ///< empty: correlation at most 0.8 with all
-  double low_degC{std::numeric_limits<double>::quiet_NaN()};
-  double high_degC{std::numeric_limits<double>::quiet_NaN()};
-  double missing_share{0.0};                                    ///< share of the recorded time
-  double drift_K{std::numeric_limits<double>::quiet_NaN()};     ///< against the neighbour
-  double drift_sd_K{std::numeric_limits<double>::quiet_NaN()};  ///< standard error of drift_K
+  double low_degC{not_a_number};
+  double high_degC{not_a_number};
+  double missing_share{0.0};        ///< share of the recorded time
+  double drift_K{not_a_number};     ///< against the neighbour
+  double drift_sd_K{not_a_number};  ///< standard error of drift_K
 };
 
 struct MachineWeek {

@@ -39,11 +39,11 @@ double rms_left_um(const MachineWeek& week, const std::string& axis, double& cla
   return std::sqrt(squares / n);
 }
 
-bool is_listed(const Outages::Kind& kind) {
+bool is_listed(const OutageTimes& kind) {
   return kind.lasted_s >= outage_listed_s || kind.lasts || kind.count >= 5;
 }
 
-std::string how_often(const Outages::Kind& kind) {
+std::string how_often(const OutageTimes& kind) {
   return std::to_string(kind.count) + (kind.count == 1 ? " time, " : " times, ") +
          duration_text(kind.lasted_s) + " in all" + (kind.lasts ? ", and still" : "") + ".";
 }
@@ -59,8 +59,7 @@ std::string what_to_do(const CodeText& text) {
 
 bool any_listed(const MachineWeek& week, SubjectKind subject) {
   return std::any_of(week.outages.begin(), week.outages.end(), [subject](const Outages& outages) {
-    return outages.subject.kind == subject &&
-           is_listed({outages.count, outages.lasted_s, outages.lasts});
+    return outages.subject.kind == subject && is_listed(outages);
   });
 }
 
@@ -87,10 +86,9 @@ void add_reasons(const MachineWeek& week, std::vector<std::string>& lines) {
     const auto reason = reason_named(outages.last.code);
     if (outages.subject.kind != SubjectKind::reason || !reason) continue;
     if (is_listed_by_its_cause(week, *reason)) continue;
-    const Outages::Kind all{outages.count, outages.lasted_s, outages.lasts};
     const CodeText text = code_text(*reason);
-    if (is_listed(all))
-      lines.push_back(as_a_sentence(std::string(text.meaning)) + ", " + how_often(all) +
+    if (is_listed(outages))
+      lines.push_back(as_a_sentence(std::string(text.meaning)) + ", " + how_often(outages) +
                       what_to_do(text));
   }
 }
@@ -99,10 +97,9 @@ void add_devices(const MachineWeek& week, std::initializer_list<SubjectKind> kin
                  const char* what_to_do, std::vector<std::string>& lines) {
   for (const Outages& outages : week.outages) {
     if (std::find(kinds.begin(), kinds.end(), outages.subject.kind) == kinds.end()) continue;
-    const Outages::Kind all{outages.count, outages.lasted_s, outages.lasts};
-    if (is_listed(all))
+    if (is_listed(outages))
       lines.push_back(as_a_sentence(subject_text(outages.subject)) + ": " +
-                      what_text(outages.last) + ", " + how_often(all) + what_to_do);
+                      what_text(outages.last) + ", " + how_often(outages) + what_to_do);
   }
 }
 
@@ -111,7 +108,7 @@ void add_devices(const MachineWeek& week, std::initializer_list<SubjectKind> kin
 void add_sensor_faults(const MachineWeek& week, std::vector<std::string>& lines) {
   struct Group {
     std::string code;
-    Outages::Kind kind;
+    OutageTimes kind;
     std::vector<std::string> sensors;
   };
   std::vector<Group> groups;
@@ -133,11 +130,10 @@ void add_sensor_faults(const MachineWeek& week, std::vector<std::string>& lines)
     return a.kind.lasted_s > b.kind.lasted_s;
   });
   for (const Group& group : groups) {
-    std::string names;
-    for (const std::string& name : group.sensors) names += (names.empty() ? "" : ", ") + name;
     const CodeText text = code_text(fault_named(group.code).value_or(Fault::device_error));
-    lines.push_back((group.sensors.size() == 1 ? "Sensor " : "Sensors ") + names + ": " +
-                    std::string(text.meaning) + ", " + how_often(group.kind) + what_to_do(text));
+    lines.push_back((group.sensors.size() == 1 ? "Sensor " : "Sensors ") + joined(group.sensors) +
+                    ": " + std::string(text.meaning) + ", " + how_often(group.kind) +
+                    what_to_do(text));
   }
 }
 
@@ -146,9 +142,8 @@ void add_suspicions(const MachineWeek& week, std::vector<std::string>& lines) {
     if (outages.subject.kind != SubjectKind::suspected_sensor) continue;
     lines.push_back(
         "Sensor " + outages.subject.name + " is suspected: " + what_text(outages.last) + ", " +
-        std::to_string(outages.count) + (outages.count == 1 ? " time, " : " times, ") +
-        duration_text(outages.lasted_s) + " in all" + (outages.lasts ? ", and still" : "") +
-        ". Do: check its contact, its place and its wiring; compare it with a thermometer. If the "
+        how_often(outages) +
+        " Do: check its contact, its place and its wiring; compare it with a thermometer. If the "
         "reading is correct, take a new reference: thermocomp reference.");
   }
 }

@@ -211,7 +211,7 @@ std::vector<double> only(const std::vector<double>& values, const std::vector<Po
                          PointPlace place) {
   std::vector<double> kept = values;
   for (std::size_t i = 0; i < kept.size(); ++i)
-    if (places[i] != place) kept[i] = std::nan("");
+    if (places[i] != place) kept[i] = not_a_number;
   return kept;
 }
 

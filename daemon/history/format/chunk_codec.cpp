@@ -43,18 +43,17 @@ std::int64_t plus(std::int64_t a, std::int64_t b) {
   return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) + static_cast<std::uint64_t>(b));
 }
 
-nanoseconds time_from(std::uint64_t written) {
-  const std::int64_t time_ns = unzigzag(written);
-  if (!is_grid_time(time_ns)) throw HistoryError("damaged: an impossible time");
+}  // namespace
+
+nanoseconds grid_time_from(std::int64_t time_ns) {
+  require_sound(time_ns >= 0 && time_ns <= (std::int64_t{1} << 61), "an impossible time");
   return nanoseconds(time_ns);
 }
 
 Fault fault_from(std::uint8_t code) {
-  if (code >= faults_count) throw HistoryError("damaged: unknown fault");
+  require_sound(code < faults_count, "unknown fault");
   return static_cast<Fault>(code);
 }
-
-}  // namespace
 
 std::uint64_t* RecordPrediction::value_bits(RecordKind kind, std::uint32_t index) {
   if (index >= indices_max) return nullptr;
@@ -154,10 +153,10 @@ void decode_inputs(std::span<const std::byte> bytes, std::vector<Reading>& readi
   readings.assign(count, Reading{});
   for (Reading& reading : readings) {
     reading.temp_degC = reader.f64();
-    reading.taken_at = time_from(reader.varint());
+    reading.taken_at = grid_time_from(unzigzag(reader.varint()));
     reading.fault = fault_from(reader.u8());
   }
-  controller.taken_at = time_from(reader.varint());
+  controller.taken_at = grid_time_from(unzigzag(reader.varint()));
   controller.link_epoch = static_cast<std::uint32_t>(reader.varint());
   set_link_bits(reader.u8(), controller);
   for (double& value : controller.applied_um) value = reader.f64();

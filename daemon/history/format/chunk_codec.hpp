@@ -128,10 +128,11 @@ class ChunkDecoder {
   std::uint64_t left_;
 };
 
-/// True if a time on the daemon's grid is plausible: not before system start, nor centuries later.
-[[nodiscard]] constexpr bool is_grid_time(std::int64_t time_ns) noexcept {
-  return time_ns >= 0 && time_ns <= (std::int64_t{1} << 61);
-}
+/// A time on the daemon's grid.
+/// @throws HistoryError when it is before system start, or centuries later
+[[nodiscard]] nanoseconds grid_time_from(std::int64_t time_ns);
+/// @throws HistoryError
+[[nodiscard]] Fault fault_from(std::uint8_t code);
 
 /// Appends a checksum: loading the estimator's state relies on its counts and indices, so bytes
 /// changed on disk must be refused.

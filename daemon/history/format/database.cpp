@@ -1,7 +1,7 @@
 #include "daemon/history/format/database.hpp"
 
 #include <bit>
-#include <cstring>
+#include <fmt/format.h>
 #include <stdexcept>
 #include <string>
 
@@ -17,17 +17,9 @@ namespace {
 /// write-ahead log's shared-memory file. Without a log there is no writer either.
 std::string immutable_uri(const std::filesystem::path& file) {
   std::string uri = "file:";
-  for (const char c : std::filesystem::absolute(file).string()) {
-    if (c == '?' || c == '#' || c == '%') {
-      constexpr char digits[] = "0123456789ABCDEF";
-      const auto code = static_cast<unsigned char>(c);
-      uri += '%';
-      uri += digits[code >> 4];
-      uri += digits[code & 0xF];
-    } else {
-      uri += c;
-    }
-  }
+  for (const char c : std::filesystem::absolute(file).string())
+    uri += c == '?' || c == '#' || c == '%' ? fmt::format("%{:02X}", static_cast<int>(c))
+                                            : std::string(1, c);
   return uri + "?immutable=1";
 }
 
@@ -66,6 +58,26 @@ bool can_read(sqlite3* handle) {
   return sqlite3_exec(handle, "SELECT count(*) FROM sqlite_master", nullptr, nullptr, nullptr) ==
          SQLITE_OK;
 }
+
+/// FNV-1a, 64 bits, as SQLite's signed integer. Source: draft-eastlake-fnv, section 2.
+class RowChecksum {
+ public:
+  RowChecksum& add(std::int64_t value) noexcept {
+    auto bits = static_cast<std::uint64_t>(value);
+    for (int i = 0; i < 8; ++i, bits >>= 8) hash_ = (hash_ ^ (bits & 0xFFu)) * 0x100000001b3u;
+    return *this;
+  }
+  /// Includes the length.
+  RowChecksum& add(std::span<const std::byte> bytes) noexcept {
+    add(static_cast<std::int64_t>(bytes.size()));
+    hash_ = fnv_1a(bytes, hash_);
+    return *this;
+  }
+  [[nodiscard]] std::int64_t value() const noexcept { return std::bit_cast<std::int64_t>(hash_); }
+
+ private:
+  std::uint64_t hash_{0xcbf29ce484222325u};
+};
 
 }  // namespace
 
@@ -110,11 +122,6 @@ void Database::run(const char* sql) {
   if (code != SQLITE_OK) fail(code);
 }
 
-std::int64_t Database::number(const char* sql) {
-  Statement statement(*this, sql);
-  return statement.step() ? statement.number(0) : 0;
-}
-
 bool is_without_tables(Database& database) {
   return database.number("SELECT count(*) FROM sqlite_master") == 0;
 }
@@ -152,32 +159,29 @@ void require_history(Database& database) {
   }
 }
 
-Statement::Statement(Database& database, const char* sql) : database_(database) {
-  const int code = sqlite3_prepare_v2(database.handle(), sql, -1, &handle_, nullptr);
-  if (code != SQLITE_OK) database.fail(code);
+void Statement::prepare(const char* sql) {
+  const int code = sqlite3_prepare_v2(database_.handle(), sql, -1, &handle_, nullptr);
+  if (code != SQLITE_OK) database_.fail(code);
 }
 
 Statement::~Statement() {
   sqlite3_finalize(handle_);
 }
 
-Statement& Statement::bind(std::int64_t value) {
+void Statement::bind(std::int64_t value) {
   sqlite3_bind_int64(handle_, ++bound_, value);
-  return *this;
 }
 
-Statement& Statement::bind(std::string_view value) {
+void Statement::bind(std::string_view value) {
   sqlite3_bind_text(handle_, ++bound_, value.data(), static_cast<int>(value.size()),
                     SQLITE_TRANSIENT);
-  return *this;
 }
 
-Statement& Statement::bind(std::span<const std::byte> value) {
+void Statement::bind(std::span<const std::byte> value) {
   // An empty span may have a null pointer, which SQLite would store as NULL.
   sqlite3_bind_blob64(handle_, ++bound_,
                       value.empty() ? "" : static_cast<const void*>(value.data()), value.size(),
                       SQLITE_TRANSIENT);
-  return *this;
 }
 
 bool Statement::step() {
@@ -187,67 +191,35 @@ bool Statement::step() {
   return false;
 }
 
-void Statement::run() {
-  step();
-  sqlite3_reset(handle_);
-  bound_ = 0;
-}
-
 std::int64_t Statement::number(int column) const {
   return sqlite3_column_int64(handle_, column);
 }
 
 std::string Statement::text(int column) const {
-  const auto size = static_cast<std::size_t>(sqlite3_column_bytes(handle_, column));
-  const void* bytes = sqlite3_column_blob(handle_, column);
-  std::string text(size, '\0');
-  if (size > 0) std::memcpy(text.data(), bytes, size);
-  return text;
+  const auto* text = static_cast<const char*>(sqlite3_column_blob(handle_, column));
+  return {text, static_cast<std::size_t>(sqlite3_column_bytes(handle_, column))};
 }
 
 std::vector<std::byte> Statement::blob(int column) const {
-  const auto size = static_cast<std::size_t>(sqlite3_column_bytes(handle_, column));
-  const void* bytes = sqlite3_column_blob(handle_, column);
-  std::vector<std::byte> blob(size);
-  if (size > 0) std::memcpy(blob.data(), bytes, size);
-  return blob;
+  const auto* bytes = static_cast<const std::byte*>(sqlite3_column_blob(handle_, column));
+  return {bytes, bytes + sqlite3_column_bytes(handle_, column)};
 }
 
-RowChecksum& RowChecksum::add(std::int64_t value) noexcept {
-  auto bits = static_cast<std::uint64_t>(value);
-  for (int i = 0; i < 8; ++i, bits >>= 8) hash_ = (hash_ ^ (bits & 0xFFu)) * 0x100000001b3u;
-  return *this;
-}
-
-RowChecksum& RowChecksum::add(std::span<const std::byte> bytes) noexcept {
-  add(static_cast<std::int64_t>(bytes.size()));
-  hash_ = fnv_1a(bytes, hash_);
-  return *this;
-}
-
-RowChecksum& RowChecksum::add(std::string_view text) noexcept {
-  return add(std::as_bytes(std::span(text)));
-}
-
-std::int64_t RowChecksum::value() const noexcept {
-  return std::bit_cast<std::int64_t>(hash_);
-}
-
-std::int64_t checksum_of(const ChunkNumbers& numbers, std::span<const std::byte> records) noexcept {
+std::int64_t checksum_of(const ChunkContent& chunk) noexcept {
   RowChecksum checksum;
-  checksum.add(numbers.number).add(numbers.count).add(numbers.through_cycle);
-  return checksum.add(numbers.wall_minus_grid_ns).add(records).value();
+  checksum.add(chunk.number).add(chunk.count).add(chunk.through_cycle);
+  return checksum.add(chunk.wall_minus_grid_ns).add(chunk.records).value();
 }
 
 std::optional<ChunkContent> read_chunk(Database& database, std::int64_t segment,
                                        std::int64_t number) {
   Statement row(database,
                 "SELECT records, count, through_cycle, wall_minus_grid_ns, checksum IS NULL,"
-                " checksum FROM chunk WHERE segment = ? AND number = ?");
-  row.bind(segment).bind(number);
+                " checksum FROM chunk WHERE segment = ? AND number = ?",
+                segment, number);
   if (!row.step()) return std::nullopt;
-  ChunkContent chunk{{number, row.number(1), row.number(2), row.number(3)}, row.blob(0)};
-  if (row.number(4) == 0 && row.number(5) != checksum_of(chunk.numbers, chunk.records))
+  ChunkContent chunk{number, row.number(1), row.number(2), row.number(3), row.blob(0)};
+  if (row.number(4) == 0 && row.number(5) != checksum_of(chunk))
     throw HistoryError("chunk " + std::to_string(number) + " does not fit its checksum");
   return chunk;
 }
@@ -257,22 +229,18 @@ std::int64_t segment_checksum(Database& database, std::int64_t segment) {
                 "SELECT run, reason, grid_start_ns, period_ns, first_cycle, wall_ns,"
                 " program_version, inputs, estimator_state, config_text, model_text,"
                 " model_checksum FROM segment JOIN setup ON setup.id = segment.setup"
-                " WHERE segment.id = ?");
-  row.bind(segment);
+                " WHERE segment.id = ?",
+                segment);
   if (!row.step()) throw HistoryError("the row of the segment or of its configuration is missing");
   RowChecksum checksum;
   for (int column = 0; column < 6; ++column) checksum.add(row.number(column));
-  checksum.add(std::string_view(row.text(6)));
-  for (int column = 7; column < 9; ++column) {
-    checksum.add(std::span<const std::byte>(row.blob(column)));
-  }
-  for (int column = 9; column < 12; ++column) checksum.add(std::string_view(row.text(column)));
+  for (int column = 6; column < 12; ++column) checksum.add(row.blob(column));
   return checksum.value();
 }
 
 void check_segment_row(Database& database, std::int64_t segment) {
-  Statement row(database, "SELECT checksum FROM segment WHERE id = ? AND checksum IS NOT NULL");
-  row.bind(segment);
+  Statement row(database, "SELECT checksum FROM segment WHERE id = ? AND checksum IS NOT NULL",
+                segment);
   if (row.step() && row.number(0) != segment_checksum(database, segment)) {
     throw HistoryError("the row of the segment, or its configuration, does not fit its checksum");
   }

@@ -53,8 +53,14 @@ class Database {
   Database(const Database&) = delete;
   Database& operator=(const Database&) = delete;
 
-  void run(const char* sql);                           ///< statements without a result
-  [[nodiscard]] std::int64_t number(const char* sql);  ///< first column of the first row, or 0
+  /// Statements without a result.
+  void run(const char* sql);
+  /// One statement without a result. @param values  as of Statement
+  template <class... Values>
+  void run(const char* sql, const Values&... values);
+  /// First column of the first row, or 0. @param values  as of Statement
+  template <class... Values>
+  [[nodiscard]] std::int64_t number(const char* sql, const Values&... values);
   [[nodiscard]] sqlite3* handle() const noexcept { return handle_; }
   [[nodiscard]] const std::filesystem::path& file() const noexcept { return file_; }
   [[noreturn]] void fail(int code) const;
@@ -77,54 +83,52 @@ void refuse_foreign_history(const std::filesystem::path& file);
 
 class Statement {
  public:
-  Statement(Database& database, const char* sql);
+  /// @param values  of the question marks, in their order
+  template <class... Values>
+  Statement(Database& database, const char* sql, const Values&... values) : database_(database) {
+    prepare(sql);
+    (bind(values), ...);
+  }
   ~Statement();
   Statement(const Statement&) = delete;
   Statement& operator=(const Statement&) = delete;
 
-  /// Binds values in the order of the question marks.
-  Statement& bind(std::int64_t value);
-  Statement& bind(std::string_view value);
-  Statement& bind(std::span<const std::byte> value);
   /// @return true if there is a row
   bool step();
-  /// For statements without rows: runs, then resets for the next values.
-  void run();
   [[nodiscard]] std::int64_t number(int column) const;
   [[nodiscard]] std::string text(int column) const;
   [[nodiscard]] std::vector<std::byte> blob(int column) const;
 
  private:
+  void prepare(const char* sql);
+  void bind(std::int64_t value);
+  void bind(std::string_view value);
+  void bind(std::span<const std::byte> value);
+
   Database& database_;
   sqlite3_stmt* handle_{nullptr};
   int bound_{0};
 };
 
-/// FNV-1a, 64 bits, as SQLite's signed integer. Source: draft-eastlake-fnv, section 2.
-class RowChecksum {
- public:
-  RowChecksum& add(std::int64_t value) noexcept;
-  RowChecksum& add(std::span<const std::byte> bytes) noexcept;  ///< including its length
-  RowChecksum& add(std::string_view text) noexcept;
-  [[nodiscard]] std::int64_t value() const noexcept;
+template <class... Values>
+void Database::run(const char* sql, const Values&... values) {
+  Statement(*this, sql, values...).step();
+}
 
- private:
-  std::uint64_t hash_{0xcbf29ce484222325u};
-};
-
-struct ChunkNumbers {
-  std::int64_t number{0};
-  std::int64_t count{0};
-  std::int64_t through_cycle{0};
-  std::int64_t wall_minus_grid_ns{0};
-};
-[[nodiscard]] std::int64_t checksum_of(const ChunkNumbers& numbers,
-                                       std::span<const std::byte> records) noexcept;
+template <class... Values>
+std::int64_t Database::number(const char* sql, const Values&... values) {
+  Statement statement(*this, sql, values...);
+  return statement.step() ? statement.number(0) : 0;
+}
 
 struct ChunkContent {
-  ChunkNumbers numbers;
+  std::int64_t number{0};
+  std::int64_t count{0};           ///< of records
+  std::int64_t through_cycle{-1};  ///< cycles up to this one are complete with this chunk
+  std::int64_t wall_minus_grid_ns{0};
   std::vector<std::byte> records;
 };
+[[nodiscard]] std::int64_t checksum_of(const ChunkContent& chunk) noexcept;
 /// The row's content; none: no such row. @throws HistoryError when the checksum does not match
 [[nodiscard]] std::optional<ChunkContent> read_chunk(Database& database, std::int64_t segment,
                                                      std::int64_t number);

@@ -3,8 +3,9 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <cstdio>
 #include <ctime>
+#include <fmt/chrono.h>
+#include <regex>
 #include <stdexcept>
 #include <string_view>
 #include <utility>
@@ -14,62 +15,27 @@
 namespace thermocomp {
 namespace {
 
-int digits(std::string_view text, std::size_t from, std::size_t count) {
-  int value = -1;
-  if (from + count > text.size()) return -1;
-  const char* begin = text.data() + from;
-  const auto [end, code] = std::from_chars(begin, begin + count, value);
-  return code == std::errc() && end == begin + count && text[from] != '-' ? value : -1;
-}
-
-/// "", "Z", "+hh:mm", "-hh:mm". @return false if it is none of these
-bool parse_zone(std::string_view text, bool& is_local, int& seconds_east) {
-  is_local = text.empty();
-  seconds_east = 0;
-  if (text.empty() || text == "Z") return true;
-  const int hours = digits(text, 1, 2);
-  const int minutes = digits(text, 4, 2);
-  if (text.size() != 6 || (text[0] != '+' && text[0] != '-') || text[3] != ':' || hours < 0 ||
-      hours > 14 || minutes < 0 || minutes > 59) {
-    return false;
-  }
-  seconds_east = (text[0] == '-' ? -1 : 1) * (hours * 3600 + minutes * 60);
-  return true;
-}
-
-std::optional<std::int64_t> parse_wall_ns(std::string_view text) {
+std::optional<std::int64_t> parse_wall_ns(const std::string& text) {
+  static const std::regex form(
+      R"((\d{4})-(\d\d)-(\d\d)([T ](\d\d):(\d\d)(:(\d\d))?(Z|[+-](\d\d):(\d\d))?)?)");
+  std::smatch found;
+  if (!std::regex_match(text, found, form)) return std::nullopt;
+  const auto part = [&](std::size_t i) { return found[i].matched ? std::stoi(found[i]) : 0; };
   std::tm parts{};
-  const int year = digits(text, 0, 4);
-  const int month = digits(text, 5, 2);
-  const int day = digits(text, 8, 2);
-  if (text.size() < 10 || text[4] != '-' || text[7] != '-' || year < 1970 || month < 1 ||
-      month > 12 || day < 1 || day > 31) {
-    return std::nullopt;
-  }
-  parts.tm_year = year - 1900;
-  parts.tm_mon = month - 1;
-  parts.tm_mday = day;
+  parts.tm_year = part(1) - 1900;
+  parts.tm_mon = part(2) - 1;
+  parts.tm_mday = part(3);
+  parts.tm_hour = part(5);
+  parts.tm_min = part(6);
+  parts.tm_sec = part(8);
   parts.tm_isdst = -1;
-  std::string_view zone;
-  if (text.size() > 10) {
-    const int hour = digits(text, 11, 2);
-    const int minute = digits(text, 14, 2);
-    const bool has_seconds = text.size() > 16 && text[16] == ':';
-    const int second = has_seconds ? digits(text, 17, 2) : 0;
-    if ((text[10] != 'T' && text[10] != ' ') || text.size() < 16 || text[13] != ':' || hour < 0 ||
-        hour > 23 || minute < 0 || minute > 59 || second < 0 || second > 59) {
-      return std::nullopt;
-    }
-    parts.tm_hour = hour;
-    parts.tm_min = minute;
-    parts.tm_sec = second;
-    zone = text.substr(has_seconds ? 19 : 16);
-  }
-  bool is_local = false;
-  int seconds_east = 0;
-  if (!parse_zone(zone, is_local, seconds_east)) return std::nullopt;
+  const std::string zone = found[9];
+  if (parts.tm_year < 70 || parts.tm_mon < 0 || parts.tm_mon > 11 || parts.tm_hour > 23 ||
+      parts.tm_min > 59 || parts.tm_sec > 59 || part(10) > 14 || part(11) > 59)
+    return std::nullopt;
+  const int seconds_east = (zone[0] == '-' ? -1 : 1) * (part(10) * 3600 + part(11) * 60);
   std::tm normal = parts;
-  const std::time_t seconds = is_local ? mktime(&normal) : timegm(&normal) - seconds_east;
+  const std::time_t seconds = zone.empty() ? mktime(&normal) : timegm(&normal) - seconds_east;
   if (normal.tm_mday != parts.tm_mday) return std::nullopt;  // such as 31 February
   return static_cast<std::int64_t>(seconds) * 1'000'000'000;
 }
@@ -132,18 +98,11 @@ HistoryTime parse_history_time(const std::string& text, std::chrono::nanoseconds
 }
 
 std::string utc_text(std::int64_t wall_ns) {
-  constexpr std::int64_t second_ns = 1'000'000'000;
-  std::int64_t part_ns = wall_ns % second_ns;
-  if (part_ns < 0) part_ns += second_ns;
-  const auto seconds = static_cast<std::time_t>((wall_ns - part_ns) / second_ns);
-  std::tm parts{};
-  if (gmtime_r(&seconds, &parts) == nullptr) return "unknown";
-  std::array<char, 40> text{};
-  std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%S", &parts);
-  std::array<char, 56> whole{};
-  std::snprintf(whole.data(), whole.size(), "%s.%03dZ", text.data(),
-                static_cast<int>(part_ns / 1'000'000));
-  return whole.data();
+  const std::chrono::sys_time wall{std::chrono::nanoseconds(wall_ns)};
+  const auto seconds = std::chrono::floor<std::chrono::seconds>(wall);
+  const auto part = std::chrono::floor<std::chrono::milliseconds>(wall - seconds);
+  return fmt::format("{:%Y-%m-%dT%H:%M:%S}.{:03}Z", fmt::gmtime(seconds.time_since_epoch().count()),
+                     part.count());
 }
 
 }  // namespace thermocomp

@@ -14,10 +14,15 @@ struct HistoryTime {
   std::optional<std::int64_t> wall_ns;
 };
 
+/// True if from <= time < to, as far as they are given.
 /// @param seconds  since the history's first cycle
-[[nodiscard]] inline bool is_before(double seconds, std::int64_t wall_ns,
-                                    const HistoryTime& bound) {
-  return bound.seconds ? seconds < *bound.seconds : wall_ns < *bound.wall_ns;
+[[nodiscard]] inline bool is_within(double seconds, std::int64_t wall_ns,
+                                    const std::optional<HistoryTime>& from,
+                                    const std::optional<HistoryTime>& to) {
+  const auto is_before = [&](const HistoryTime& bound) {
+    return bound.seconds ? seconds < *bound.seconds : wall_ns < *bound.wall_ns;
+  };
+  return !(from && is_before(*from)) && (!to || is_before(*to));
 }
 
 /// "12.5": seconds since the history's start. "2026-03-01T08:30:00", "2026-03-01 08:30",

@@ -91,7 +91,13 @@ std::string HistoryPlaces::add(const SegmentInfo& segment) {
   return {};
 }
 
-std::vector<SegmentInfo> sound_segments(std::vector<SegmentInfo> segments,
+double HistoryPlaces::seconds_at(const SegmentInfo& segment, std::uint64_t cycle) const {
+  const std::int64_t time_ns =
+      segment.grid.time_of(cycle).count() + grid_to_history_ns_.at(segment.run);
+  return static_cast<double>(time_ns) * 1e-9;
+}
+
+std::vector<SegmentInfo> sound_segments(std::vector<SegmentInfo> segments, HistoryPlaces& places,
                                         std::vector<HistoryDamage>& damage) {
   const std::map<std::int64_t, GridKey> grids = usual_grids(segments);
   std::erase_if(segments, [&](const SegmentInfo& segment) {
@@ -106,7 +112,6 @@ std::vector<SegmentInfo> sound_segments(std::vector<SegmentInfo> segments,
                       "its wall time is impossible (clock set wrong?); its records are used, at "
                       "the most likely time"});
   }
-  HistoryPlaces places;
   std::vector<SegmentInfo> sound;
   for (SegmentInfo& segment : segments) {
     const std::string why = places.add(segment);

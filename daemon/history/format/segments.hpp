@@ -85,28 +85,28 @@ inline constexpr std::int64_t wall_ns_max = std::int64_t{1} << 62;  ///< in the 
 /// @throws HistoryError when the segment's numbers, except its wall time, are impossible
 void check_times(const SegmentInfo& segment);
 
-/// Drops segments, with an entry in `damage`, that are on another grid than most of their run,
-/// begin before the end of the previous one, or exceed the limits above. Replaces an impossible
-/// wall time by an estimate.
-/// @param segments  by id, each passed by check_times()
-[[nodiscard]] std::vector<SegmentInfo> sound_segments(std::vector<SegmentInfo> segments,
-                                                      std::vector<HistoryDamage>& damage);
-
 /// Places segments on the history's own time axis: within a run of the daemon by the grid, between
 /// runs by the wall clock, but never backwards.
 class HistoryPlaces {
  public:
   /// @return why the segment cannot follow the previous ones; empty: it is placed
   std::string add(const SegmentInfo& segment);
-  /// Offset from the grid of `run` to the history's time. @pre a segment of the run is placed
-  [[nodiscard]] std::int64_t grid_to_history_ns(std::int64_t run) const {
-    return grid_to_history_ns_.at(run);
-  }
+  /// Since the history's first cycle. @pre a segment of the run is placed
+  [[nodiscard]] double seconds_at(const SegmentInfo& segment, std::uint64_t cycle) const;
 
  private:
-  std::map<std::int64_t, std::int64_t> grid_to_history_ns_;
+  std::map<std::int64_t, std::int64_t> grid_to_history_ns_;  ///< by run
   std::int64_t first_wall_ns_{0};
   std::int64_t end_ns_{0};  ///< of the segments so far
 };
+
+/// Drops segments, with an entry in `damage`, that are on another grid than most of their run,
+/// begin before the end of the previous one, or exceed the limits above. Replaces an impossible
+/// wall time by an estimate.
+/// @param segments  by id, each passed by check_times()
+/// @param places    gets the segments that are kept
+[[nodiscard]] std::vector<SegmentInfo> sound_segments(std::vector<SegmentInfo> segments,
+                                                      HistoryPlaces& places,
+                                                      std::vector<HistoryDamage>& damage);
 
 }  // namespace thermocomp

@@ -70,43 +70,6 @@ void note_absences(std::vector<RecordedEvent>& events, Database& database) {
   }
 }
 
-}  // namespace
-
-std::vector<RecordedEvent> read_events(const std::filesystem::path& history,
-                                       const std::optional<HistoryTime>& from,
-                                       const std::optional<HistoryTime>& to) {
-  Database database(history, DatabaseMode::read_only);
-  require_history(database);
-  const std::string query = query_of_events(database, "");
-  std::vector<RecordedEvent> events;
-  Statement rows(database, query.c_str());
-  std::optional<std::int64_t> first_ns;
-  while (rows.step()) {
-    const std::int64_t wall_ns = rows.number(2);
-    if (!first_ns) first_ns = wall_ns;
-    const double since_first_s = 1e-9 * static_cast<double>(wall_ns - *first_ns);
-    if (from && is_before(since_first_s, wall_ns, *from)) continue;
-    if (to && !is_before(since_first_s, wall_ns, *to)) continue;
-    events.push_back(event_from(rows));
-  }
-  note_absences(events, database);
-  return events;
-}
-
-std::vector<RecordedEvent> read_events_after(const std::filesystem::path& history, std::int64_t run,
-                                             std::uint64_t number, std::int64_t count) {
-  Database database(history, DatabaseMode::read_only);
-  require_history(database);
-  const std::string query = query_of_events(database, " WHERE (run, number) > (?, ?)") + " LIMIT ?";
-  Statement rows(database, query.c_str());
-  rows.bind(run).bind(static_cast<std::int64_t>(number)).bind(count);
-  std::vector<RecordedEvent> events;
-  while (rows.step()) events.push_back(event_from(rows));
-  return events;
-}
-
-namespace {
-
 SegmentReason reason_from(std::int64_t code) {
   require_sound(code >= 0 && code <= static_cast<std::int64_t>(SegmentReason::gap),
                 "unknown reason of a segment");
@@ -135,38 +98,34 @@ constexpr const char* columns_of_segment =
     "SELECT id, run, setup, reason, grid_start_ns, period_ns, first_cycle, last_cycle,"
     " wall_ns, records, bytes, program_version FROM segment";
 
-}  // namespace
-
-struct HistoryReader::Parts {
-  explicit Parts(const std::filesystem::path& path)
-      : file(path), database(path, DatabaseMode::read_only) {}
-
-  void read(const char* order, std::vector<SegmentInfo>& found);
-  void limit_to_chunks(SegmentInfo& segment);
-  [[nodiscard]] bool contains(std::int64_t id, const std::vector<SegmentInfo>& found) const;
-
-  std::filesystem::path file;
-  mutable Database database;
-  std::vector<SegmentInfo> segments;
-  std::vector<HistoryDamage> damage;
-};
-
-bool HistoryReader::Parts::contains(std::int64_t id, const std::vector<SegmentInfo>& found) const {
-  return std::any_of(found.begin(), found.end(),
-                     [id](const SegmentInfo& segment) { return segment.id == id; }) ||
-         std::any_of(damage.begin(), damage.end(),
-                     [id](const HistoryDamage& part) { return part.segment == id; });
+/// Limits the last cycle to the chunks, beyond which a replay would continue with old inputs.
+void limit_to_chunks(Database& database, SegmentInfo& segment, std::vector<HistoryDamage>& damage) {
+  const std::int64_t none = static_cast<std::int64_t>(segment.first_cycle) - 1;
+  if (segment.last_cycle == none) return;
+  const std::int64_t newest = database.number(
+      "SELECT max(through_cycle) FROM"
+      " (SELECT through_cycle FROM chunk WHERE segment = ? ORDER BY number DESC LIMIT 2)",
+      segment.id);
+  const std::int64_t through = std::max(newest, none);
+  if (through >= segment.last_cycle) return;
+  segment.last_cycle = through;
+  damage.push_back({segment.id, "its chunks end before its last cycle"});
 }
 
 /// Reads rows in that order up to a known one. @throws DatabaseError
-void HistoryReader::Parts::read(const char* order, std::vector<SegmentInfo>& found) {
+void read_segments(Database& database, const char* order, std::vector<SegmentInfo>& found,
+                   std::vector<HistoryDamage>& damage) {
   Statement rows(database, (std::string(columns_of_segment) + order).c_str());
   while (rows.step()) {
     const std::int64_t id = rows.number(0);
-    if (contains(id, found)) return;
+    const bool is_known =
+        std::any_of(found.begin(), found.end(), [id](const auto& each) { return each.id == id; }) ||
+        std::any_of(damage.begin(), damage.end(),
+                    [id](const auto& each) { return each.segment == id; });
+    if (is_known) return;
     try {
       found.push_back(segment_from(rows));
-      limit_to_chunks(found.back());
+      limit_to_chunks(database, found.back(), damage);
     } catch (const DatabaseError&) {
       throw;
     } catch (const HistoryError& error) {
@@ -175,77 +134,80 @@ void HistoryReader::Parts::read(const char* order, std::vector<SegmentInfo>& fou
   }
 }
 
-/// Limits the last cycle to the chunks, beyond which a replay would continue with old inputs.
-void HistoryReader::Parts::limit_to_chunks(SegmentInfo& segment) {
-  const std::int64_t none = static_cast<std::int64_t>(segment.first_cycle) - 1;
-  if (segment.last_cycle == none) return;
-  Statement newest(database,
-                   "SELECT max(through_cycle) FROM"
-                   " (SELECT through_cycle FROM chunk WHERE segment = ? ORDER BY number DESC"
-                   " LIMIT 2)");
-  newest.bind(segment.id);
-  const std::int64_t through = newest.step() ? std::max(newest.number(0), none) : none;
-  if (through >= segment.last_cycle) return;
-  segment.last_cycle = through;
-  damage.push_back({segment.id, "its chunks end before its last cycle"});
+}  // namespace
+
+std::vector<RecordedEvent> read_events(const std::filesystem::path& history,
+                                       const std::optional<HistoryTime>& from,
+                                       const std::optional<HistoryTime>& to) {
+  Database database(history, DatabaseMode::read_only);
+  require_history(database);
+  const std::string query = query_of_events(database, "");
+  std::vector<RecordedEvent> events;
+  Statement rows(database, query.c_str());
+  std::optional<std::int64_t> first_ns;
+  while (rows.step()) {
+    const std::int64_t wall_ns = rows.number(2);
+    if (!first_ns) first_ns = wall_ns;
+    const double since_first_s = 1e-9 * static_cast<double>(wall_ns - *first_ns);
+    if (is_within(since_first_s, wall_ns, from, to)) events.push_back(event_from(rows));
+  }
+  note_absences(events, database);
+  return events;
 }
 
-HistoryReader::HistoryReader(const std::filesystem::path& file) {
+std::vector<RecordedEvent> read_events_after(const std::filesystem::path& history, std::int64_t run,
+                                             std::uint64_t number, std::int64_t count) {
+  Database database(history, DatabaseMode::read_only);
+  require_history(database);
+  const std::string query = query_of_events(database, " WHERE (run, number) > (?, ?)") + " LIMIT ?";
+  Statement rows(database, query.c_str(), run, static_cast<std::int64_t>(number), count);
+  std::vector<RecordedEvent> events;
+  while (rows.step()) events.push_back(event_from(rows));
+  return events;
+}
+
+HistoryReader::HistoryReader(const std::filesystem::path& file) : file_(file) {
   std::error_code failed;
   if (!std::filesystem::exists(file, failed)) {
     throw HistoryError(file.string() + ": " +
                        (failed ? failed.message() : std::string("there is no such file")));
   }
-  parts_ = std::make_unique<Parts>(file);
-  require_history(parts_->database);
-  parts_->database.run("PRAGMA cache_size = -256");  // chunks are read once, sequentially
+  database_ = std::make_shared<Database>(file, DatabaseMode::read_only);
+  require_history(*database_);
+  database_->run("PRAGMA cache_size = -256");  // chunks are read once, sequentially
   std::vector<SegmentInfo> found;
   try {
-    parts_->read(" ORDER BY id", found);
+    read_segments(*database_, " ORDER BY id", found, damage_);
   } catch (const DatabaseError& error) {
     // A page of the table is damaged: the rows after it are read from the other end.
-    parts_->damage.push_back({0, std::string("some segments cannot be read: ") + error.what()});
+    damage_.push_back({0, std::string("some segments cannot be read: ") + error.what()});
     try {
-      parts_->read(" ORDER BY id DESC", found);
+      read_segments(*database_, " ORDER BY id DESC", found, damage_);
     } catch (const DatabaseError&) {  // reported already
     }
     if (found.empty()) throw;
   }
   std::sort(found.begin(), found.end(),
             [](const SegmentInfo& a, const SegmentInfo& b) { return a.id < b.id; });
-  parts_->segments = sound_segments(std::move(found), parts_->damage);
-}
-
-HistoryReader::~HistoryReader() = default;
-HistoryReader::HistoryReader(HistoryReader&&) noexcept = default;
-
-const std::filesystem::path& HistoryReader::file() const noexcept {
-  return parts_->file;
-}
-const std::vector<SegmentInfo>& HistoryReader::segments() const& noexcept {
-  return parts_->segments;
-}
-const std::vector<HistoryDamage>& HistoryReader::damage() const noexcept {
-  return parts_->damage;
+  segments_ = sound_segments(std::move(found), places_, damage_);
 }
 
 SegmentSetup HistoryReader::setup(const SegmentInfo& segment) const {
-  Statement row(parts_->database,
-                "SELECT config_text, model_text, model_checksum FROM setup WHERE id = ?");
-  row.bind(segment.setup);
+  Statement row(*database_,
+                "SELECT config_text, model_text, model_checksum FROM setup WHERE id = ?",
+                segment.setup);
   if (!row.step()) {
-    throw HistoryError(parts_->file.string() + ": the configuration of segment " +
+    throw HistoryError(file_.string() + ": the configuration of segment " +
                        std::to_string(segment.id) + " is missing");
   }
   return {row.text(0), row.text(1), row.text(2)};
 }
 
 SegmentStart HistoryReader::start(const SegmentInfo& segment) const {
-  check_segment_row(parts_->database, segment.id);
-  Statement row(parts_->database, "SELECT estimator_state, inputs FROM segment WHERE id = ?");
-  row.bind(segment.id);
+  check_segment_row(*database_, segment.id);
+  Statement row(*database_, "SELECT estimator_state, inputs FROM segment WHERE id = ?", segment.id);
   if (!row.step()) {
-    throw HistoryError(parts_->file.string() + ": segment " + std::to_string(segment.id) +
+    throw HistoryError(file_.string() + ": segment " + std::to_string(segment.id) +
                        " was deleted meanwhile");
   }
   SegmentStart start;
@@ -255,114 +217,79 @@ SegmentStart HistoryReader::start(const SegmentInfo& segment) const {
   return start;
 }
 
-RecordCursor HistoryReader::records(const SegmentInfo& segment) const {
-  return RecordCursor(*this, segment);
-}
-
-struct RecordCursor::Parts {
-  Parts(Database& database_in, SegmentInfo segment_in)
-      : database(database_in), segment(std::move(segment_in)) {}
-  void decode(std::vector<std::byte> bytes, std::uint64_t count);
-
-  Database& database;
-  SegmentInfo segment;
-  std::int64_t next_chunk{0};
-  std::int64_t through{-1};  ///< last complete cycle of the chunks read so far
-  std::int64_t wall_minus_grid_ns{0};
-  bool wall_was_impossible{false};
-  RecordOrder order;            ///< of the chunks so far
-  std::vector<Record> records;  ///< of the present chunk
-  std::size_t given{0};         ///< number of records returned
-};
-
-RecordCursor::RecordCursor(const HistoryReader& reader, const SegmentInfo& segment)
-    : parts_(std::make_unique<Parts>(reader.parts_->database, segment)) {
-  parts_->wall_minus_grid_ns = segment.wall_ns - segment.grid.time_of(segment.first_cycle).count();
-  parts_->through = static_cast<std::int64_t>(segment.first_cycle) - 1;
-  parts_->order = RecordOrder(segment.first_cycle);
-}
-RecordCursor::~RecordCursor() = default;
-RecordCursor::RecordCursor(RecordCursor&&) noexcept = default;
-
-std::int64_t RecordCursor::wall_minus_grid_ns() const noexcept {
-  return parts_->wall_minus_grid_ns;
-}
-
-bool RecordCursor::wall_time_was_impossible() const noexcept {
-  return parts_->wall_was_impossible;
-}
+RecordCursor::RecordCursor(const HistoryReader& reader, SegmentInfo segment)
+    : database_(reader.database_),
+      segment_(std::move(segment)),
+      through_(static_cast<std::int64_t>(segment_.first_cycle) - 1),
+      wall_minus_grid_ns_(segment_.wall_ns - segment_.grid.time_of(segment_.first_cycle).count()),
+      order_(segment_.first_cycle) {}
 
 /// Decodes the whole chunk before any record is returned.
-void RecordCursor::Parts::decode(std::vector<std::byte> bytes, std::uint64_t count) {
-  if (count > bytes.size()) throw HistoryError("damaged: more records than bytes");
+void RecordCursor::decode(std::vector<std::byte> bytes, std::uint64_t count) {
+  require_sound(count <= bytes.size(), "more records than bytes");
   std::vector<Record> decoded;
   decoded.reserve(count);
   ChunkDecoder chunk(std::move(bytes), count);
-  RecordOrder order_then = order;
+  RecordOrder order_then = order_;
   for (Record record; chunk.next(record); decoded.push_back(record))
     require_sound(order_then.admits(record), "records are out of order");
-  order = order_then;
-  records = std::move(decoded);
-  given = 0;
+  order_ = order_then;
+  records_ = std::move(decoded);
+  given_ = 0;
 }
 
 /// @return false after the segment's last chunk
 bool RecordCursor::load_chunk() {
-  Parts& parts = *parts_;
   // One statement per chunk: a read transaction kept open would block the checkpoint of the
   // daemon's write-ahead log.
-  std::optional<ChunkContent> content =
-      read_chunk(parts.database, parts.segment.id, parts.next_chunk);
-  const std::string chunk = "chunk " + std::to_string(parts.next_chunk);
+  std::optional<ChunkContent> content = read_chunk(*database_, segment_.id, next_chunk_);
+  const std::string chunk = "chunk " + std::to_string(next_chunk_);
   if (!content) {
-    if (parts.through >= parts.segment.last_cycle) return false;
+    if (through_ >= segment_.last_cycle) return false;
     throw HistoryError(chunk + " is missing (damaged, or deleted meanwhile)");
   }
-  const ChunkNumbers& numbers = content->numbers;
   try {
-    parts.decode(std::move(content->records), static_cast<std::uint64_t>(numbers.count));
+    decode(std::move(content->records), static_cast<std::uint64_t>(content->count));
   } catch (const HistoryError& error) {
     throw HistoryError(chunk + ": " + error.what());
   }
-  ++parts.next_chunk;
-  parts.through = numbers.through_cycle;
-  const std::int64_t begin_ns = parts.segment.grid.time_of(parts.segment.first_cycle).count();
-  const std::int64_t difference_ns = numbers.wall_minus_grid_ns;
+  ++next_chunk_;
+  through_ = content->through_cycle;
+  const std::int64_t begin_ns = segment_.grid.time_of(segment_.first_cycle).count();
+  const std::int64_t difference_ns = content->wall_minus_grid_ns;
   if (difference_ns >= -grid_ns_max && difference_ns <= wall_ns_max - begin_ns) {
-    parts.wall_minus_grid_ns = difference_ns;
+    wall_minus_grid_ns_ = difference_ns;
   } else {
-    parts.wall_was_impossible = true;
+    wall_was_impossible_ = true;
   }
   return true;
 }
 
 bool RecordCursor::next(Record& out) {
-  Parts& parts = *parts_;
-  while (parts.given == parts.records.size()) {
+  while (given_ == records_.size()) {
     if (!load_chunk()) return false;
   }
-  out = parts.records[parts.given];
+  out = records_[given_];
   // Records after the last complete cycle belong to an incomplete one.
-  const bool is_whole = out.cycle < static_cast<std::uint64_t>(parts.segment.last_cycle + 1);
-  if (is_whole) ++parts.given;
+  const bool is_whole = out.cycle < static_cast<std::uint64_t>(segment_.last_cycle + 1);
+  if (is_whole) ++given_;
   return is_whole;
 }
 
 void RecordCursor::extend(std::int64_t last_cycle) {
-  parts_->segment.last_cycle = std::max(parts_->segment.last_cycle, last_cycle);
+  segment_.last_cycle = std::max(segment_.last_cycle, last_cycle);
 }
 
 bool RecordCursor::resume() {
-  Parts& parts = *parts_;
-  parts.records.clear();
-  parts.given = 0;
+  records_.clear();
+  given_ = 0;
   try {
-    Statement row(parts.database,
+    Statement row(*database_,
                   "SELECT number FROM chunk WHERE segment = ? AND number > ?"
-                  " ORDER BY number LIMIT 1");
-    row.bind(parts.segment.id).bind(parts.next_chunk);
+                  " ORDER BY number LIMIT 1",
+                  segment_.id, next_chunk_);
     if (!row.step()) return false;
-    parts.next_chunk = row.number(0);
+    next_chunk_ = row.number(0);
     return true;
   } catch (const DatabaseError&) {
     return false;  // the index itself is damaged

@@ -36,14 +36,13 @@ struct SegmentStart {
   ControllerState controller;
 };
 
+class Database;
 class HistoryReader;
 
 /// Reads the records of a segment in the order of their arrival at the estimator, chunk by chunk.
 class RecordCursor {
  public:
-  RecordCursor(const HistoryReader& reader, const SegmentInfo& segment);
-  ~RecordCursor();
-  RecordCursor(RecordCursor&&) noexcept;
+  RecordCursor(const HistoryReader& reader, SegmentInfo segment);
   /// Returns records of sound chunks only: the checksum matches and the whole chunk decodes.
   /// @return false after the last record of the segment's complete cycles
   /// @throws HistoryError when a chunk is damaged or missing, or the segment was deleted
@@ -54,14 +53,23 @@ class RecordCursor {
   /// Call when the segment has grown: next() continues beyond its previous last cycle.
   void extend(std::int64_t last_cycle);
   /// True if a chunk had an impossible wall time; the last valid difference is then kept.
-  [[nodiscard]] bool wall_time_was_impossible() const noexcept;
+  [[nodiscard]] bool wall_time_was_impossible() const noexcept { return wall_was_impossible_; }
   /// Wall clock minus grid time, as of the record last returned [ns].
-  [[nodiscard]] std::int64_t wall_minus_grid_ns() const noexcept;
+  [[nodiscard]] std::int64_t wall_minus_grid_ns() const noexcept { return wall_minus_grid_ns_; }
 
  private:
-  struct Parts;
   bool load_chunk();
-  std::unique_ptr<Parts> parts_;
+  void decode(std::vector<std::byte> bytes, std::uint64_t count);
+
+  std::shared_ptr<Database> database_;
+  SegmentInfo segment_;
+  std::int64_t next_chunk_{0};
+  std::int64_t through_;  ///< last complete cycle of the chunks read so far
+  std::int64_t wall_minus_grid_ns_;
+  bool wall_was_impossible_{false};
+  RecordOrder order_;            ///< of the chunks so far
+  std::vector<Record> records_;  ///< of the present chunk
+  std::size_t given_{0};         ///< number of records returned
 };
 
 class HistoryReader {
@@ -71,21 +79,25 @@ class HistoryReader {
   /// a wrong clock, by an estimate from other segments.
   /// @throws HistoryError naming the file: missing, not a history, unknown version, or unreadable
   explicit HistoryReader(const std::filesystem::path& file);
-  ~HistoryReader();
-  HistoryReader(HistoryReader&&) noexcept;
 
-  [[nodiscard]] const std::filesystem::path& file() const noexcept;
-  [[nodiscard]] const std::vector<SegmentInfo>& segments() const& noexcept;  ///< oldest first
+  /// Oldest first.
+  [[nodiscard]] const std::vector<SegmentInfo>& segments() const& noexcept { return segments_; }
   const std::vector<SegmentInfo>& segments() const&& = delete;
-  [[nodiscard]] const std::vector<HistoryDamage>& damage() const noexcept;
+  [[nodiscard]] const std::vector<HistoryDamage>& damage() const noexcept { return damage_; }
+  /// Time of a cycle since the history's first one, see HistoryPlaces.
+  [[nodiscard]] double seconds_at(const SegmentInfo& segment, std::uint64_t cycle) const {
+    return places_.seconds_at(segment, cycle);
+  }
   [[nodiscard]] SegmentSetup setup(const SegmentInfo& segment) const;
   [[nodiscard]] SegmentStart start(const SegmentInfo& segment) const;
-  [[nodiscard]] RecordCursor records(const SegmentInfo& segment) const;
 
  private:
   friend class RecordCursor;
-  struct Parts;
-  std::unique_ptr<Parts> parts_;
+  std::filesystem::path file_;
+  std::shared_ptr<Database> database_;
+  std::vector<SegmentInfo> segments_;
+  HistoryPlaces places_;
+  std::vector<HistoryDamage> damage_;
 };
 
 }  // namespace thermocomp

@@ -1,8 +1,7 @@
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
+#include <fmt/format.h>
 #include <map>
 #include <ostream>
 #include <stdexcept>
@@ -16,35 +15,32 @@ namespace thermocomp {
 namespace {
 
 /// Comment line for a gap between two segments; empty if they are contiguous.
-std::string gap_line(const HistoryClock& clock, const SegmentInfo& before, const SegmentInfo& after,
-                     double first_s) {
+std::string gap_line(const HistoryReader& reader, const SegmentInfo& before,
+                     const SegmentInfo& after, double first_s) {
   const double from_s =
-      clock.seconds_at(before, static_cast<std::uint64_t>(before.last_cycle + 1)) - first_s;
-  const double to_s = clock.seconds_at(after, after.first_cycle) - first_s;
+      reader.seconds_at(before, static_cast<std::uint64_t>(before.last_cycle + 1)) - first_s;
+  const double to_s = reader.seconds_at(after, after.first_cycle) - first_s;
   const double period_s = std::chrono::duration<double>(after.grid.period).count();
   if (!(to_s - from_s > 0.5 * period_s)) return {};
-  std::array<char, 160> text{};
-  std::snprintf(text.data(), text.size(), "# nothing is recorded from %.3f s to %.3f s: %s\n",
-                from_s, to_s,
-                after.reason == SegmentReason::gap ? "lost" : "the daemon ended and began again");
-  return text.data();
+  return fmt::format(
+      "# nothing is recorded from {:.3f} s to {:.3f} s: {}\n", from_s, to_s,
+      after.reason == SegmentReason::gap ? "lost" : "the daemon ended and began again");
 }
 
 /// True if the whole segment is outside [from, to), as far as seconds show.
-bool is_outside(const HistoryClock& clock, const SegmentInfo& segment,
+bool is_outside(const HistoryReader& reader, const SegmentInfo& segment,
                 const std::optional<HistoryTime>& from, const std::optional<HistoryTime>& to) {
   const auto end = static_cast<std::uint64_t>(segment.last_cycle + 1);
   const bool is_before_it =
-      from && from->seconds && clock.seconds_at(segment, end) < *from->seconds;
+      from && from->seconds && reader.seconds_at(segment, end) < *from->seconds;
   return is_before_it ||
-         (to && to->seconds && clock.seconds_at(segment, segment.first_cycle) >= *to->seconds);
+         (to && to->seconds && reader.seconds_at(segment, segment.first_cycle) >= *to->seconds);
 }
 
 /// "# 12.500 s: what\n"
 std::string comment_at(double time_s, const std::string& what) {
-  std::array<char, 40> time{};
-  std::snprintf(time.data(), time.size(), "# %.3f s: ", time_s);
-  return time.data() + printable_text(what) + "\n";  // a damaged file may contain any text
+  // a damaged file may contain any text
+  return fmt::format("# {:.3f} s: {}\n", time_s, printable_text(what));
 }
 
 /// Selects rows for a wall-time comment: the first, one per hour, and after a clock step.
@@ -76,14 +72,11 @@ class RunExport {
   RunExport(const HistoryReader& reader, const SetupParser& parser, ExportContent content,
             const std::optional<HistoryTime>& from, const std::optional<HistoryTime>& to,
             std::ostream& out)
-      : reader_(reader), setups_(reader, parser), clock_(reader), from_(from), to_(to), out_(out) {
+      : reader_(reader), setups_(reader, parser), from_(from), to_(to), out_(out) {
     columns_.column("time_s");
-    const std::map<std::int64_t, std::vector<bool>> probed = find_probed();
-    for (const auto& [id, setup] : setups_.all()) {
-      const auto found = probed.find(id);
-      places_[id] = export_places(
-          setup, content, found != probed.end() ? found->second : std::vector<bool>{}, columns_);
-    }
+    std::map<std::int64_t, std::vector<bool>> probed = find_probed();
+    for (const auto& [id, setup] : setups_.all())
+      places_[id] = export_places(setup, content, &probed[id], columns_);
     summary_.columns = columns_.names();
     append_header(text_, columns_.names());
     row_.resize(columns_.names().size());
@@ -94,7 +87,7 @@ class RunExport {
   ExportSummary run(const Progress& progress) {
     std::size_t done = 0;
     for (const SegmentInfo& segment : reader_.segments()) {
-      if (!is_outside(clock_, segment, from_, to_)) take(segment);
+      if (!is_outside(reader_, segment, from_, to_)) take(segment);
       ++done;
       if (progress) {
         progress(static_cast<double>(done) / static_cast<double>(reader_.segments().size()));
@@ -109,11 +102,10 @@ class RunExport {
   [[nodiscard]] std::map<std::int64_t, std::vector<bool>> find_probed() const {
     std::map<std::int64_t, std::vector<bool>> probed;
     for (const SegmentInfo& segment : reader_.segments()) {
-      const auto setup = setups_.all().find(segment.setup);
-      if (setup == setups_.all().end() || is_outside(clock_, segment, from_, to_)) continue;
-      const std::size_t axes = setup->second.estimator.axes.size();
+      const ReplaySetup* setup = setups_.find(segment);
+      if (setup == nullptr || is_outside(reader_, segment, from_, to_)) continue;
       std::vector<bool>& all = probed[segment.setup];
-      all.resize(axes, false);
+      all.resize(setup->estimator.axes.size(), false);
       note_probed(reader_, segment, all);
     }
     return probed;
@@ -126,15 +118,12 @@ class RunExport {
       std::uint64_t cycle = 0;
       while (walk.next(cycle)) {
         report_damage();
-        const double time_s = clock_.seconds_at(segment, cycle);
+        const double time_s = reader_.seconds_at(segment, cycle);
         const std::int64_t wall_ns = walk.wall_ns(cycle);
-        const bool is_wanted = !(from_ && is_before(time_s, wall_ns, *from_)) &&
-                               !(to_ && !is_before(time_s, wall_ns, *to_));
-        if (!is_wanted) {
+        if (is_within(time_s, wall_ns, from_, to_))
+          write(segment, cycle, time_s, wall_ns, walk);
+        else
           walk.skip();
-          continue;
-        }
-        write(segment, cycle, time_s, wall_ns, walk);
       }
     } catch (const std::exception& error) {
       summary_.damage.push_back({segment.id, error.what()});
@@ -149,7 +138,7 @@ class RunExport {
     walk.fill(row_, cycle);
     row_[0] = time_s - *first_s_;
     if (last_written_ != nullptr && last_written_ != &segment) {
-      const std::string gap = gap_line(clock_, *last_written_, segment, *first_s_);
+      const std::string gap = gap_line(reader_, *last_written_, segment, *first_s_);
       text_ += gap;
       if (!gap.empty()) ++summary_.gaps;
     }
@@ -181,7 +170,6 @@ class RunExport {
 
   const HistoryReader& reader_;
   ParsedSetups setups_;
-  HistoryClock clock_;
   const std::optional<HistoryTime>& from_;
   const std::optional<HistoryTime>& to_;
   std::ostream& out_;

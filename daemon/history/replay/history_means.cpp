@@ -10,12 +10,6 @@
 namespace thermocomp {
 namespace {
 
-constexpr std::int64_t ns_per_s = 1'000'000'000;
-
-std::int64_t begin_of_mean_s(std::int64_t wall_ns) {
-  return wall_ns / ns_per_s / mean_s * mean_s;  // the reader has replaced impossible times
-}
-
 /// The mean being accumulated.
 struct OpenMean {
   std::int64_t at_s{0};
@@ -42,24 +36,12 @@ struct Walk {
         info(std::move(segment)),
         texts(reader->setup(info)),
         setup(parse_setup(texts)),
-        places(export_places(setup, ExportContent::inputs, {}, columns)),
+        places(export_places(setup, ExportContent::inputs, nullptr, columns)),
         walk(*reader, info, setup, places, damage),
         row(columns.names().size()) {}
 
   [[nodiscard]] HistoryPosition at(std::uint64_t cycle) const {
     return {info.id, info.wall_ns, cycle};
-  }
-  [[nodiscard]] bool is_measured(std::size_t column) const {
-    return std::find(places.measured.begin(), places.measured.end(), column) !=
-           places.measured.end();
-  }
-  /// Removes the columns of probings, which are returned separately.
-  template <class Value>
-  [[nodiscard]] std::vector<Value> without_measured(const std::vector<Value>& all) const {
-    std::vector<Value> kept;
-    for (std::size_t i = 0; i < all.size(); ++i)
-      if (!is_measured(i)) kept.push_back(all[i]);
-    return kept;
   }
 
   std::shared_ptr<const HistoryReader> reader;
@@ -151,7 +133,7 @@ void HistoryMeans::Parts::begin_batch() {
   if (!walk) return;
   batch.setup = walk->texts;
   batch.program_version = walk->info.program_version;
-  batch.columns = walk->without_measured(walk->columns.names());
+  batch.columns = walk->columns.names();
 }
 
 void HistoryMeans::Parts::close_mean() {
@@ -171,19 +153,20 @@ void HistoryMeans::Parts::close_mean() {
 
 void HistoryMeans::Parts::take_row(std::uint64_t cycle) {
   if (cycle < from.cycle && walk->info.id == from.segment) return walk->walk.skip();
-  const std::int64_t at_s = begin_of_mean_s(walk->walk.wall_ns(cycle));
+  constexpr std::int64_t ns_per_s = 1'000'000'000;
+  // The reader has replaced impossible times.
+  const std::int64_t at_s = walk->walk.wall_ns(cycle) / ns_per_s / mean_s * mean_s;
   if (open && open->at_s != at_s) close_mean();
   if (!open) open = OpenMean{at_s, walk->at(cycle), {}, {}, {}};
   std::fill(walk->row.begin(), walk->row.end(), not_a_number);
   walk->walk.fill(walk->row, cycle);
-  static_cast<void>(walk->walk.happened());
-  static_cast<void>(walk->walk.references_after_row());
-  open->add(walk->without_measured(walk->row));
+  open->add(walk->row);
   for (const ExportedProbing& probing : walk->walk.probings())
     open->probings.push_back({walk->setup.estimator.axes[probing.axis].output, 0, probing.wall_ns,
                               probing.measured_um, probing.displacement_um, probing.modelled_um,
                               probing.claimed_um, probing.sd_um,
                               std::string(to_string(probing.source))});
+  walk->walk.skip();  // its texts are not used
 }
 
 std::optional<MeansBatch> HistoryMeans::next(std::size_t rows_max, std::int64_t wall_s,

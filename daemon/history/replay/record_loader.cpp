@@ -12,6 +12,8 @@
 
 namespace thermocomp::cli {
 
+namespace {
+
 bool is_history(const std::string& file) {
   constexpr std::string_view sqlite = "SQLite format 3";
   if (!std::filesystem::is_regular_file(file)) return false;
@@ -20,6 +22,8 @@ bool is_history(const std::string& file) {
   stream.read(head.data(), static_cast<std::streamsize>(head.size()));
   return stream && head == sqlite;
 }
+
+}  // namespace
 
 RunFile load_record(const std::string& argument, RunLoader& loader) {
   const RunSelection selection = parse_selection(argument);

@@ -8,8 +8,6 @@
 
 namespace thermocomp::cli {
 
-[[nodiscard]] bool is_history(const std::string& file);
-
 /// RUN.csv[@T0:T1] by `loader`, or a history (also with @T0:T1, seconds since its start) as
 /// exported by `thermocomp export`; damage is printed on stderr.
 /// @throws ConfigurationError, HistoryError

@@ -25,10 +25,10 @@ struct NotedOffsets {
 class SegmentReplay {
  public:
   SegmentReplay(const HistoryReader& reader, const SegmentInfo& segment, const ReplaySetup& setup,
-                const HistoryClock& clock, const OffsetSink& sink, ReplaySummary& summary)
-      : segment_(segment),
+                const OffsetSink& sink, ReplaySummary& summary)
+      : reader_(reader),
+        segment_(segment),
         steps_(reader, segment, setup),
-        clock_(clock),
         sink_(sink),
         summary_(summary) {}
 
@@ -56,7 +56,7 @@ class SegmentReplay {
     }
     compare(cycle, noted);
     if (!sink_) return;
-    sink_({clock_.seconds_at(segment_, cycle), cycle, &config,
+    sink_({reader_.seconds_at(segment_, cycle), cycle, &config,
            std::span<const double>(steps_.command().offset_um).first(noted.axes),
            std::span<const double>(noted.offset_um).first(noted.axes)});
   }
@@ -76,14 +76,14 @@ class SegmentReplay {
       }
       if (!summary_.first_different_cycle) {
         summary_.first_different_cycle = cycle;
-        summary_.first_different_time_s = clock_.seconds_at(segment_, cycle);
+        summary_.first_different_time_s = reader_.seconds_at(segment_, cycle);
       }
     }
   }
 
+  const HistoryReader& reader_;
   const SegmentInfo& segment_;
   SegmentSteps steps_;
-  const HistoryClock& clock_;
   const OffsetSink& sink_;
   ReplaySummary& summary_;
 };
@@ -103,14 +103,13 @@ ReplaySummary replay_all(const HistoryReader& reader, const ParsedSetups& setups
     summary.damage.push_back(damage);
   };
   for (const HistoryDamage& damage : reader.damage()) note(damage);
-  const HistoryClock clock(reader);
   std::uint64_t total = 0;
   for (const SegmentInfo& segment : reader.segments()) total += cycles_of(segment);
   std::uint64_t done = 0;
   for (const SegmentInfo& segment : reader.segments()) {
     if (segment.reason == SegmentReason::gap) ++summary.gaps;
     try {
-      SegmentReplay replayed(reader, segment, setups.of(segment), clock, sink, summary);
+      SegmentReplay replayed(reader, segment, setups.of(segment), sink, summary);
       replayed.run([&](std::uint64_t cycles) {
         if (progress) progress(static_cast<double>(done + cycles) / static_cast<double>(total));
       });
@@ -209,7 +208,7 @@ void check_record(const Record& record, const EstimatorConfig& config, InputsInF
 
 void check_records(const HistoryReader& reader, const EstimatorConfig& config,
                    SegmentCheck& check) {
-  RecordCursor cursor = reader.records(check.segment);
+  RecordCursor cursor(reader, check.segment);
   InputsInForce inputs;
   inputs.readings.resize(config.sensors.size());
   Record record;

@@ -93,12 +93,7 @@ class RunBinding {
   }
 
   static bool is_needed(const EstimatorConfig& config, std::size_t sensor) {
-    const bool in_block =
-        std::any_of(config.blocks.begin(), config.blocks.end(), [&](const BlockConfig& block) {
-          return std::find(block.sensors.begin(), block.sensors.end(), sensor) !=
-                 block.sensors.end();
-        });
-    return in_block ||
+    return is_in_a_block(config, sensor) ||
            std::any_of(config.sensors.begin(), config.sensors.end(),
                        [&](const SensorConfig& other) { return other.reference_sensor == sensor; });
   }

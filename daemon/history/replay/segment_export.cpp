@@ -15,12 +15,6 @@ namespace {
 
 constexpr std::size_t none = ExportPlaces::none;
 
-bool is_in_a_block(const EstimatorConfig& config, std::size_t sensor) {
-  return std::any_of(config.blocks.begin(), config.blocks.end(), [&](const BlockConfig& block) {
-    return std::find(block.sensors.begin(), block.sensors.end(), sensor) != block.sensors.end();
-  });
-}
-
 double good_value(const Reading& reading) {
   return reading.fault == Fault::none ? reading.temp_degC : not_a_number;
 }
@@ -44,7 +38,7 @@ double block_mean(const BlockConfig& block, const EstimatorConfig& config,
 }  // namespace
 
 ExportPlaces export_places(const ReplaySetup& setup, ExportContent content,
-                           const std::vector<bool>& probed, RunColumns& columns) {
+                           const std::vector<bool>* probed, RunColumns& columns) {
   const EstimatorConfig& config = setup.estimator;
   const bool as_read = content == ExportContent::sensors;
   ExportPlaces places;
@@ -57,14 +51,14 @@ ExportPlaces export_places(const ReplaySetup& setup, ExportContent content,
   }
   for (const std::string& signal : config.signals) places.signals.push_back(columns.column(signal));
   for (std::size_t i = 0; i < config.axes.size(); ++i) {
-    const AxisConfig& axis = config.axes[i];
-    places.displacement.push_back(i < probed.size() && probed[i] ? columns.column(axis.output)
-                                                                 : none);
+    const bool is_probed = probed != nullptr && i < probed->size() && (*probed)[i];
+    places.displacement.push_back(is_probed ? columns.column(config.axes[i].output) : none);
   }
   for (const AxisConfig& axis : config.axes) {
     places.offsets.push_back(columns.column(axis.name + "_offset_um"));
     places.applied.push_back(columns.column(axis.name + "_applied_um"));
-    places.measured.push_back(columns.column(axis.name + "_measured_um"));
+    places.measured.push_back(probed != nullptr ? columns.column(axis.name + "_measured_um")
+                                                : none);
   }
   return places;
 }
@@ -72,7 +66,7 @@ ExportPlaces export_places(const ReplaySetup& setup, ExportContent content,
 void note_probed(const HistoryReader& reader, const SegmentInfo& segment,
                  std::vector<bool>& probed) noexcept {
   try {
-    RecordCursor cursor = reader.records(segment);
+    RecordCursor cursor(reader, segment);
     for (bool is_there = true; is_there;) {
       try {
         Record record;
@@ -98,7 +92,7 @@ SegmentExport::SegmentExport(const HistoryReader& reader, const SegmentInfo& seg
       dry_run_(setup.dry_run),
       places_(places),
       damage_(damage),
-      cursor_(reader.records(segment)),
+      cursor_(reader, segment),
       faults_reported_(config_.sensors.size(), Fault::never_read) {
   inputs_ = inputs_at(reader.start(segment), config_);
   measured_um_.fill(not_a_number);
@@ -146,7 +140,7 @@ void SegmentExport::fill(std::vector<double>& row, std::uint64_t cycle) {
     row[places_.offsets[i]] = offset_um_[i];
     // The offset shown in a dry run was not applied.
     row[places_.applied[i]] = dry_run_ || !is_read ? not_a_number : read_back_um(i);
-    row[places_.measured[i]] = measured_um_[i];
+    if (places_.measured[i] != none) row[places_.measured[i]] = measured_um_[i];
     if (places_.displacement[i] != none) row[places_.displacement[i]] = displacement_um_[i];
   }
   // -0 would be printed as "-0".
@@ -156,8 +150,7 @@ void SegmentExport::fill(std::vector<double>& row, std::uint64_t cycle) {
 }
 
 std::vector<std::string> SegmentExport::happened() {
-  std::vector<std::string> all;
-  all.swap(happened_);
+  std::vector<std::string> all = std::exchange(happened_, {});
   if (!not_followed_.empty()) all.push_back(std::move(not_followed_));
   not_followed_.clear();
   return all;
@@ -168,8 +161,7 @@ std::vector<std::string> SegmentExport::references_after_row() {
 }
 
 std::vector<ExportedProbing> SegmentExport::probings() {
-  std::vector<ExportedProbing> all;
-  all.swap(probings_);
+  std::vector<ExportedProbing> all = std::exchange(probings_, {});
   for (ExportedProbing& probing : all) {
     if (!steps_) continue;
     probing.claimed_um = report_.axes[probing.axis].claimed_sd_um;

@@ -25,13 +25,14 @@ struct ExportPlaces {
   std::vector<std::size_t> displacement;  ///< by axis; none if not probed
   std::vector<std::size_t> offsets;
   std::vector<std::size_t> applied;
-  std::vector<std::size_t> measured;
+  std::vector<std::size_t> measured;  ///< none: probings have no columns
 };
 
 /// Creates the columns of a configuration.
-/// @param probed  by axis: true if its displacement was measured anywhere in the file
+/// @param probed  by axis: true if its displacement was measured anywhere in the file; nullptr: no
+///                columns of probings
 [[nodiscard]] ExportPlaces export_places(const ReplaySetup& setup, ExportContent content,
-                                         const std::vector<bool>& probed, RunColumns& columns);
+                                         const std::vector<bool>* probed, RunColumns& columns);
 
 /// A displacement entered by an operator or a probe.
 struct ExportedProbing {

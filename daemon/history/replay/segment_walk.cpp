@@ -7,25 +7,22 @@
 #include "config/daemon/daemon_config.hpp"
 #include "config/text/printable_text.hpp"
 #include "daemon/history/format/chunk_codec.hpp"
-#include "estimator/checks.hpp"
 
 namespace thermocomp {
 
 void InputsInForce::apply(const Record& record) {
-  const bool has_time = record.kind == RecordKind::reading || record.kind == RecordKind::link;
-  if (has_time && !is_grid_time(record.time_ns)) throw HistoryError("damaged: an impossible time");
   const auto require_below = [&](std::size_t size) {
-    if (record.index >= size) throw HistoryError("damaged: a record names what does not exist");
+    require_sound(record.index < size, "a record names what does not exist");
   };
   switch (record.kind) {
-    case RecordKind::reading:
+    case RecordKind::reading: {
+      const nanoseconds taken_at = grid_time_from(record.time_ns);
       require_below(readings.size());
-      if (record.detail >= faults_count) throw HistoryError("damaged: unknown fault");
-      readings[record.index] = {record.value, nanoseconds(record.time_ns),
-                                static_cast<Fault>(record.detail)};
+      readings[record.index] = {record.value, taken_at, fault_from(record.detail)};
       break;
+    }
     case RecordKind::link:
-      controller.taken_at = nanoseconds(record.time_ns);
+      controller.taken_at = grid_time_from(record.time_ns);
       controller.link_epoch = record.index;
       set_link_bits(record.detail, controller);
       break;
@@ -54,17 +51,10 @@ InputsInForce inputs_at(const SegmentStart& start, const EstimatorConfig& config
   return {start.readings, start.controller};
 }
 
-HistoryClock::HistoryClock(const HistoryReader& reader) {
-  for (const SegmentInfo& segment : reader.segments()) {
-    const std::string why = places_.add(segment);
-    THERMOCOMP_ENSURE(why.empty());  // the reader has dropped segments without a place
-  }
-}
-
-double HistoryClock::seconds_at(const SegmentInfo& segment, std::uint64_t cycle) const {
-  const std::int64_t time_ns =
-      segment.grid.time_of(cycle).count() + places_.grid_to_history_ns(segment.run);
-  return static_cast<double>(time_ns) * 1e-9;
+bool is_in_a_block(const EstimatorConfig& config, std::size_t sensor) {
+  return std::any_of(config.blocks.begin(), config.blocks.end(), [&](const BlockConfig& block) {
+    return std::find(block.sensors.begin(), block.sensors.end(), sensor) != block.sensors.end();
+  });
 }
 
 ReplaySetup parse_setup(const SegmentSetup& setup) {
@@ -85,11 +75,13 @@ ParsedSetups::ParsedSetups(const HistoryReader& reader, const SetupParser& parse
 }
 
 const ReplaySetup& ParsedSetups::of(const SegmentInfo& segment) const {
-  const auto failure = failures_.find(segment.setup);
-  if (failure != failures_.end()) {
-    throw HistoryError("its configuration cannot be used: " + failure->second);
-  }
-  return setups_.at(segment.setup);
+  if (const ReplaySetup* setup = find(segment)) return *setup;
+  throw HistoryError("its configuration cannot be used: " + failures_.at(segment.setup));
+}
+
+const ReplaySetup* ParsedSetups::find(const SegmentInfo& segment) const {
+  const auto found = setups_.find(segment.setup);
+  return found == setups_.end() ? nullptr : &found->second;
 }
 
 std::string damage_line(const HistoryDamage& damage) {
@@ -122,7 +114,7 @@ SegmentSteps::SegmentSteps(const HistoryReader& reader, const SegmentInfo& segme
                            const ReplaySetup& setup)
     : segment_(segment),
       estimator_(setup.estimator, setup.model),
-      cursor_(reader.records(segment)),
+      cursor_(reader, segment),
       next_cycle_(segment.first_cycle) {
   const SegmentStart start = reader.start(segment);
   estimator_.load_state(start.estimator_state);

@@ -16,6 +16,8 @@
 
 namespace thermocomp {
 
+[[nodiscard]] bool is_in_a_block(const EstimatorConfig& config, std::size_t sensor);
+
 /// Configuration and model of a segment's estimator.
 struct ReplaySetup {
   EstimatorConfig estimator;
@@ -40,16 +42,6 @@ struct InputsInForce {
 /// @throws HistoryError when the number of readings differs from that of the sensors
 [[nodiscard]] InputsInForce inputs_at(const SegmentStart& start, const EstimatorConfig& config);
 
-/// Seconds since the history's first cycle, see HistoryPlaces.
-class HistoryClock {
- public:
-  explicit HistoryClock(const HistoryReader& reader);
-  [[nodiscard]] double seconds_at(const SegmentInfo& segment, std::uint64_t cycle) const;
-
- private:
-  HistoryPlaces places_;
-};
-
 /// The setups of all segments, each parsed once.
 class ParsedSetups {
  public:
@@ -57,7 +49,13 @@ class ParsedSetups {
   ParsedSetups(const HistoryReader& reader, const SetupParser& parser);
   /// @throws HistoryError when the segment's configuration is missing or cannot be used
   [[nodiscard]] const ReplaySetup& of(const SegmentInfo& segment) const;
+  /// nullptr when it cannot be used
+  [[nodiscard]] const ReplaySetup* find(const SegmentInfo& segment) const;
   [[nodiscard]] const std::map<std::int64_t, ReplaySetup>& all() const noexcept { return setups_; }
+  /// Parse errors, by setup.
+  [[nodiscard]] const std::map<std::int64_t, std::string>& failures() const noexcept {
+    return failures_;
+  }
 
  private:
   std::map<std::int64_t, ReplaySetup> setups_;    ///< by setup, in order of appearance

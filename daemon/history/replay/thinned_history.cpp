@@ -169,7 +169,9 @@ class Thinning {
           last < static_cast<double>(segment.first_cycle))
         continue;
       if (!open_setup(segment)) continue;
-      ChunkRange range{&segment, 0, chunk_count(segment)};
+      ChunkRange range{
+          &segment, 0,
+          database_.number("SELECT max(number) + 1 FROM chunk WHERE segment = ?", segment.id)};
       range.first = first_reaching(segment, range.end, first);
       range.end = std::min(range.end, first_reaching(segment, range.end, last) + 1);
       ranges.push_back(range);
@@ -200,12 +202,6 @@ class Thinning {
     return place;
   }
 
-  std::int64_t chunk_count(const SegmentInfo& segment) {
-    Statement row(database_, "SELECT max(number) + 1 FROM chunk WHERE segment = ?");
-    row.bind(segment.id);
-    return row.step() ? row.number(0) : 0;
-  }
-
   /// The first chunk that reaches the cycle, by bisection; `end` if none does.
   std::int64_t first_reaching(const SegmentInfo& segment, std::int64_t end, double cycle) {
     std::int64_t low = 0;
@@ -214,8 +210,8 @@ class Thinning {
       const std::int64_t middle = low + (high - low) / 2;
       Statement probe(database_,
                       "SELECT through_cycle FROM chunk WHERE segment = ? AND number >= ?"
-                      " ORDER BY number LIMIT 1");
-      probe.bind(segment.id).bind(middle);
+                      " ORDER BY number LIMIT 1",
+                      segment.id, middle);
       const bool reaches = !probe.step() || static_cast<double>(probe.number(0)) >= cycle;
       if (reaches)
         high = middle;
@@ -230,23 +226,22 @@ class Thinning {
       std::optional<ChunkContent> content = read_chunk(database_, segment.id, number);
       if (!content) return;  // deleted meanwhile, or missing: its interval stays empty
       ++result_.chunks_read;
-      add_records(segment, content->numbers, std::move(content->records));
+      add_records(segment, std::move(*content));
     } catch (const HistoryError& error) {
       note(segment.id, error.what());
     }
   }
 
-  void add_records(const SegmentInfo& segment, const ChunkNumbers& numbers,
-                   std::vector<std::byte> bytes) {
-    if (numbers.count < 0 || static_cast<std::size_t>(numbers.count) > bytes.size())
-      throw HistoryError("damaged: more records than bytes");
+  void add_records(const SegmentInfo& segment, ChunkContent content) {
+    const auto count = static_cast<std::uint64_t>(content.count);
+    require_sound(count <= content.records.size(), "more records than bytes");
     const bool is_sound =
-        numbers.wall_minus_grid_ns >= -grid_ns_max && numbers.wall_minus_grid_ns <= wall_ns_max;
+        content.wall_minus_grid_ns >= -grid_ns_max && content.wall_minus_grid_ns <= wall_ns_max;
     const std::int64_t difference_ns =
-        is_sound ? numbers.wall_minus_grid_ns
+        is_sound ? content.wall_minus_grid_ns
                  : segment.wall_ns - segment.grid.time_of(segment.first_cycle).count();
     const Places& places = places_.at(segment.setup);
-    ChunkDecoder chunk(std::move(bytes), static_cast<std::uint64_t>(numbers.count));
+    ChunkDecoder chunk(std::move(content.records), count);
     for (Record record; chunk.next(record);) {
       if (record.cycle > static_cast<std::uint64_t>(segment.last_cycle)) break;
       const std::optional<std::size_t> place = place_of(record, places);

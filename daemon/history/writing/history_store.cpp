@@ -4,7 +4,9 @@
 #include <chrono>
 #include <cmath>
 #include <ctime>
+#include <fmt/chrono.h>
 #include <fmt/format.h>
+#include <iterator>
 #include <utility>
 
 #include <nlohmann/json.hpp>
@@ -54,12 +56,7 @@ constexpr double events_max = 20000.0;
 constexpr double event_bytes = 400.0;
 
 std::string utc_stamp() {
-  const std::time_t now = std::time(nullptr);
-  std::tm parts{};
-  gmtime_r(&now, &parts);
-  char text[32];
-  std::strftime(text, sizeof text, "%Y%m%dT%H%M%SZ", &parts);
-  return text;
+  return fmt::format("{:%Y%m%dT%H%M%SZ}", fmt::gmtime(std::time(nullptr)));
 }
 
 /// Rolls back unless committed.
@@ -95,7 +92,7 @@ void PendingRows::add(SegmentRow row) {
 
 void PendingRows::add(ChunkRow row) {
   bytes_ += row.records.size() + sizeof(ChunkRow);
-  records_ += row.count;
+  records_ += static_cast<std::uint64_t>(row.count);
   rows_.emplace_back(std::move(row));
 }
 
@@ -243,8 +240,8 @@ void HistoryStore::forget_lost_tokens() {
   }
   chunks_before_ = 0;
   std::erase_if(tokens_, [this](const Tokens::value_type& token) {
-    Statement known(*database_, "SELECT 1 FROM segment WHERE id = ? AND run = ? AND token = ?");
-    return !known.bind(token.second).bind(run_).bind(token.first).step();
+    return database_->number("SELECT 1 FROM segment WHERE id = ? AND run = ? AND token = ?",
+                             token.second, run_, token.first) == 0;
   });
 }
 
@@ -287,10 +284,9 @@ void HistoryStore::write(const PendingRows& pending, bool prove) {
   if (pending.rows().empty() && !prove) return;
   Tokens tokens = tokens_;
   Transaction transaction(*database_);
-  if (prove) {
-    Statement statement(*database_, "INSERT OR REPLACE INTO meta VALUES ('opened_wall_ns', ?)");
-    statement.bind(std::string_view(std::to_string(wall_now_ns()))).run();
-  }
+  if (prove)
+    database_->run("INSERT OR REPLACE INTO meta VALUES ('opened_wall_ns', ?)",
+                   std::to_string(wall_now_ns()));
   for (const PendingRows::Row& row : pending.rows()) {
     if (const auto* segment = std::get_if<SegmentRow>(&row)) {
       insert(*segment, tokens);
@@ -310,75 +306,57 @@ void HistoryStore::write(const PendingRows& pending, bool prove) {
 
 void HistoryStore::read_back(const PendingRows& pending) {
   Database reader(config_.file, DatabaseMode::read_only);
-  const auto require = [this](Statement& row) {
-    if (!row.step())
+  const auto require = [&](const char* sql, const auto&... values) {
+    if (reader.number(sql, values...) == 0)
       throw HistoryError(config_.file.string() + ": committed records cannot be read back");
   };
   for (const PendingRows::Row& row : pending.rows()) {
     if (const auto* segment = std::get_if<SegmentRow>(&row)) {
-      Statement known(reader, "SELECT 1 FROM segment WHERE run = ? AND token = ?");
-      require(known.bind(run_).bind(segment->token));
+      require("SELECT 1 FROM segment WHERE run = ? AND token = ?", run_, segment->token);
     } else if (const auto* chunk = std::get_if<ChunkRow>(&row)) {
-      Statement known(reader,
-                      "SELECT 1 FROM chunk JOIN segment ON segment.id = chunk.segment"
-                      " WHERE run = ? AND token = ? AND number = ? AND chunk.records = ?");
-      known.bind(run_).bind(chunk->segment_token).bind(chunk->number);
-      require(known.bind(std::span<const std::byte>(chunk->records)));
+      require(
+          "SELECT 1 FROM chunk JOIN segment ON segment.id = chunk.segment"
+          " WHERE run = ? AND token = ? AND number = ? AND chunk.records = ?",
+          run_, chunk->segment_token, chunk->number, chunk->records);
     } else {
-      Statement known(reader, "SELECT 1 FROM event WHERE run = ? AND number = ?");
-      require(known.bind(run_).bind(static_cast<std::int64_t>(std::get<Event>(row).number)));
+      require("SELECT 1 FROM event WHERE run = ? AND number = ?", run_,
+              static_cast<std::int64_t>(std::get<Event>(row).number));
     }
   }
 }
 
 std::int64_t HistoryStore::setup_id(const SegmentSetup& setup) {
-  Statement known(*database_,
-                  "SELECT id FROM setup WHERE config_text = ? AND model_text = ?"
-                  " AND model_checksum = ?");
-  known.bind(std::string_view(setup.config_text))
-      .bind(std::string_view(setup.model_text))
-      .bind(std::string_view(setup.model_checksum));
-  if (known.step()) return known.number(0);
-  Statement added(*database_,
-                  "INSERT INTO setup (config_text, model_text, model_checksum) VALUES (?, ?, ?)");
-  added.bind(std::string_view(setup.config_text))
-      .bind(std::string_view(setup.model_text))
-      .bind(std::string_view(setup.model_checksum))
-      .run();
+  const std::int64_t known = database_->number(
+      "SELECT id FROM setup WHERE config_text = ? AND model_text = ? AND model_checksum = ?",
+      setup.config_text, setup.model_text, setup.model_checksum);
+  if (known != 0) return known;
+  database_->run("INSERT INTO setup (config_text, model_text, model_checksum) VALUES (?, ?, ?)",
+                 setup.config_text, setup.model_text, setup.model_checksum);
   return sqlite3_last_insert_rowid(database_->handle());
 }
 
 void HistoryStore::insert(const SegmentRow& row, Tokens& tokens) {
   // A commit reported as failed may have succeeded.
-  Statement known(*database_, "SELECT id FROM segment WHERE run = ? AND token = ?");
-  known.bind(run_).bind(row.token);
-  if (known.step()) {
-    tokens[row.token] = known.number(0);
-    return;
-  }
-  const std::int64_t setup = setup_id(*row.setup);
-  Statement statement(
-      *database_,
+  std::int64_t& id = tokens[row.token];
+  id = database_->number("SELECT id FROM segment WHERE run = ? AND token = ?", run_, row.token);
+  if (id != 0) return;
+  const auto first_cycle = static_cast<std::int64_t>(row.first_cycle);
+  database_->run(
       "INSERT INTO segment (run, token, setup, reason, grid_start_ns, period_ns, first_cycle,"
       " last_cycle, wall_ns, last_wall_ns, records, bytes, program_version, inputs,"
-      " estimator_state) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 0, 0, ?, ?, ?)");
-  const auto first_cycle = static_cast<std::int64_t>(row.first_cycle);
-  statement.bind(run_).bind(row.token).bind(setup).bind(static_cast<std::int64_t>(row.reason));
-  statement.bind(row.grid.start.count()).bind(row.grid.period.count());
-  statement.bind(first_cycle).bind(first_cycle - 1).bind(row.wall_ns).bind(row.wall_ns);
-  statement.bind(std::string_view(row.program_version));
-  statement.bind(std::span<const std::byte>(row.inputs));
-  statement.bind(std::span<const std::byte>(row.estimator_state)).run();
-  const std::int64_t id = sqlite3_last_insert_rowid(database_->handle());
-  tokens[row.token] = id;
-  Statement seal(*database_, "UPDATE segment SET checksum = ? WHERE id = ?");
-  seal.bind(segment_checksum(*database_, id)).bind(id).run();
+      " estimator_state) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 0, 0, ?, ?, ?)",
+      run_, row.token, setup_id(*row.setup), static_cast<std::int64_t>(row.reason),
+      row.grid.start.count(), row.grid.period.count(), first_cycle, first_cycle - 1, row.wall_ns,
+      row.wall_ns, row.program_version, row.inputs, row.estimator_state);
+  id = sqlite3_last_insert_rowid(database_->handle());
+  database_->run("UPDATE segment SET checksum = ? WHERE id = ?", segment_checksum(*database_, id),
+                 id);
 }
 
 /// True if the row exists, from a commit reported as failed. Existing rows are never replaced.
 bool HistoryStore::is_known(std::int64_t segment, const ChunkRow& row) {
-  Statement known(*database_, "SELECT records FROM chunk WHERE segment = ? AND number = ?");
-  known.bind(segment).bind(row.number);
+  Statement known(*database_, "SELECT records FROM chunk WHERE segment = ? AND number = ?", segment,
+                  row.number);
   if (!known.step()) return false;
   if (known.blob(0) != row.records)
     throw HistoryError(config_.file.string() + ": chunk " + std::to_string(row.number) +
@@ -391,64 +369,55 @@ void HistoryStore::insert(const ChunkRow& row, const Tokens& tokens) {
   const auto segment = tokens.find(row.segment_token);
   if (segment == tokens.end()) throw HistoryError("a chunk without its segment");
   if (is_known(segment->second, row)) return;
-  Statement chunk(*database_,
-                  "INSERT INTO chunk (segment, number, through_cycle,"
-                  " wall_minus_grid_ns, count, records, checksum)"
-                  " VALUES (?, ?, ?, ?, ?, ?, ?)");
-  chunk.bind(segment->second).bind(row.number).bind(row.through_cycle);
-  chunk.bind(row.wall_minus_grid_ns).bind(static_cast<std::int64_t>(row.count));
-  chunk.bind(std::span<const std::byte>(row.records));
-  const ChunkNumbers numbers{row.number, static_cast<std::int64_t>(row.count), row.through_cycle,
-                             row.wall_minus_grid_ns};
-  chunk.bind(checksum_of(numbers, row.records)).run();
-  Statement update(*database_,
-                   "UPDATE segment SET last_cycle = ?, last_wall_ns = ?, records = records + ?,"
-                   " bytes = bytes + ? WHERE id = ?");
-  update.bind(row.through_cycle).bind(wall_now_ns()).bind(static_cast<std::int64_t>(row.count));
-  update.bind(static_cast<std::int64_t>(row.records.size())).bind(segment->second).run();
+  database_->run(
+      "INSERT INTO chunk (segment, number, through_cycle,"
+      " wall_minus_grid_ns, count, records, checksum)"
+      " VALUES (?, ?, ?, ?, ?, ?, ?)",
+      segment->second, row.number, row.through_cycle, row.wall_minus_grid_ns, row.count,
+      row.records, checksum_of(row));
+  database_->run(
+      "UPDATE segment SET last_cycle = ?, last_wall_ns = ?, records = records + ?,"
+      " bytes = bytes + ? WHERE id = ?",
+      row.through_cycle, wall_now_ns(), row.count, std::ssize(row.records), segment->second);
 }
 
 /// Ignores an existing event, from a commit reported as failed.
 void HistoryStore::insert(const Event& row) {
   const std::string record =
       json_of(row).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-  Statement statement(*database_, "INSERT OR IGNORE INTO event VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)");
-  statement.bind(run_).bind(static_cast<std::int64_t>(row.number));
-  statement.bind(static_cast<std::int64_t>(std::llround(1e9 * row.wall_s)));
-  statement.bind(to_string(row.kind)).bind(std::string_view(subject_text(row.subject)));
-  statement.bind(std::string_view(what_text(row)));
-  statement.bind(static_cast<std::int64_t>(
-      std::isfinite(row.duration_s) ? std::llround(1e9 * row.duration_s) : -1));
-  statement.bind(row.user).bind(std::string_view(record)).run();
+  database_->run("INSERT OR IGNORE INTO event VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", run_,
+                 static_cast<std::int64_t>(row.number), std::llround(1e9 * row.wall_s),
+                 to_string(row.kind), subject_text(row.subject), what_text(row),
+                 std::isfinite(row.duration_s) ? std::llround(1e9 * row.duration_s) : -1, row.user,
+                 record);
 }
 
 void HistoryStore::forget_old_events() {
   const double room = 0.05 * config_.size_MB_max * 1e6 / event_bytes;
   const auto kept = static_cast<std::int64_t>(std::min(events_max, room));
   if (database_->number("SELECT count(*) FROM event") <= kept) return;
-  Statement statement(*database_,
-                      "DELETE FROM event WHERE (run, number) IN (SELECT run, number FROM event"
-                      " ORDER BY run DESC, number DESC LIMIT -1 OFFSET ?)");
   // Deletes more at once, so that not every commit has to.
-  statement.bind(kept - kept / 10).run();
+  database_->run(
+      "DELETE FROM event WHERE (run, number) IN (SELECT run, number FROM event"
+      " ORDER BY run DESC, number DESC LIMIT -1 OFFSET ?)",
+      kept - kept / 10);
 }
 
 HistoryStore::OldSegment HistoryStore::oldest_other_than(std::int64_t current) {
   Statement oldest(*database_,
                    "SELECT id, records, (SELECT total(min(max(last_cycle - first_cycle + 1, 0)"
                    " * period_ns, ?)) FROM segment AS later WHERE later.id > segment.id)"
-                   " FROM segment WHERE id <> ? ORDER BY id LIMIT 1");
-  oldest.bind(static_cast<std::int64_t>(segment_lengths_max * config_.segment_h * 3600e9));
-  if (!oldest.bind(current).step()) return {};
+                   " FROM segment WHERE id <> ? ORDER BY id LIMIT 1",
+                   static_cast<std::int64_t>(segment_lengths_max * config_.segment_h * 3600e9),
+                   current);
+  if (!oldest.step()) return {};
   return {oldest.number(0), oldest.number(1), static_cast<double>(oldest.number(2))};
 }
 
 void HistoryStore::delete_segment(std::int64_t id) {
   Transaction transaction(*database_);
-  Statement chunks(*database_, "DELETE FROM chunk WHERE segment = ?");
-  chunks.bind(id).run();
-  Statement segment(*database_, "DELETE FROM segment WHERE id = ?");
-  segment.bind(id).run();
+  database_->run("DELETE FROM chunk WHERE segment = ?", id);
+  database_->run("DELETE FROM segment WHERE id = ?", id);
   database_->run("DELETE FROM setup WHERE id NOT IN (SELECT setup FROM segment)");
   transaction.commit();
 }

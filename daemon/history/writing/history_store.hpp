@@ -47,13 +47,8 @@ struct SegmentRow {
   std::vector<std::byte> inputs;
 };
 
-struct ChunkRow {
+struct ChunkRow : ChunkContent {
   std::int64_t segment_token{0};
-  std::int64_t number{0};
-  std::int64_t through_cycle{-1};  ///< cycles up to this one are complete with this chunk
-  std::int64_t wall_minus_grid_ns{0};
-  std::uint64_t count{0};
-  std::vector<std::byte> records;
 };
 
 /// Rows for the next commit.

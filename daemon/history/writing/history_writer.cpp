@@ -43,10 +43,6 @@ std::string disk_note(const std::filesystem::path& file) {
   return room_bytes < room_bytes_min ? " (its disk is full)" : "";
 }
 
-nanoseconds as_duration(double seconds) {
-  return std::chrono::duration_cast<nanoseconds>(std::chrono::duration<double>(seconds));
-}
-
 /// The segment being recorded.
 struct OpenSegment {
   std::int64_t token{0};
@@ -225,13 +221,10 @@ void HistoryWriter::Parts::close_segment(std::int64_t last_whole_cycle) {
 void HistoryWriter::Parts::cut_chunk() {
   if (!segment) return;
   if (segment->encoder.count() == 0 && segment->through_cycle == segment->chunk_through) return;
-  ChunkRow row;
-  row.segment_token = segment->token;
-  row.number = segment->next_chunk++;
-  row.through_cycle = segment->through_cycle;
-  row.wall_minus_grid_ns = wall_minus_monotonic_ns();
-  row.count = segment->encoder.count();
-  row.records = segment->encoder.take();
+  const auto count = static_cast<std::int64_t>(segment->encoder.count());
+  ChunkRow row{{segment->next_chunk++, count, segment->through_cycle, wall_minus_monotonic_ns(),
+                segment->encoder.take()},
+               segment->token};
   segment->chunk_through = segment->through_cycle;
   segment->bytes += row.records.size();
   pending.add(std::move(row));
@@ -251,11 +244,11 @@ void HistoryWriter::Parts::commit() {
   take_events();
   if (write()) {
     backoff_s = 0.0;
-    next_commit = clocks.monotonic() + as_duration(std::min(config.commit_s, commit_s_max));
+    next_commit = clocks.monotonic() + to_nanoseconds(std::min(config.commit_s, commit_s_max));
     request_if_due();
   } else {
     backoff_s = std::clamp(2.0 * backoff_s, 0.5, backoff_s_max);
-    next_commit = clocks.monotonic() + as_duration(backoff_s);
+    next_commit = clocks.monotonic() + to_nanoseconds(backoff_s);
   }
 }
 
@@ -346,7 +339,7 @@ void HistoryWriter::Parts::request_if_due() {
     return;
   }
   const auto cycles = segment->through_cycle - static_cast<std::int64_t>(segment->first_cycle) + 1;
-  const bool old = grid.period * cycles >= as_duration(config.segment_h * 3600.0);
+  const bool old = grid.period * cycles >= to_nanoseconds(config.segment_h * 3600.0);
   const bool large = static_cast<double>(segment->bytes) > config.size_MB_max * 1e6 / 8.0;
   // A segment has the wall time of its begin, so a clock set later needs a new one.
   const std::int64_t set_by_ns = wall_minus_monotonic_ns() - segment->wall_minus_monotonic_ns;
@@ -381,7 +374,8 @@ std::unique_ptr<CycleRecorder> HistoryWriter::make_recorder(const SegmentSetup& 
     parts_->sessions.push_back({session, std::make_shared<const SegmentSetup>(setup)});
   }
   return std::make_unique<CycleRecorder>(parts_->ring, std::move(session), parts_->grid,
-                                         as_duration(parts_->config.offsets_period_s), estimator);
+                                         to_nanoseconds(parts_->config.offsets_period_s),
+                                         estimator);
 }
 
 void HistoryWriter::note(Event event) {

@@ -12,6 +12,24 @@
 
 namespace thermocomp::testing {
 
+/// With a clock of its own, without the writer's thread; not started.
+class ClockedMachine : public RecordedMachine {
+ public:
+  ClockedMachine(const HistoryConfig& config, unsigned seed)
+      : RecordedMachine(config, seed, 65536,
+                        {[this] { return now; }, [this] { return now + wall_minus_now; }}) {}
+
+  /// Records cycles, and lets the writer work after that time.
+  void work(std::uint64_t cycles, nanoseconds after = std::chrono::seconds(1)) {
+    run(cycles);
+    now += after;
+    writer().work();
+  }
+
+  nanoseconds now{std::chrono::hours(7)};
+  nanoseconds wall_minus_now{0};
+};
+
 template <class Condition>
 bool eventually(Condition condition) {
   for (int i = 0; i < 400; ++i) {

@@ -1,15 +1,13 @@
 // Exports of a history: run files and events.
 #include <cmath>
 #include <sstream>
-#include <stdexcept>
 #include <string>
 
 #include <catch2/catch.hpp>
-#include <sqlite3.h>
 
 #include "config/runs/run_file.hpp"
 #include "daemon/history/reading/history_reader.hpp"
-#include "history_fixture.hpp"
+#include "history_checks.hpp"
 
 using namespace thermocomp;
 using namespace thermocomp::testing;
@@ -33,10 +31,8 @@ TEST_CASE("an export is a run file with the daemon's model inputs", "[history][e
   Report last = machine.estimator().make_report();
   machine.estimator().report(last);
   machine.stop();
-  std::ostringstream out;
-  const ExportSummary summary = export_run(config.file, HistoryTime{5.0, {}}, HistoryTime{20.0, {}},
-                                           out, {}, parse_test_setup);
-  const RunFile run = parse_run(out.str(), "export");
+  const auto [part, summary] = exported(config.file, HistoryTime{5.0, {}}, HistoryTime{20.0, {}});
+  const RunFile run = parse_run(part, "export");
   CHECK(run.rows() == summary.rows);
   CHECK(run.time_s().front() == 0.0);
   CHECK(run.time_s().back() < 15.0);
@@ -47,17 +43,17 @@ TEST_CASE("an export is a run file with the daemon's model inputs", "[history][e
   }
   CHECK(!run.find("bed_degC"));  // included in its block
 
-  std::ostringstream all;
-  REQUIRE(export_run(config.file, {}, {}, all, {}, parse_test_setup).damage.empty());
-  const RunFile whole = parse_run(all.str(), "export");
-  CHECK_FALSE(has_negative_zero(all.str()));
+  const Exported all = exported(config.file);
+  REQUIRE(all.summary.damage.empty());
+  const RunFile whole = parse_run(all.text, "export");
+  CHECK_FALSE(has_negative_zero(all.text));
   const auto columns = machine.estimator().model().temperature_columns();
   for (std::size_t i = 0; i < columns.size(); ++i) {
-    const double damage_text = whole.column(columns[i]).back();
+    const double temp_degC = whole.column(columns[i]).back();
     if (last.inputs[i].good)
-      CHECK(damage_text == last.inputs[i].temp_degC);  // bitwise
+      CHECK(temp_degC == last.inputs[i].temp_degC);  // bitwise
     else
-      CHECK(std::isnan(damage_text));
+      CHECK(std::isnan(temp_degC));
   }
 
   std::ostringstream replayed;
@@ -69,24 +65,15 @@ TEST_CASE("an export is a run file with the daemon's model inputs", "[history][e
 TEST_CASE("an export has timed comments on faults, commands, wall time and reloads",
           "[history][export]") {
   const TempFolder folder;
-  const HistoryConfig config = history_config(folder / "h.db");
-  RecordedMachine machine(config, 12);
-  machine.start();
-  machine.run(4000);
-  machine.reload(5.0);
-  machine.run(1000);
-  machine.stop();
-  std::ostringstream out;
-  export_run(config.file, {}, {}, out, {}, parse_test_setup);
-  CHECK_THAT(out.str(), Catch::Contains("# 0.000 s: wall time "));
-  CHECK_THAT(out.str(), Catch::Contains("# 0.000 s: model SHA-256 sum"));
-  CHECK_THAT(out.str(), Catch::Contains(": sensor bed: open_circuit\n"));
-  CHECK_THAT(out.str(), Catch::Contains(": sensor bed: good again\n"));
-  CHECK_THAT(out.str(), Catch::Contains(": command measured "));
-  CHECK_THAT(out.str(), Catch::Contains("reloaded or restarted with another configuration"));
+  const HistoryConfig config = recorded_history(folder / "h.db", 4000, 1000, 12);
+  const std::string whole = exported(config.file).text;
+  for (const char* comment :
+       {"# 0.000 s: wall time ", "# 0.000 s: model SHA-256 sum", ": sensor bed: open_circuit\n",
+        ": sensor bed: good again\n", ": command measured ",
+        "reloaded or restarted with another configuration"})
+    CHECK_THAT(whole, Catch::Contains(comment));
   // Without the commands before the exported part.
-  std::ostringstream part;
-  export_run(config.file, HistoryTime{49.0, {}}, {}, part, {}, parse_test_setup);
+  const std::string part = exported(config.file, HistoryTime{49.0, {}}).text;
   const auto commands = [](const std::string& text) {
     std::size_t count = 0;
     for (std::size_t at = text.find(": command "); at != std::string::npos;
@@ -94,7 +81,7 @@ TEST_CASE("an export has timed comments on faults, commands, wall time and reloa
       ++count;
     return count;
   };
-  CHECK(commands(part.str()) < commands(out.str()));
+  CHECK(commands(part) < commands(whole));
 }
 
 TEST_CASE("an export of sensors has every raw reading and no inputs", "[history][export]") {
@@ -111,9 +98,7 @@ TEST_CASE("a probing is exported as displacement, without the offset in effect",
           "[history][export]") {
   const TempFolder folder;
   const HistoryConfig config = recorded_history(folder / "h.db", 20000, 0, 12);
-  std::ostringstream out;
-  export_run(config.file, {}, {}, out, {}, parse_test_setup);
-  const RunFile run = parse_run(out.str(), "export");
+  const RunFile run = parse_run(exported(config.file).text, "export");
   std::size_t probed = 0;
   for (const char* axis : {"y", "z"}) {
     const std::string name(axis);
@@ -209,29 +194,13 @@ TEST_CASE("a start is told from when on no daemon had run", "[history][events]")
   CHECK(std::isnan(read[3].duration_s));  // a run without records that was not stopped
 }
 
-TEST_CASE("times are seconds or wall times, and anything else is refused", "[history][export]") {
-  CHECK(*parse_history_time("12.5").seconds == 12.5);
-  CHECK(*parse_history_time("1970-01-02T00:00:00Z").wall_ns == 86'400'000'000'000);
-  CHECK(*parse_history_time("1970-01-02T01:00+01:00").wall_ns == 86'400'000'000'000);
-  CHECK(parse_history_time("2026-03-01").wall_ns.has_value());
-  for (const char* text : {"", "yesterday", "nan", "2026-13-01", "2026-02-31", "2026-03-01T25:00",
-                           "2026-03-01T08:30:00+1", "12 s"}) {
-    CHECK_THROWS_AS(parse_history_time(text), std::invalid_argument);
-  }
-}
-
 TEST_CASE("texts of a damaged history do not add lines to an export", "[history][export][damage]") {
   const TempFolder folder;
   const HistoryConfig config = recorded_history(folder / "h.db", 500, 0, 12);
-  sqlite3* handle = nullptr;
-  REQUIRE(sqlite3_open(config.file.c_str(), &handle) == SQLITE_OK);
-  REQUIRE(sqlite3_exec(handle,
-                       "UPDATE setup SET model_checksum = 'a' || char(10) || '1,2,3' || char(27);"
-                       "UPDATE segment SET checksum = NULL",
-                       nullptr, nullptr, nullptr) == SQLITE_OK);
-  sqlite3_close(handle);
-  std::ostringstream out;
-  const ExportSummary summary = export_run(config.file, {}, {}, out, {}, parse_test_setup);
-  CHECK(out.str().find('\033') == std::string::npos);
-  CHECK(parse_run(out.str(), "export").rows() == summary.rows);
+  run_sql(config.file,
+          "UPDATE setup SET model_checksum = 'a' || char(10) || '1,2,3' || char(27);"
+          "UPDATE segment SET checksum = NULL");
+  const auto [text, summary] = exported(config.file);
+  CHECK(text.find('\033') == std::string::npos);
+  CHECK(parse_run(text, "export").rows() == summary.rows);
 }

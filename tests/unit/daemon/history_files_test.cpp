@@ -17,14 +17,9 @@ TEST_CASE(
   const HistoryConfig config = history_config(folder / "h.db");
   const std::string wal = config.file.string() + "-wal";
   const std::string shm = config.file.string() + "-shm";
-  nanoseconds now = std::chrono::hours(7);
-  RecordedMachine machine(config, 11, 65536, {[&] { return now; }, [&] { return now; }});
+  ClockedMachine machine(config, 11);
   machine.open();
-  const auto commit = [&] {
-    machine.run(300);
-    now += std::chrono::seconds(1);
-    machine.writer().work();
-  };
+  const auto commit = [&] { machine.work(300); };
   for (int i = 0; i < 5; ++i) commit();
   std::filesystem::copy_file(wal, folder / "old-wal");
   for (int i = 0; i < 5; ++i) commit();
@@ -74,14 +69,9 @@ TEST_CASE("rows whose only copy was in a removed -wal wait until they can be wri
           "[history][files]") {
   const TempFolder folder;
   const HistoryConfig config = history_config(folder / "h.db");
-  nanoseconds now = std::chrono::hours(7);
-  RecordedMachine machine(config, 12, 65536, {[&] { return now; }, [&] { return now; }});
+  ClockedMachine machine(config, 12);
   machine.open();
-  const auto commit = [&] {
-    machine.run(3000);
-    now += std::chrono::seconds(1);
-    machine.writer().work();
-  };
+  const auto commit = [&] { machine.work(3000); };
   commit();
   // Rows committed while a reader is active stay in the log.
   sqlite3* reader = nullptr;
@@ -105,7 +95,7 @@ TEST_CASE("rows whose only copy was in a removed -wal wait until they can be wri
   CHECK(failed.errors > 0);
   CHECK(failed.lost == 0);
   CHECK(damage_text(machine.writer().take_messages()).empty());
-  now += std::chrono::minutes(1);
+  machine.now += std::chrono::minutes(1);
   commit();
   CHECK_THAT(damage_text(machine.writer().take_messages()), Catch::Contains("reopened"));
   CHECK(machine.writer().statistics().replaced == 1);
@@ -122,14 +112,9 @@ TEST_CASE("a moved history or folder is reported and a new history begins", "[hi
   const TempFolder folder;
   std::filesystem::create_directory(folder / "place");
   const HistoryConfig config = history_config(folder / "place/h.db");
-  nanoseconds now = std::chrono::hours(7);
-  RecordedMachine machine(config, 12, 65536, {[&] { return now; }, [&] { return now; }});
+  ClockedMachine machine(config, 12);
   machine.open();
-  const auto commit = [&] {
-    machine.run(300);
-    now += std::chrono::seconds(70);
-    machine.writer().work();
-  };
+  const auto commit = [&] { machine.work(300, std::chrono::seconds(70)); };
   for (int i = 0; i < 5; ++i) commit();
   const std::uint64_t written = machine.writer().statistics().records;
   std::filesystem::path moved = folder / "moved.db";
@@ -155,23 +140,14 @@ TEST_CASE("a file that is not a database is moved aside and a new one begins", "
   const TempFolder folder;
   const HistoryConfig config = history_config(folder / "h.db");
   std::ofstream(config.file) << std::string(20000, 'x');
-  RecordedMachine machine(config, 6);
-  machine.start();
-  machine.run(300);
-  machine.stop();
+  recorded_history(config.file, 300);
   CHECK(has_moved_aside(folder.path()));
   CHECK(replay_quietly(config.file).different == 0);
 }
 
 TEST_CASE("a file that is damaged while running is moved aside", "[history]") {
   const TempFolder folder;
-  const HistoryConfig config = history_config(folder / "h.db");
-  {
-    RecordedMachine machine(config, 7);
-    machine.start();
-    machine.run(20000);
-    machine.stop();
-  }
+  const HistoryConfig config = recorded_history(folder / "h.db", 20000, 0, 7);
   std::fstream file(config.file, std::ios::in | std::ios::out | std::ios::binary);
   file.seekp(4096);
   file << std::string(40000, '\xA5');
@@ -194,21 +170,13 @@ TEST_CASE("a newer version and another program's database are refused", "[histor
   const TempFolder folder;
   const HistoryConfig config = history_config(folder / "h.db");
   SECTION("newer") {
-    {
-      RecordedMachine machine(config, 9);
-      machine.start();
-      machine.stop();
-    }
+    recorded_history(config.file, 0);
     run_sql(config.file, "PRAGMA user_version = 99");
     CHECK_THROWS_WITH(HistoryReader(config.file), Catch::Contains("version 99"));
     CHECK_THROWS_WITH(HistoryWriter(config, Grid{}, "test").start(), Catch::Contains("version 99"));
   }
   SECTION("of no version") {
-    {
-      RecordedMachine machine(config, 9);
-      machine.start();
-      machine.stop();
-    }
+    recorded_history(config.file, 0);
     const std::string version = GENERATE(as<std::string>(), "0", "-1");
     run_sql(config.file, ("PRAGMA user_version = " + version).c_str());
     CHECK_THROWS_WITH(HistoryReader(config.file), Catch::Contains("version " + version));

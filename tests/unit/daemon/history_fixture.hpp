@@ -5,7 +5,9 @@
 #include <array>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <random>
+#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -155,6 +157,18 @@ inline HistoryConfig history_config(const std::filesystem::path& file) {
   config.commit_s = 0.1;
   config.offsets_period_s = 0.1;
   return config;
+}
+
+struct Exported {
+  std::string text;
+  ExportSummary summary;
+};
+inline Exported exported(const std::filesystem::path& file,
+                         const std::optional<HistoryTime>& from = {},
+                         const std::optional<HistoryTime>& to = {}) {
+  std::ostringstream out;
+  ExportSummary summary = export_run(file, from, to, out, {}, parse_test_setup);
+  return {out.str(), std::move(summary)};
 }
 
 /// Records cycles before and after a reload.

@@ -39,16 +39,12 @@ TEST_CASE("a stop in the first cycle of a segment leaves a readable segment", "[
   const TempFolder folder;
   HistoryConfig config = history_config(folder / "h.db");
   config.segment_h = 3.0 / 3600.0;
-  nanoseconds now = std::chrono::hours(7);
-  RecordedMachine machine(config, 4, 65536, {[&] { return now; }, [&] { return now; }});
+  ClockedMachine machine(config, 4);
   machine.open();
-  machine.run(401);
-  now += std::chrono::seconds(4);
-  machine.writer().work();
+  machine.work(401, std::chrono::seconds(4));
   machine.run(1);
   machine.stop();
-  now += std::chrono::seconds(1);
-  machine.writer().work();
+  machine.work(0);
   const ReplaySummary summary = replay_quietly(config.file);
   CHECK(summary.segments == 2);
   CHECK(damage_text(summary.damage).empty());
@@ -92,13 +88,12 @@ TEST_CASE("rows that no daemon wrote are reported as damage and never make a rep
     run_sql(config.file, "UPDATE segment SET checksum = NULL; UPDATE chunk SET checksum = NULL");
   }
   INFO(damage << ", with checksums: " << has_checksums);
-  std::ostringstream out;
   const bool only_reported = damage.find("wall") != std::string::npos;
   const ReplaySummary replayed = replay_quietly(config.file);
   CHECK((only_reported || !replayed.damage.empty()));
-  const ExportSummary exported = export_run(config.file, {}, {}, out, {}, parse_test_setup);
-  CHECK(!exported.damage.empty());
-  CHECK_THAT(out.str(), Catch::Contains("# damaged: segment 1: "));
+  const auto [text, summary] = exported(config.file);
+  CHECK(!summary.damage.empty());
+  CHECK_THAT(text, Catch::Contains("# damaged: segment 1: "));
   CHECK(!check_history(config.file, {}, parse_test_setup).is_sound());
 }
 
@@ -116,9 +111,8 @@ TEST_CASE("one flipped bit costs one chunk; all others are exported and replayed
   machine.run(500);
   machine.stop();
   REQUIRE(check_history(config.file, {}, parse_test_setup).is_sound());
-  std::ostringstream whole;
-  const ExportSummary before = export_run(config.file, {}, {}, whole, {}, parse_test_setup);
-  REQUIRE(before.damage.empty());
+  const Exported before = exported(config.file);
+  REQUIRE(before.summary.damage.empty());
   run_sql(config.file,
           "UPDATE chunk SET records = substr(records, 1, 40) || x'55' || substr(records, 42)"
           " WHERE segment = 1 AND number = 2");
@@ -127,13 +121,12 @@ TEST_CASE("one flipped bit costs one chunk; all others are exported and replayed
   CHECK_THAT(damage_text(check.segments[0].damage),
              Catch::Contains("chunk 2 does not fit its checksum"));
   CHECK(check.segments[1].damage.empty());
-  std::ostringstream out;
-  const ExportSummary after = export_run(config.file, {}, {}, out, {}, parse_test_setup);
-  CHECK_THAT(out.str(), Catch::Contains("# damaged: segment 1: chunk 2"));
-  CHECK(after.rows < before.rows);
-  CHECK(after.rows > before.rows / 2);
-  const std::string last_row = whole.str().substr(whole.str().rfind('\n', whole.str().size() - 2));
-  CHECK_THAT(out.str(), Catch::EndsWith(last_row));
+  const Exported after = exported(config.file);
+  CHECK_THAT(after.text, Catch::Contains("# damaged: segment 1: chunk 2"));
+  CHECK(after.summary.rows < before.summary.rows);
+  CHECK(after.summary.rows > before.summary.rows / 2);
+  const std::string last_row = before.text.substr(before.text.rfind('\n', before.text.size() - 2));
+  CHECK_THAT(after.text, Catch::EndsWith(last_row));
   const ReplaySummary replayed = replay_quietly(config.file);
   CHECK(replayed.segments == 1);
   CHECK(replayed.compared > 0);
@@ -143,12 +136,10 @@ TEST_CASE("one flipped bit costs one chunk; all others are exported and replayed
 TEST_CASE("a clock set beyond the year 2116 costs only the wall time", "[history][damage]") {
   const TempFolder folder;
   const HistoryConfig config = recorded_history(folder / "h.db", 500, 500);
-  std::ostringstream whole;
-  const ExportSummary before = export_run(config.file, {}, {}, whole, {}, parse_test_setup);
+  const ExportSummary before = exported(config.file).summary;
   run_sql(config.file,
           "UPDATE segment SET wall_ns = 9000000000000000000, checksum = NULL WHERE id = 2");
-  std::ostringstream out;
-  const ExportSummary after = export_run(config.file, {}, {}, out, {}, parse_test_setup);
+  const ExportSummary after = exported(config.file).summary;
   CHECK(after.rows == before.rows);
   CHECK_THAT(damage_text(after.damage), Catch::Contains("segment 2: its wall time is impossible"));
   CHECK(replay_quietly(config.file).segments == 2);
@@ -228,27 +219,21 @@ TEST_CASE("the file keeps its size bound by deleting the oldest segments", "[his
 TEST_CASE("a wrong wall clock deletes no history; recorded time does", "[history]") {
   using std::chrono::hours;
   using std::chrono::minutes;
-  using std::chrono::seconds;
   const TempFolder folder;
   HistoryConfig config = history_config(folder / "h.db");
   config.segment_h = 10.0 / 3600.0;
   config.age_days_max = 150.0 / 86400.0;
-  nanoseconds now = hours(7);
-  nanoseconds stepped{0};
-  const nanoseconds wall_minus_now = seconds(1'780'000'000);
-  RecordedMachine machine(config, 9, 65536,
-                          {[&] { return now; }, [&] { return wall_minus_now + now + stepped; }});
+  constexpr nanoseconds wall_minus_now = std::chrono::seconds(1'780'000'000);
+  ClockedMachine machine(config, 9);
   const auto segments_after = [&](nanoseconds time) {
-    machine.run(1100);  // records 11 s
-    now += time;
-    machine.writer().work();
+    machine.work(1100, time);  // records 11 s
     return machine.writer().statistics().segments;
   };
   machine.open();
   std::uint64_t segments = 0;
   for (const nanoseconds wrong :
        {nanoseconds{0}, nanoseconds(hours(24 * 3650)), nanoseconds(-wall_minus_now)}) {
-    stepped = wrong;
+    machine.wall_minus_now = wall_minus_now + wrong;
     for (int i = 0; i < 4; ++i) {
       const std::uint64_t before = segments;
       segments = segments_after(minutes(61));
@@ -257,7 +242,7 @@ TEST_CASE("a wrong wall clock deletes no history; recorded time does", "[history
   }
   CHECK(machine.writer().statistics().deleted == 0);
   CHECK(machine.writer().take_messages().empty());
-  stepped = nanoseconds{0};
+  machine.wall_minus_now = wall_minus_now;
   for (int i = 0; i < 12; ++i) segments = segments_after(minutes(1));
   const HistoryStatistics statistics = machine.writer().statistics();
   CHECK(statistics.deleted >= 8);
@@ -272,13 +257,8 @@ TEST_CASE("a wrong wall clock deletes no history; recorded time does", "[history
 
 TEST_CASE("a segment of damaged length does not age the others", "[history]") {
   const TempFolder folder;
-  HistoryConfig config = history_config(folder / "h.db");
-  for (unsigned seed = 0; seed < 3; ++seed) {
-    RecordedMachine machine(config, seed);
-    machine.start();
-    machine.run(500);
-    machine.stop();
-  }
+  const HistoryConfig config = history_config(folder / "h.db");
+  for (unsigned seed = 0; seed < 3; ++seed) recorded_history(config.file, 500, 0, seed);
   run_sql(config.file, "UPDATE segment SET last_cycle = 1000000000000000 WHERE id = 3");
   RecordedMachine machine(config, 4);
   machine.start();
@@ -292,23 +272,14 @@ TEST_CASE("a wall clock that is set begins a segment with the new time", "[histo
   const TempFolder folder;
   const HistoryConfig config = history_config(folder / "h.db");
   const double set_by_s = GENERATE(7200.0, -3600.0);
-  nanoseconds set_by{0};
-  nanoseconds now = std::chrono::hours(7);
-  const nanoseconds wall_minus_now = std::chrono::seconds(1'780'000'000);
-  RecordedMachine machine(config, 1, 65536,
-                          {[&] { return now; }, [&] { return wall_minus_now + now + set_by; }});
+  ClockedMachine machine(config, 1);
+  machine.wall_minus_now = std::chrono::seconds(1'780'000'000);
   machine.open();
-  machine.run(200);
-  machine.writer().work();
-  set_by = to_nanoseconds(set_by_s);
-  for (int i = 0; i < 3; ++i) {
-    now += std::chrono::seconds(10);
-    machine.run(200);
-    machine.writer().work();
-  }
+  machine.work(200, nanoseconds{0});
+  machine.wall_minus_now += to_nanoseconds(set_by_s);
+  for (int i = 0; i < 3; ++i) machine.work(200, std::chrono::seconds(10));
   machine.stop();
-  now += std::chrono::seconds(1);
-  machine.writer().work();
+  machine.work(0);
   const HistoryReader reader(config.file);
   REQUIRE(reader.segments().size() == 2);
   const auto& [before, after] = std::pair(reader.segments()[0], reader.segments()[1]);

@@ -57,13 +57,10 @@ Event measured_z(double wall_s, double value_um) {
 const Subject bed{SubjectKind::sensor, "bed"};
 const Subject cabinet{SubjectKind::bus, "cabinet"};
 
-double spell_s(const std::vector<ModeSpell>& spells, const std::string& mode) {
-  double sum = 0.0;
-  for (const ModeSpell& spell : spells)
-    if (spell.mode == mode) sum += spell.span.length_s();
-  return sum;
-}
-
+/// Wall time of the first cycle of a machine with these clocks: its grid starts at 07:00.
+constexpr double zero_s = 3600.0 * 500007.0;
+const WriterClocks still_clocks{[] { return nanoseconds(0); },
+                                [] { return std::chrono::hours(500000); }};
 /// Temperatures with a daily cycle and noise, sampled every 10 min.
 ThinnedHistory week_of_sensors(double drift_K, std::uint64_t seed) {
   ThinnedHistory course;
@@ -89,11 +86,12 @@ TEST_CASE("time per mode runs between events, clipped to the span and the run's 
       {mode_at(-3600, "starting"), mode_at(0, "compensating"), mode_at(7200, "holding"),
        mode_at(7800, "compensating"), mode_at(20000, "disabled", 2)},
       {{1, begin_s + 10800}, {2, begin_s + 50000}}};
-  const auto spells = mode_spells(events, {begin_s - 600, begin_s + 30000});
-  CHECK(spell_s(spells, "starting") == Approx(600.0).margin(1e-3));
-  CHECK(spell_s(spells, "compensating") == Approx(7200.0 + 3000.0).margin(1e-3));
-  CHECK(spell_s(spells, "holding") == Approx(600.0).margin(1e-3));
-  CHECK(spell_s(spells, "disabled") == Approx(10000.0).margin(1e-3));
+  MachineWeek week;
+  week.modes = mode_spells(events, {begin_s - 600, begin_s + 30000});
+  CHECK(week.mode_s("starting") == Approx(600.0).margin(1e-3));
+  CHECK(week.mode_s("compensating") == Approx(7200.0 + 3000.0).margin(1e-3));
+  CHECK(week.mode_s("holding") == Approx(600.0).margin(1e-3));
+  CHECK(week.mode_s("disabled") == Approx(10000.0).margin(1e-3));
 }
 
 TEST_CASE("time in which an axis is latched is not compensated", "[week]") {
@@ -102,10 +100,11 @@ TEST_CASE("time in which an axis is latched is not compensated", "[week]") {
       {mode_at(0, "compensating"), fault_at(100, z, "mismatch_latched"), mode_at(200, "holding"),
        mode_at(300, "compensating"), recovery_at(400, z, "mismatch_latched")},
       {{1, begin_s + 1000}}};
-  const auto spells = mode_spells(events, {begin_s, begin_s + 1000});
-  CHECK(spell_s(spells, "compensating") == Approx(700.0).margin(1e-3));
-  CHECK(spell_s(spells, "not_driven") == Approx(200.0).margin(1e-3));
-  CHECK(spell_s(spells, "holding") == Approx(100.0).margin(1e-3));
+  MachineWeek week;
+  week.modes = mode_spells(events, {begin_s, begin_s + 1000});
+  CHECK(week.mode_s("compensating") == Approx(700.0).margin(1e-3));
+  CHECK(week.mode_s("not_driven") == Approx(200.0).margin(1e-3));
+  CHECK(week.mode_s("holding") == Approx(100.0).margin(1e-3));
 }
 
 TEST_CASE("outages count and last until their recovery, or the run's end", "[week]") {
@@ -173,6 +172,12 @@ TEST_CASE("a sensor's drift against its neighbour is within its interval of the 
     CHECK(sensors[1].drift_sd_K < 0.3);
   }
   CHECK(within >= 19);
+}
+
+TEST_CASE("sensors that stand still are not alike", "[week]") {
+  ThinnedHistory course = week_of_sensors(0.0, 1);
+  for (ThinnedColumn& column : course.columns) column.values.assign(course.time_s.size(), 19.8);
+  for (const SensorWeek& sensor : sensors_of(course)) CHECK(sensor.neighbour.empty());
 }
 
 TEST_CASE("advice names a drifting sensor, not a steady one", "[week]") {
@@ -273,16 +278,13 @@ TEST_CASE("a point of a course is sent, of a dry run, or of both", "[week]") {
 TEST_CASE("offsets of a dry run are not reported as compensated", "[week]") {
   const TempFolder folder;
   const auto config = history_config(folder / "h.db");
-  const WriterClocks clocks{[] { return nanoseconds(0); },
-                            [] { return std::chrono::hours(500000); }};
-  const double zero_s = 3600.0 * 500007.0;
   // The configuration text is the gain of the model: 2 in a dry run, 0.5 otherwise.
   const SetupParser parser = [](const SegmentSetup& text) {
     ReplaySetup setup = parse_test_setup(text);
     setup.dry_run = std::stod(text.config_text) > 1.0;
     return setup;
   };
-  RecordedMachine machine(config, 11, 65536, clocks);
+  RecordedMachine machine(config, 11, 65536, still_clocks);
   machine.start();
   machine.run(12000);
   machine.writer().note(measured_z(zero_s + 60.0, 2.5));
@@ -333,9 +335,6 @@ TEST_CASE("offsets of a dry run are not reported as compensated", "[week]") {
 TEST_CASE("time with a model of zeros is not compensated", "[week]") {
   const TempFolder folder;
   const auto config = history_config(folder / "h.db");
-  const WriterClocks clocks{[] { return nanoseconds(0); },
-                            [] { return std::chrono::hours(500000); }};
-  const double zero_s = 3600.0 * 500007.0;
   const SetupParser parser = [](const SegmentSetup& text) {
     ReplaySetup setup = parse_test_setup(text);
     if (std::stod(text.config_text) > 1.0) return setup;
@@ -345,7 +344,7 @@ TEST_CASE("time with a model of zeros is not compensated", "[week]") {
       std::fill(row.begin(), row.end(), 0.0);
     return setup;
   };
-  RecordedMachine machine(config, 11, 65536, clocks);
+  RecordedMachine machine(config, 11, 65536, still_clocks);
   machine.start();
   machine.run(12000);
   machine.reload(0.5);
@@ -365,10 +364,7 @@ TEST_CASE("time with a model of zeros is not compensated", "[week]") {
 TEST_CASE("offsets and probings of a recorded machine equal those of replay", "[week]") {
   const TempFolder folder;
   const auto config = history_config(folder / "h.db");
-  const WriterClocks clocks{[] { return nanoseconds(0); },
-                            [] { return std::chrono::hours(500000); }};
-  const double zero_s = 3600.0 * 500007.0;  // the grid starts at 07:00
-  RecordedMachine machine(config, 11, 65536, clocks);
+  RecordedMachine machine(config, 11, 65536, still_clocks);
   machine.start();
   machine.run(12000);  // two minutes
   Event compensating = mode_at(zero_s - begin_s, "compensating");
