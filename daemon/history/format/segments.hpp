@@ -27,6 +27,7 @@ struct SegmentSetup {
   std::string config_text;
   std::string model_text;
   std::string model_checksum;
+  bool operator==(const SegmentSetup&) const = default;
 };
 
 struct SegmentInfo {

@@ -100,14 +100,14 @@ std::uint64_t HistoryMeans::damaged() const noexcept {
 void HistoryMeans::Parts::refresh() {
   newest = std::make_shared<const HistoryReader>(file);
   if (!walk) return;
+  bool is_other_file = newest->segments().empty() || newest->segments().back().id < walk->info.id;
   for (const SegmentInfo& segment : newest->segments()) {
-    if (segment.id != walk->info.id || segment.wall_ns != walk->info.wall_ns) continue;
+    if (segment.id != walk->info.id) continue;
+    is_other_file = segment.wall_ns != walk->info.wall_ns;
+    if (is_other_file) break;
     if (segment.last_cycle > walk->info.last_cycle) walk->walk.extend(segment.last_cycle);
     walk->info.last_cycle = segment.last_cycle;
-    return;
   }
-  const bool is_other_file =
-      newest->segments().empty() || newest->segments().back().id < walk->info.id;
   if (is_other_file) walked = 0;
 }
 
@@ -183,13 +183,13 @@ std::optional<MeansBatch> HistoryMeans::next(std::size_t rows_max, std::int64_t 
       rest();
     }
     if (parts.batch.rows.size() >= rows_max) break;
-    const SegmentInfo before = parts.walk->info;
     if (!parts.open_next()) {
       if (parts.open && wall_s - parts.open->at_s > settled_s) parts.close_mean();
       break;
     }
-    if (parts.walk->info.setup != before.setup ||
-        parts.walk->info.program_version != before.program_version) {
+    // The texts, since in a replaced file the same ID may be another setup's.
+    if (parts.walk->texts != parts.batch.setup ||
+        parts.walk->info.program_version != parts.batch.program_version) {
       parts.close_mean();
       parts.end = parts.walk->at(parts.walk->info.first_cycle);
       if (!parts.batch.rows.empty()) break;  // the next call continues with this segment

@@ -87,6 +87,24 @@ def test_a_new_history_is_sent_from_its_beginning(machine):
     assert_all_there_once(machine)
 
 
+def test_a_history_of_other_sensors_replaces_one_that_is_being_sent(store):
+    machine, other = Machine(store, "mill_1"), Machine(store, "mill_2")
+    for file in ("thermocompd.toml", "model.toml"):
+        text = (other.folder / file).read_text()
+        (other.folder / file).write_text(text.replace("column", "ram"))
+    other.record(hours_ago=2, hours=0.5)
+    machine.record(hours_ago=5, hours=0.5)
+    machine.start()
+    rows = len(machine.recorded())
+    eventually(lambda: machine.count("sample") == rows, "the first history is sent")
+    other.history.rename(machine.history)  # its only segment has the number of the one before
+    rows += len(machine.recorded())
+    eventually(lambda: machine.count("sample") == rows, "so is the other")
+    columns = machine.store.ask("SELECT array_to_string(columns, ' ') FROM fleet.setup ORDER BY number")
+    assert ["column_degC" in names for [names] in columns] == [True, False]
+    machine.end()
+
+
 def test_a_server_that_is_killed_loses_nothing(machine):
     server = machine.store.server
     machine.start()
