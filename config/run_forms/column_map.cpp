@@ -61,6 +61,12 @@ std::string ignore_column(std::string_view header) {
   return "ignore = [" + toml_text(header) + "]";
 }
 
+std::string pivot_or_ignore(std::string_view header) {
+  return "write pivot = [" + toml_text(header) +
+         ", \"the column of the values\"] in the file of --columns, or " + ignore_column(header) +
+         " if all rows are of the same";
+}
+
 ColumnMap parse_column_map(const std::string& text, const std::string& name) {
   const TomlDocument document = TomlDocument::from_text(text, name);
   const TomlTable root = document.root();

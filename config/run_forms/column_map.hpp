@@ -48,9 +48,10 @@ struct ColumnMap {
 };
 
 /// Parts of messages: write "T1" = `value` under [columns] in the file of --columns;
-/// ignore = ["T1"].
+/// ignore = ["T1"]; either, for a column that may name the sensor of each row.
 [[nodiscard]] std::string write_column(std::string_view header, const std::string& value);
 [[nodiscard]] std::string ignore_column(std::string_view header);
+[[nodiscard]] std::string pivot_or_ignore(std::string_view header);
 
 /// "column 3": name of a column without one.
 [[nodiscard]] std::string unnamed(std::size_t column);

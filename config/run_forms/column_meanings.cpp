@@ -248,7 +248,9 @@ class MeaningFinder {
   }
 
   void take(std::size_t i, ColumnMeaning meaning, bool is_mapped) {
-    if (!is_mapped) number_name(meaning);
+    if (!is_mapped)
+      meaning.name =
+          unused_name(meaning.name, [&](const std::string& name) { return names_.contains(name); });
     if (!names_.insert(meaning.name).second) {
       table_.refuse_column(i, "becomes " + meaning.name + ", which appears twice: " +
                                   write_column(meaning.source->header, "\"another name\""));
@@ -256,14 +258,6 @@ class MeaningFinder {
     }
     note(meaning, is_mapped);
     found_.push_back(std::move(meaning));
-  }
-
-  /// Numbers columns of equal names: Temp_degC, Temp_2_degC.
-  void number_name(ColumnMeaning& meaning) const {
-    const std::string suffix(unit_of(meaning.name).suffix);
-    const std::string base = meaning.name.substr(0, meaning.name.size() - suffix.size());
-    for (int i = 2; names_.contains(meaning.name); ++i)
-      meaning.name = base + "_" + std::to_string(i) + suffix;
   }
 
   void note(const ColumnMeaning& meaning, bool is_mapped) {
@@ -281,10 +275,8 @@ class MeaningFinder {
     if (factor != 1.0) text += ", times " + number_text(factor);
     if (offset != 0.0) text += ", plus " + number_text(offset);
     if (kind_of(meaning.name) == QuantityKind::position && meaning.name != header)
-      text +=
-          ", a position (a displacement: " +
-          write_column(header, toml_text(meaning.name.substr(0, meaning.name.size() - 2) + "um")) +
-          ")";
+      text += ", a position (a displacement: " +
+              write_column(header, toml_text(without_unit(meaning.name) + "_um")) + ")";
     note_on(*meaning.source, text);
   }
 
@@ -406,9 +398,9 @@ class MeaningFinder {
                                            : std::nullopt;
     if (!unit && !spelled.unit.empty()) {
       if (!unit_of(mapped.name).suffix.empty() && may_be_unit(spelled.unit))
-        return refused("may not be the unit of '" + column.header +
-                       "': write { name = " + toml_text(mapped.name) +
-                       ", unit = \"that of the file\" }, such as degC, 0.1 degC or mil");
+        return refused("may not be the unit of '" + column.header + "': write " +
+                       with_name_and_unit(mapped.name, "that of the file") +
+                       ", such as degC, 0.1 degC or mil");
       table_.notes.push_back("in '" + column.header + "' '" + spelled.unit +
                              "' is taken for a part of the name, not for a unit");
     }
@@ -506,19 +498,17 @@ void leave_bad_values_out(TextTable& table) {
 }
 
 std::string unclear_role(const TextColumn& column) {
-  const std::string name = toml_text(column.header);
   const auto is_number = [](std::string_view field) { return finite_number(field).has_value(); };
   if (!std::ranges::all_of(column.fields, is_number) || column.has_one_value() ||
       increases(column, finite_number))
     return {};
   const bool has_unit = !column.unit.empty() || has_own_unit(column.header);
   if (is_one_of(numbered_names, column.header) || (!has_unit && recurs(column)))
-    return "may say which sensor a row is of: write pivot = [" + name +
-           ", \"the column of the values\"] in the file of --columns, or ignore = [" + name +
-           "] if all rows are of the same";
+    return "may say which sensor a row is of: " + pivot_or_ignore(column.header);
   if (is_one_of(time_part_names, column.header))
-    return "may be a part of the time: write the whole time in one column, or ignore = [" + name +
-           "] in the file of --columns if the time is complete without it";
+    return "may be a part of the time: write the whole time in one column, or " +
+           ignore_column(column.header) +
+           " in the file of --columns if the time is complete without it";
   return {};
 }
 

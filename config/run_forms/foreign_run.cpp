@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <set>
 #include <utility>
 
@@ -122,10 +121,10 @@ class ValueReader {
         number = in_unit_of_column(*meaning.source, *number, *parts.unit);
       if (!number && suffix == "_on") number = switch_word(field);
       if (!number && !missing) ask_for_word(row, *meaning.source);
-      double value = number.value_or(std::numeric_limits<double>::quiet_NaN());
+      double value = number.value_or(NAN);
       if (!meaning.conversion.is_identity())
         value = meaning.conversion.factor * value + meaning.conversion.offset;
-      if (std::isinf(value)) value = std::numeric_limits<double>::quiet_NaN();
+      if (std::isinf(value)) value = NAN;
       if (suffix == "_degC" && (value < degC_min || value > degC_max)) {
         is_impossible_ = is_impossible_ || words_.empty();
         ask_for_word(row, *meaning.source);
@@ -228,10 +227,8 @@ RunFile read_foreign_run(std::string_view text, const std::string& name, const C
   if (!run.wall_zero) run.wall_zero = stated_wall_zero(plain.text);
   if (plain.has_own_names) own_map.names.clear();  // already used by the form
   std::vector<std::string> notes = std::move(plain.notes);
-  const bool has_own_names = plain.has_own_names;
   TextTable table = read_text_table(std::move(plain), own_map, problems);
   problems.throw_any();
-  table.has_own_names = has_own_names;
   leave_empty_columns_out(table);
   leave_repeated_times_out(table);
   join_calendar(table);

@@ -88,12 +88,9 @@ bool alternates(const TextColumn& column) {
 
 void ask_for_devices(const TextTable& table, const std::vector<std::size_t>& columns) {
   for (const std::size_t i : columns) {
-    const std::string name = toml_text(table.columns[i].header);
     if (!alternates(table.columns[i])) continue;
-    table.refuse_column(
-        i, "alternates, and may say which device a row is of: write pivot = [" + name +
-               ", \"the column of the values\"] in the file of --columns, or ignore = [" + name +
-               "] if all rows are of the same");
+    table.refuse_column(i, "alternates, and may say which device a row is of: " +
+                               pivot_or_ignore(table.columns[i].header));
     return;
   }
 }

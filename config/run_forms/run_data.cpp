@@ -5,8 +5,31 @@
 #include <cstdio>
 
 #include "config/run_forms/time_stamp.hpp"
+#include "config/text/units.hpp"
 
 namespace thermocomp {
+
+std::optional<std::size_t> RunFile::find(std::string_view column_name) const {
+  const auto found = std::ranges::find(columns, column_name);
+  if (found == columns.end()) return std::nullopt;
+  return static_cast<std::size_t>(found - columns.begin());
+}
+
+const std::vector<double>& RunFile::column(std::string_view column_name) const {
+  if (const auto index = find(column_name)) return values[*index];
+  const auto is_displacement = [](const std::string& each) {
+    return is_output(each) && !each.ends_with("_offset_um") && !each.ends_with("_applied_um");
+  };
+  std::string rule = "must be one of the columns";
+  const std::string position = std::string(column_name.substr(0, column_name.rfind('_'))) + "_mm";
+  if (is_output(column_name) && find(position))
+    rule += "; there is " + position + ", a position, which --columns can make a displacement";
+  else if (is_output(column_name) && std::ranges::none_of(columns, is_displacement))
+    rule =
+        "this file has no measured displacement: report indicator readings with `thermocomp "
+        "measured AXIS UM`, or add a column *_um";
+  throw ConfigurationError({{this->name, 0, std::string(column_name), "(missing)", rule}});
+}
 
 std::optional<WallZero> stated_wall_zero(std::string_view text) {
   const std::size_t at = text.find(wall_zero_mark);

@@ -82,22 +82,8 @@ const std::map<std::string_view, SpelledUnit>& known_units() {
 
 /// Encodings of the degree sign, including look-alikes and conversion errors, in UTF-8, Latin-1 and
 /// GBK. Longer ones first.
-struct DegreeSign {
-  std::string_view bytes;
-  std::string_view letter;  ///< if the sign is a whole unit
-};
-constexpr auto degree_signs = std::to_array<DegreeSign>({{"℃", "c"},
-                                                         {"℉", "f"},
-                                                         {"\xA1\xE6", "c"},
-                                                         {"Â°", ""},
-                                                         {"Âº", ""},
-                                                         {"°", ""},
-                                                         {"º", ""},
-                                                         {"˚", ""},
-                                                         {"∘", ""},
-                                                         {"ø", ""},  // of DOS
-                                                         {"\xB0", ""},
-                                                         {"\xBA", ""}});
+constexpr auto degree_signs = std::to_array<std::string_view>(
+    {"℃", "℉", "\xA1\xE6", "Â°", "Âº", "°", "º", "˚", "∘", "ø" /* DOS */, "\xB0", "\xBA"});
 
 /// Normalises other spellings of a temperature unit: "ºC", "Deg. C", "oC", "Celcius". Empty: not a
 /// temperature unit.
@@ -110,14 +96,14 @@ std::string_view plain_temperature(std::string_view unit) {
   const std::string small = small_letters(unit);
   for (std::string_view rest = small; !rest.empty();) {
     const auto* const sign = std::ranges::find_if(
-        degree_signs, [&](const DegreeSign& each) { return rest.starts_with(each.bytes); });
+        degree_signs, [&](std::string_view each) { return rest.starts_with(each); });
     const bool is_sign = sign != degree_signs.end();
     has_degree = has_degree || is_sign;
     if (is_sign)
-      letters += sign->letter;
+      letters += *sign == "℉" ? "f" : *sign == "℃" || *sign == "\xA1\xE6" ? "c" : "";
     else if (std::string_view(" _.").find(rest.front()) == std::string_view::npos)
       letters += rest.front();
-    rest.remove_prefix(is_sign ? sign->bytes.size() : 1);
+    rest.remove_prefix(is_sign ? sign->size() : 1);
   }
   std::string_view left = letters;
   for (const std::string_view word : {"degrees", "degree", "deg", "grad", "grd"}) {
@@ -265,6 +251,18 @@ std::string plain_name(std::string_view base) {
   return name;
 }
 
+std::string without_unit(std::string_view column) {
+  return std::string(column.substr(0, column.size() - unit_of(column).suffix.size()));
+}
+
+std::string unused_name(const std::string& column,
+                        const std::function<bool(const std::string&)>& is_taken) {
+  std::string name = column;
+  for (int i = 2; is_taken(name); ++i)
+    name = without_unit(column) + "_" + std::to_string(i) + std::string(unit_of(column).suffix);
+  return name;
+}
+
 bool is_grouped(std::string_view text, char sign) {
   std::string_view part;
   bool first = true;
@@ -284,24 +282,22 @@ bool is_grouped_by_blanks(std::string_view field) {
 }
 
 std::optional<double> number_of(std::string_view field, const NumberForm& form) {
-  std::array<char, 64> digits{};
-  if (field.size() >= digits.size()) return finite_number(field);
   if (form.thousands != '\0' && field.find(form.thousands) != std::string_view::npos) {
     std::string_view whole = field.substr(0, field.find(form.decimal));
     if (!whole.empty() && (whole.front() == '-' || whole.front() == '+')) whole.remove_prefix(1);
     if (!is_grouped(whole, form.thousands)) return std::nullopt;
   }
   const bool has_blanks = is_grouped_by_blanks(field);
-  std::size_t size = 0;
+  std::string digits;
   bool in_fraction = false;
   for (const char c : field) {
     if (c == ' ' && has_blanks) continue;
     if (c == form.thousands && c != '\0' && !in_fraction) continue;
     if (c == form.decimal) in_fraction = true;
     if (c == '.' && form.decimal != '.') return std::nullopt;
-    digits[size++] = c == form.decimal ? '.' : c;
+    digits += c == form.decimal ? '.' : c;
   }
-  return finite_number({digits.data(), size});
+  return finite_number(digits);
 }
 
 NumberText number_text_of(std::string_view field) {
@@ -322,8 +318,8 @@ NumberText number_text_of(std::string_view field) {
 bool may_be_unit(std::string_view text) {
   const std::string small = small_letters(text);
   if (small.find('%') != std::string::npos || small.find("deg") != std::string::npos) return true;
-  for (const DegreeSign& sign : degree_signs)
-    if (sign.bytes != "ø" && small.find(sign.bytes) != std::string::npos) return true;
+  for (const std::string_view sign : degree_signs)
+    if (sign != "ø" && small.find(sign) != std::string::npos) return true;
   std::string word;
   for (const char c : small + ' ') {
     const bool is_letter = (c >= 'a' && c <= 'z') || static_cast<unsigned char>(c) >= 0x80;

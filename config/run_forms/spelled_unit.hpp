@@ -1,6 +1,7 @@
 /// Units in other spellings; numbers with a unit, with a decimal point or comma.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -58,6 +59,12 @@ struct UnitConversion {
 
 /// `base` as a column name of ours: blanks, commas, quotes and bars become `_`.
 [[nodiscard]] std::string plain_name(std::string_view base);
+
+/// The name of a column of ours without its unit: "T1" of "T1_degC".
+[[nodiscard]] std::string without_unit(std::string_view column);
+/// The name or, if it is taken, the first of T1_2_degC, T1_3_degC, ... that is not.
+[[nodiscard]] std::string unused_name(const std::string& column,
+                                      const std::function<bool(const std::string&)>& is_taken);
 
 /// A number with its unit, "22.1 °C"; `unit` is nullptr without one.
 struct NumberText {

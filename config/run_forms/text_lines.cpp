@@ -209,20 +209,19 @@ bool is_workbook(std::string_view bytes) {
 }
 
 RunText run_text(std::string_view bytes, const std::string& name, const std::string& encoding) {
-  const auto refuse = [&](const char* rule) {
-    throw ConfigurationError({Problem{name, 0, "", "(binary)", rule}});
+  const auto refuse = [&](const char* key, const std::string& value, const char* rule) {
+    throw ConfigurationError({Problem{name, 0, key, value, rule}});
   };
   for (const Binary& binary : binaries)
-    if (bytes.starts_with(binary.begin)) refuse(binary.rule);
+    if (bytes.starts_with(binary.begin)) refuse("", "(binary)", binary.rule);
   if (bytes.starts_with("\xFF\xFE") || bytes.starts_with("\xFE\xFF"))
     return {utf8_of_utf16(bytes.substr(2), bytes.front() == '\xFF'), false};
   if (bytes.starts_with(byte_order_mark)) bytes.remove_prefix(byte_order_mark.size());
   if (!encoding.empty()) {
     auto text = converted(std::string(bytes), encoding);
     if (!text)
-      throw ConfigurationError(
-          {Problem{name, 0, "encoding", encoding,
-                   "must be the encoding of all letters of the file, by a name of iconv --list"}});
+      refuse("encoding", encoding,
+             "must be the encoding of all letters of the file, by a name of iconv --list");
     return {with_line_ends(*std::move(text)), false};
   }
   for (const bool low_first : {true, false})
@@ -230,16 +229,15 @@ RunText run_text(std::string_view bytes, const std::string& name, const std::str
   while (!bytes.empty() && bytes.back() == '\0') bytes.remove_suffix(1);
   const auto is_control = [](char c) { return c > 0 && c < '\t'; };
   if (std::ranges::any_of(bytes.substr(0, 4096), is_control))
-    refuse("is neither text nor a known form; docs/run_files.md lists them");
+    refuse("", "(binary)", "is neither text nor a known form; docs/run_files.md lists them");
   std::string without;
   if (bytes.find('\0') != std::string_view::npos) bytes = without = without_zeros(bytes);
   if (is_utf8(bytes)) return {with_line_ends(std::string(bytes)), false};
   if (has_wide_letters(bytes))
-    throw ConfigurationError(
-        {Problem{name, 0, "encoding", "(unknown)",
-                 "must be known, since the letters are neither UTF-8 nor Latin-1: write encoding = "
-                 "\"shift_jis\" (Japanese), \"gb18030\" (Chinese), \"euc-kr\" (Korean), "
-                 "\"cp1251\" (Cyrillic) or what it is in the file of --columns"}});
+    refuse("encoding", "(unknown)",
+           "must be known, since the letters are neither UTF-8 nor Latin-1: write encoding = "
+           "\"shift_jis\" (Japanese), \"gb18030\" (Chinese), \"euc-kr\" (Korean), \"cp1251\" "
+           "(Cyrillic) or what it is in the file of --columns");
   RunText latin1{{}, true};
   latin1.text.reserve(bytes.size() + bytes.size() / 8);
   for (const char c : bytes) append_letter(latin1.text, static_cast<unsigned char>(c));

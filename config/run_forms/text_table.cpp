@@ -91,10 +91,14 @@ bool is_row_of_types(const TableFields& fields) {
   });
 }
 
+/// "Min", "Mittelwert:"
+bool names_statistic(std::string_view field) {
+  return is_one_of(statistic_words, field.substr(0, field.find_first_of(".:")));
+}
+
 /// Channel numbers, 1 2 3, or the statistics of each column.
 bool is_known_row_of_numbers(const HeadLine& line) {
-  const std::string_view first = line.fields[0];
-  if (is_one_of(statistic_words, first.substr(0, first.find_first_of(".:")))) return true;
+  if (names_statistic(line.fields[0])) return true;
   if (line.has(FieldKind::time)) return false;
   std::vector<double> numbers;
   for (std::size_t i = 0; i < line.kinds.size(); ++i)
@@ -109,16 +113,10 @@ bool is_known_row_of_numbers(const HeadLine& line) {
 /// statistics of the columns are such a line, too, unless rows begin with words.
 bool is_remark(const TableFields& fields, bool begins_with_words) {
   if (fields.empty() || fields[0].empty()) return false;
-  if (!begins_with_words &&
-      is_one_of(statistic_words, fields[0].substr(0, fields[0].find_first_of(".:"))))
-    return true;
-  std::ptrdiff_t texts = 0;
-  for (const std::string_view field : fields) {
-    const FieldKind kind = kind_of_field(field);
-    if (kind == FieldKind::number || kind == FieldKind::time) return false;
-    if (kind == FieldKind::text) ++texts;
-  }
-  return texts > 0;
+  if (!begins_with_words && names_statistic(fields[0])) return true;
+  HeadLine line;
+  std::ranges::transform(fields, std::back_inserter(line.kinds), kind_of_field);
+  return line.is_all_words() && line.has(FieldKind::text);
 }
 
 /// Whether the key column has its kind, or is missing in a line without any word.
@@ -174,6 +172,7 @@ class TableReader {
 
   TextTable read(PlainTable plain) {
     table_.text = std::move(plain.text);
+    table_.has_own_names = plain.has_own_names;
     // Heap-allocated, so that moving the table keeps pointers into it valid.
     table_.text.reserve(64);
     found_ = find_lines(table_.text, plain.lines_above, map_.header_line);
@@ -247,9 +246,9 @@ class TableReader {
     const bool is_table =
         cut_.fields > 1 && (cut_.values >= values_share_min || cut_.lines.size() == 1);
     if (!is_table)
-      problems_.add(lines_[0].number, "", lines_[0].text,
-                    "is not a known table: rows of numbers and times between ; , tab | "
-                    "or blanks; docs/run_files.md lists the forms that are read");
+      refuse(lines_[0], lines_[0].text,
+             "is not a known table: rows of numbers and times between ; , tab | or blanks; "
+             "docs/run_files.md lists the forms that are read");
     for (HeadLine& line : cut_.lines)
       if (!line.is_closed) line = {};
     return is_table;
@@ -371,18 +370,23 @@ class TableReader {
                         "\"t1_degC\", unit = \"0.1 degC\" } under [columns]"
                       : "delete the line or, if it holds the names, write header_line = " +
                             std::to_string(line.number);
-      problems_.add(line.number, "", line.text,
-                    "is neither a row like those below nor names, units or numbers of channels: " +
-                        rule + " in the file of --columns");
+      refuse(line, line.text,
+             "is neither a row like those below nor names, units or numbers of channels: " + rule +
+                 " in the file of --columns");
     } else if (names_line_ &&
                (map_.names.empty() || head_[*names_line_].fields.size() == cut_.fields)) {
       return take_names(*names_line_) && make_columns();
     } else if (take_commented_names() || take_given_names()) {
       if (row_begin_ == 0 || head_[row_begin_ - 1].is_all_words()) return make_columns();
-      problems_.add(lines_[row_begin_ - 1].number, "",
-                    std::to_string(head_[row_begin_ - 1].fields.size()) + " fields",
-                    "must have " + std::to_string(cut_.fields) + ", as the rows below");
+      refuse(lines_[row_begin_ - 1],
+             std::to_string(head_[row_begin_ - 1].fields.size()) + " fields",
+             "must have " + std::to_string(cut_.fields) + ", as the rows below");
     }
+    return false;
+  }
+
+  bool refuse(const TextLine& line, std::string_view value, std::string rule) {
+    problems_.add(line.number, "", value, std::move(rule));
     return false;
   }
 
@@ -416,24 +420,19 @@ class TableReader {
       else if (begins_with_count_or_time())
         fields.insert(fields.begin(), std::string_view());
     }
-    if (fields.empty()) {
-      problems_.add(lines_[line].number, "", lines_[line].text, "has a quote that is not closed");
-      return false;
-    }
-    if (cut_.separator == ',' && cut_.fields == 2 * fields.size() - 1) {
-      problems_.add(lines_[line].number, "", std::to_string(fields.size()) + " names",
+    if (fields.empty())
+      return refuse(lines_[line], lines_[line].text, "has a quote that is not closed");
+    const std::string count = std::to_string(fields.size()) + " names";
+    if (cut_.separator == ',' && cut_.fields == 2 * fields.size() - 1)
+      return refuse(lines_[line], count,
                     "above rows of " + std::to_string(cut_.fields) +
                         " fields: a comma separates them and seems to be the decimal sign, too; "
                         "write the file with decimal points or with semicolons between the fields");
-      return false;
-    }
-    if (fields.size() != cut_.fields) {
-      problems_.add(lines_[line].number, "", std::to_string(fields.size()) + " names",
+    if (fields.size() != cut_.fields)
+      return refuse(lines_[line], count,
                     "must be one for each of the " + std::to_string(cut_.fields) +
                         " fields of the rows below: write names = [\"time_s\", \"t1_degC\", ...] "
                         "in the file of --columns");
-      return false;
-    }
     // Names that stand above a row of further ones: "Time" above "", "Min", "Max".
     if (line > 0 && head_[line - 1].fields.size() == fields.size() &&
         head_[line - 1].is_all_words())
@@ -507,7 +506,7 @@ class TableReader {
       const TextLine& line = lines_[i];
       if (!header_text_.empty() && line.text == header_text_) continue;
       if (!split_line(line.text, table_.separator, fields)) {
-        problems_.add(line.number, "", line.text, "has a quote that is not closed");
+        refuse(line, line.text, "has a quote that is not closed");
         continue;
       }
       while (fields.size() > columns && fields.back().empty()) fields.pop_back();
@@ -523,8 +522,8 @@ class TableReader {
         table_.notes.push_back("the last line, " + std::to_string(line.number) +
                                ", is cut off: left out");
       } else if (fields.size() != columns) {
-        problems_.add(line.number, "", std::to_string(fields.size()) + " fields",
-                      "must have " + std::to_string(columns) + ", as the header");
+        refuse(line, std::to_string(fields.size()) + " fields",
+               "must have " + std::to_string(columns) + ", as the header");
       } else {
         for (std::size_t k = 0; k < columns; ++k) table_.columns[k].fields.push_back(fields[k]);
         table_.lines.push_back(line.number);
@@ -540,10 +539,9 @@ class TableReader {
     for (const std::string_view field : fields) words.push_back(unquoted(field));
     if (words == names_) return;
     if (std::ranges::is_permutation(words, names_))
-      problems_.add(line.number, "", line.text,
-                    "names the columns in another order than line " +
-                        std::to_string(table_.header_line) +
-                        ": give the rows below it a file of their own");
+      refuse(line, line.text,
+             "names the columns in another order than line " + std::to_string(table_.header_line) +
+                 ": give the rows below it a file of their own");
     if (remarks_++ == 0) first_remark_ = line.text;
   }
 
@@ -579,8 +577,7 @@ void TextTable::refuse_field(std::size_t row, std::size_t column, std::string ru
 
 void TextTable::refuse_column(std::size_t column, std::string rule) const {
   const std::string& header = columns[column].header;
-  problems.add(header_line, "column " + std::to_string(column + 1),
-               header.empty() ? "(empty)" : header, std::move(rule));
+  problems.add(header_line, unnamed(column), header.empty() ? "(empty)" : header, std::move(rule));
 }
 
 TextTable read_text_table(PlainTable plain, const ColumnMap& map, ProblemList& problems) {

@@ -133,13 +133,13 @@ void refuse_two(const TextTable& table, std::size_t first, std::size_t second) {
   const std::string other = toml_text(table.columns[second].header);
   if (name == other)
     table.refuse_column(second,
-                        "is the name of column " + std::to_string(first + 1) +
+                        "is the name of " + unnamed(first) +
                             ", too, and both may be the time: give each a name of its own "
                             "in this line, or a file of its own to the columns of each time");
   else
     table.refuse_column(first, "may be the time, and so may " + other + ": write time = " + name +
-                                   " and ignore = [" + other +
-                                   "], or the other way round, in the file of --columns");
+                                   " and " + ignore_column(table.columns[second].header) +
+                                   ", or the other way round, in the file of --columns");
 }
 
 /// @return nullopt after a problem, too
@@ -271,18 +271,6 @@ class TimeReader {
     note("a row each " + number_text(period_s) + " s, from the first");
   }
 
-  bool take_numbers(const TextColumn& numbers) {
-    for (std::size_t row = 0; row < table_.rows(); ++row) {
-      const auto number = table_.number(numbers.fields[row]);
-      if (!number && row == 0) return refuse_form();
-      if (!number)
-        refuse(row,
-               "must be a number, as in the rows before; delete the line if it is no measurement");
-      run_.time_s.push_back(number.value_or(NAN));
-    }
-    return problems_.empty() && !run_.time_s.empty();
-  }
-
   void read_day_of_year() {
     for (std::size_t row = 0; row < table_.rows() && !problems_.full(); ++row) {
       const auto number = [&](std::size_t i) {
@@ -295,15 +283,25 @@ class TimeReader {
       run_.time_s.push_back(new_year + day_s * (number(1) - 1) + 3600 * std::floor(hhmm / 100) +
                             60 * std::fmod(hhmm, 100.0));
     }
-    const double first = run_.time_s.front();
-    for (double& at : run_.time_s) at -= first;
+    const double first = count_from_first();
     run_.wall_zero = WallZero{first, false};
     note("year, day of the year and hhmm from " + quoted(time_.columns[0]) +
          " on, seconds after the first row (" + date_text(first) + ")");
   }
 
   void read_numbers(const TextColumn& numbers) {
-    if (!take_numbers(numbers)) return;
+    for (std::size_t row = 0; row < table_.rows(); ++row) {
+      const auto number = table_.number(numbers.fields[row]);
+      if (!number && row == 0) return refuse_form();
+      if (!number)
+        refuse(row,
+               "must be a number, as in the rows before; delete the line if it is no measurement");
+      run_.time_s.push_back(number.value_or(NAN));
+    }
+    if (problems_.empty() && !run_.time_s.empty()) scale_numbers(numbers);
+  }
+
+  void scale_numbers(const TextColumn& numbers) {
     const std::string& header = numbers.header;
     std::string unit = table_.map.time_unit;
     if (unit.empty()) unit = header == "time_s" ? "s" : numbers.unit;
@@ -327,7 +325,11 @@ class TimeReader {
         std::abs(known->factor * epoch->per_second - 1) > 1e-9)
       epoch = nullptr;  // the unit implies another scale
     if (epoch != nullptr) {
-      count_from_first(header, *epoch);
+      const double first = count_from_first(epoch->per_second);
+      const double zero_s = first / epoch->per_second + epoch->zero_s;
+      run_.wall_zero = WallZero{zero_s, epoch->is_utc};
+      note("'" + header + "', numbers [" + epoch->name + "], seconds after the first row (" +
+           (epoch->is_utc ? date_text(zero_s) + " UTC)" : number_text(first) + ")"));
     } else if (is_time) {
       for (double& value : run_.time_s) value *= known->factor;
       note("'" + header + "', numbers [" + unit + "]" +
@@ -339,15 +341,12 @@ class TimeReader {
     }
   }
 
-  /// Rounds to a microsecond, since fractions were rounded when written.
-  void count_from_first(const std::string& header, const Epoch& epoch) {
+  /// Converts the times to seconds after the first one, which it returns. Rounds to a microsecond,
+  /// since fractions were rounded when written.
+  double count_from_first(double per_second = 1.0) {
     const double first = run_.time_s.front();
-    for (double& value : run_.time_s)
-      value = std::round((value - first) / epoch.per_second * 1e6) / 1e6;
-    const double zero_s = first / epoch.per_second + epoch.zero_s;
-    run_.wall_zero = WallZero{zero_s, epoch.is_utc};
-    note("'" + header + "', numbers [" + epoch.name + "], seconds after the first row (" +
-         (epoch.is_utc ? date_text(zero_s) + " UTC)" : number_text(first) + ")"));
+    for (double& at : run_.time_s) at = std::round((at - first) / per_second * 1e6) / 1e6;
+    return first;
   }
 
   // ---- dates and clock times
@@ -382,10 +381,7 @@ class TimeReader {
       if (stamp && has_clocks) stamp = joined(row, *stamp);
       if (stamp && stamp->has_date && !stamp->zone_s) stamp->zone_s = zone;
       if (stamp && !stamps.empty() && !alike(*stamp, stamps.front())) stamp.reset();
-      if (!stamp && row == 0) {
-        refuse_form();
-        return;
-      }
+      if (!stamp && row == 0) return refuse_form();
       if (!stamp)
         refuse(row,
                "must be a time in the form of the rows before; delete the line if it is no "
@@ -399,13 +395,11 @@ class TimeReader {
     if (!problems_.empty()) return;
     run_.time_s = seconds_by(stamps, order.value_or(DateOrder::unknown));
     add_fractions();
-    const double first = run_.time_s.front();
-    for (std::size_t row = 0; row < stamps.size(); ++row) {
+    for (std::size_t row = 0; row < stamps.size(); ++row)
       if (std::isnan(run_.time_s[row]))
         refuse(row, "must be a day of the calendar and a time of it");
-      run_.time_s[row] = std::round((run_.time_s[row] - first) * 1e6) / 1e6;
-    }
     if (!problems_.empty()) return;
+    const double first = count_from_first();
     note_stamps(stamps.front(), order, first);
     if (stamps.front().has_date && order)
       run_.wall_zero = WallZero{first, stamps.front().zone_s.has_value()};
@@ -542,9 +536,8 @@ class TimeReader {
   }
 
   /// Reports the first row only.
-  bool refuse_form() {
+  void refuse_form() {
     refuse(0, "must be a number or a time of a form that is read; docs/run_files.md lists them");
-    return false;
   }
 
   void refuse(std::size_t row, std::string rule) {

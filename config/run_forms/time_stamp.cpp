@@ -5,7 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <limits>
+#include <map>
 #include <string>
 #include <utility>
 
@@ -33,29 +33,6 @@ constexpr std::array<std::string_view, 12> month_names{
 /// Names of days, at most three letters; longer ones end in "day", "tag", "woch" or "di".
 constexpr std::string_view day_names =
     "|mon|tue|wed|thu|fri|sat|sun|mo|di|mi|do|fr|sa|so|lun|mar|mer|jeu|ven|sam|dim|gio|sab|dom|";
-
-/// Zones whose letters mean one zone only; CST, IST and BST are several.
-struct ZoneName {
-  std::string_view letters;
-  double hours;
-};
-constexpr auto zone_names = std::to_array<ZoneName>({{"CET", 1},
-                                                     {"CEST", 2},
-                                                     {"MEZ", 1},
-                                                     {"MESZ", 2},
-                                                     {"WET", 0},
-                                                     {"WEST", 1},
-                                                     {"EET", 2},
-                                                     {"EEST", 3},
-                                                     {"EST", -5},
-                                                     {"EDT", -4},
-                                                     {"CDT", -5},
-                                                     {"MST", -7},
-                                                     {"MDT", -6},
-                                                     {"PST", -8},
-                                                     {"PDT", -7},
-                                                     {"JST", 9},
-                                                     {"KST", 9}});
 
 /// Takes one to `digits_max` leading digits.
 std::optional<int> take_digits(std::string_view& text, std::size_t digits_max) {
@@ -216,14 +193,16 @@ bool take_half_of_day(std::string_view& text, TimeStamp& stamp) {
 
 /// Takes a zone named by letters off the end.
 void take_zone_name(std::string_view& text, TimeStamp& stamp) {
-  for (const ZoneName& zone : zone_names) {
-    if (!text.ends_with(zone.letters)) continue;
-    const std::string_view before = text.substr(0, text.size() - zone.letters.size());
-    if (!before.empty() && before.back() != ' ') continue;
-    stamp.zone_s = 3600.0 * zone.hours;
-    text = trimmed(before);
-    return;
-  }
+  // Hours east of Greenwich. These letters mean one zone only; CST, IST and BST are several.
+  static const std::map<std::string_view, double> zone_hours{
+      {"CET", 1},  {"CEST", 2}, {"MEZ", 1},  {"MESZ", 2}, {"WET", 0},  {"WEST", 1},
+      {"EET", 2},  {"EEST", 3}, {"EST", -5}, {"EDT", -4}, {"CDT", -5}, {"MST", -7},
+      {"MDT", -6}, {"PST", -8}, {"PDT", -7}, {"JST", 9},  {"KST", 9}};
+  const auto begin = text.rfind(' ') + 1;  // without a blank 0
+  const auto zone = zone_hours.find(text.substr(begin));
+  if (zone == zone_hours.end()) return;
+  stamp.zone_s = 3600.0 * zone->second;
+  text = trimmed(text.substr(0, begin));
 }
 
 /// Takes the days off "1 days 02:15:00", "1 day, 2:15:00", "1d 02:15:00", "1.02:15:00".
@@ -327,40 +306,26 @@ std::string year_in_front(std::string_view text) {
 std::string without_ideographs(std::string_view all) {
   if (std::ranges::none_of(all, [](char c) { return static_cast<unsigned char>(c) >= 0xe0; }))
     return {};
-  constexpr std::array<std::pair<std::string_view, char>, 13> signs{{{"年", '-'},
-                                                                     {"月", '-'},
-                                                                     {"日", ' '},
-                                                                     {"時", ':'},
-                                                                     {"时", ':'},
-                                                                     {"分", ':'},
-                                                                     {"秒", ' '},
-                                                                     {"년", '-'},
-                                                                     {"월", '-'},
-                                                                     {"일", ' '},
-                                                                     {"시", ':'},
-                                                                     {"분", ':'},
-                                                                     {"초", ' '}}};
-  constexpr std::array<std::pair<std::string_view, const char*>, 6> halves{{{"上午", " AM"},
-                                                                            {"下午", " PM"},
-                                                                            {"午前", " AM"},
-                                                                            {"午後", " PM"},
-                                                                            {"오전", " AM"},
-                                                                            {"오후", " PM"}}};
+  static const std::map<std::string_view, char> signs{
+      {"年", '-'}, {"月", '-'}, {"日", ' '}, {"時", ':'}, {"时", ':'}, {"分", ':'}, {"秒", ' '},
+      {"년", '-'}, {"월", '-'}, {"일", ' '}, {"시", ':'}, {"분", ':'}, {"초", ' '}};
+  static const std::map<std::string_view, const char*> halves{{"上午", " AM"}, {"下午", " PM"},
+                                                              {"午前", " AM"}, {"午後", " PM"},
+                                                              {"오전", " AM"}, {"오후", " PM"}};
   std::string text;
   std::string half;
   bool has_sign = false;
   while (!all.empty()) {
-    const auto begins = [&](const auto& each) { return all.starts_with(each.first); };
-    if (const auto* const found = std::ranges::find_if(halves, begins); found != halves.end()) {
+    if (const auto found = halves.find(all.substr(0, 6)); found != halves.end()) {
       half = found->second;
-      all = trimmed(all.substr(found->first.size()));
+      all = trimmed(all.substr(6));
       continue;
     }
-    const auto* const sign = std::ranges::find_if(signs, begins);
+    const auto sign = signs.find(all.substr(0, 3));
     const bool is_sign = sign != signs.end();
     has_sign = has_sign || is_sign;
     text += is_sign ? sign->second : all.front();
-    all.remove_prefix(is_sign ? sign->first.size() : 1);
+    all.remove_prefix(is_sign ? 3 : 1);
   }
   while (text.ends_with(':') || text.ends_with(' ')) text.pop_back();
   return has_sign || !half.empty() ? text + half : std::string();
@@ -406,8 +371,8 @@ bool are_multiples_of(double unit, const std::vector<double>& numbers) {
 
 /// The least and the greatest difference of consecutive numbers.
 std::pair<double, double> steps_of(const std::vector<double>& numbers, double (*seconds)(double)) {
-  double low = std::numeric_limits<double>::infinity();
-  double high = -std::numeric_limits<double>::infinity();
+  double low = INFINITY;
+  double high = -INFINITY;
   for (std::size_t i = 1; i < numbers.size(); ++i) {
     const double step = seconds(numbers[i]) - seconds(numbers[i - 1]);
     low = std::min(low, step);
@@ -449,8 +414,7 @@ std::optional<TimeStamp> parse_time_stamp(std::string_view text) {
   if (!take_clock(text, stamp)) return std::nullopt;
   stamp.clock_a += 24 * days;
   // The day 0 of databases: only a clock time.
-  constexpr std::array day_0{30, 12, 1899};
-  if (stamp.has_date && (stamp.date == day_0 || stamp.date == std::array{1899, 12, 30})) {
+  if (stamp.date == std::array{30, 12, 1899} || stamp.date == std::array{1899, 12, 30}) {
     stamp.has_date = false;
     stamp.allows = {};
   }
@@ -463,7 +427,7 @@ std::optional<double> seconds_of_day(int year, int month, int day) {
                                          std::chrono::month{static_cast<unsigned>(month)},
                                          std::chrono::day{static_cast<unsigned>(day)}};
   if (!date.ok()) return std::nullopt;
-  return 86400.0 * static_cast<double>(std::chrono::sys_days(date).time_since_epoch().count());
+  return s_per_day * static_cast<double>(std::chrono::sys_days(date).time_since_epoch().count());
 }
 
 std::optional<double> seconds_of(const TimeStamp& stamp, DateOrder order, bool minutes_first) {
@@ -487,10 +451,9 @@ std::optional<double> seconds_of(const TimeStamp& stamp, DateOrder order, bool m
 }
 
 std::string date_text(double seconds_since_1970) {
-  constexpr double day_s = 86400.0;
-  const auto days = static_cast<int>(std::floor(seconds_since_1970 / day_s));
+  const auto days = static_cast<int>(std::floor(seconds_since_1970 / s_per_day));
   const std::chrono::year_month_day date{std::chrono::sys_days{std::chrono::days{days}}};
-  const auto second = static_cast<int>(seconds_since_1970 - day_s * days);
+  const auto second = static_cast<int>(seconds_since_1970 - s_per_day * days);
   char text[64];
   std::snprintf(text, sizeof text, "%04d-%02u-%02u %02d:%02d:%02d", static_cast<int>(date.year()),
                 static_cast<unsigned>(date.month()), static_cast<unsigned>(date.day()),

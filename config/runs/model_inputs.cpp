@@ -11,6 +11,7 @@
 
 #include <system_error>
 
+#include "config/run_forms/field_text.hpp"
 #include "config/runs/robust.hpp"
 #include "config/text/printable_text.hpp"
 #include "config/text/problems.hpp"
@@ -247,13 +248,11 @@ std::string Outliers::text() const {
 
 std::vector<Outliers> leave_out_outliers(RunFile& run, const std::vector<std::string>& columns) {
   std::vector<Outliers> all;
-  for (const std::string& column : columns) {
-    if (!run.find(column)) continue;
-    Outliers found = outliers_of(run, column);
-    if (!found.times_s.empty()) all.push_back(std::move(found));
-    Outliers stuck = stuck_of(run, column);
-    if (!stuck.times_s.empty()) all.push_back(std::move(stuck));
-  }
+  for (const std::string& column : columns)
+    for (const auto find : {outliers_of, stuck_of})
+      if (run.find(column))
+        if (Outliers found = find(run, column); !found.times_s.empty())
+          all.push_back(std::move(found));
   for (const Outliers& each : all) {
     std::vector<double>& values = run.values[*run.find(each.column)];
     for (std::size_t row = 0; row < values.size(); ++row)
@@ -301,16 +300,14 @@ std::vector<double> references(const ThermalModel& model, const RunFile& run,
 }
 
 std::vector<std::size_t> whole_rows(std::size_t count, const ModelInputs& inputs) {
-  std::vector<char> whole(count, 1);
-  for (const Columns* columns : {&inputs.temperatures, &inputs.signals})
-    for (const std::vector<double>* column : *columns)
-      for (std::size_t row = 0; row < count; ++row)
-        whole[row] =
-            static_cast<char>(whole[row] & static_cast<char>(std::isfinite((*column)[row])));
   std::vector<std::size_t> rows;
   rows.reserve(count);
-  for (std::size_t row = 0; row < count; ++row)
-    if (whole[row] != 0) rows.push_back(row);
+  for (std::size_t row = 0; row < count; ++row) {
+    const auto has_value = [row](const auto* column) { return std::isfinite((*column)[row]); };
+    if (std::ranges::all_of(inputs.temperatures, has_value) &&
+        std::ranges::all_of(inputs.signals, has_value))
+      rows.push_back(row);
+  }
   return rows;
 }
 
@@ -364,8 +361,7 @@ nanoseconds time_of_row(double time_s) {
 }
 
 bool is_called_like_a_room(std::string name) {
-  std::transform(name.begin(), name.end(), name.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  name = small_letters(name);
   const auto is_letter = [&](std::size_t i) {
     return std::isalpha(static_cast<unsigned char>(name[i])) != 0;
   };

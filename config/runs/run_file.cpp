@@ -2,9 +2,7 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
-#include <cstdint>
 #include <fcntl.h>
 #include <set>
 #include <spawn.h>
@@ -12,6 +10,7 @@
 
 #include <sys/wait.h>
 
+#include "config/run_forms/column_map.hpp"
 #include "config/run_forms/field_text.hpp"
 #include "config/run_forms/foreign_run.hpp"
 #include "config/run_forms/text_lines.hpp"
@@ -22,73 +21,32 @@
 namespace thermocomp {
 namespace {
 
-constexpr std::size_t problems_max = 100;
 /// The largest model has 512 inputs and 64 outputs; searches among columns take quadratic time.
 constexpr std::size_t columns_max = 1024;
 
-/// Parses a decimal number with so few digits that digits and power of ten are exact in a double:
-/// their quotient equals the result of std::from_chars, in a third of the time.
-/// @return number of characters; 0 if it is another kind of number, or not a number
-std::size_t plain_number(std::string_view text, double& value) {
-  constexpr std::array<double, 16> power_of_ten{1e0, 1e1, 1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
-                                                1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15};
-  const char* at = text.data();
-  const char* const end = at + text.size();
-  const bool negative = at != end && *at == '-';
-  if (negative) ++at;
-  std::uint64_t digits = 0;
-  const auto take_digits = [&] {
-    const char* const first = at;
-    for (; at != end && *at >= '0' && *at <= '9'; ++at)
-      digits = 10 * digits + static_cast<std::uint64_t>(*at - '0');
-    return static_cast<std::size_t>(at - first);
-  };
-  const std::size_t whole = take_digits();
-  std::size_t fraction = 0;
-  if (at != end && *at == '.') {
-    ++at;
-    fraction = take_digits();
-    if (fraction == 0) return 0;
-  }
-  if (whole == 0 || whole + fraction >= power_of_ten.size()) return 0;
-  value = static_cast<double>(digits) / power_of_ten[fraction];
-  if (negative) value = -value;
-  return static_cast<std::size_t>(at - text.data());
-}
-
 class RunParser {
  public:
-  RunParser(std::string_view text, const std::string& name) : rest_(text) { run_.name = name; }
+  RunParser(std::string_view text, const std::string& name) : rest_(text), problems_(name) {
+    run_.name = name;
+  }
 
   RunFile parse() {
     std::string_view line;
-    while (next_line(line)) {
-      if (run_.columns.empty()) {
-        read_header(line);
-        if (!problems_.empty()) break;  // rows cannot be checked
-      } else if (!blank_to_the_end(line)) {
-        if (take_plain_row(line))
-          check_time();
-        else
-          read_row(line);
+    while (!problems_.full() && next_line(line)) {
+      if (!run_.columns.empty()) {
+        if (!blank_to_the_end(line)) read_row(line);
+        continue;
       }
-      if (problems_.size() >= problems_max) break;
+      read_header(line);
+      problems_.throw_any();  // rows cannot be checked
     }
-    if (problems_.empty() && run_.columns.empty()) add(0, "", "", "has no header row");
-    if (problems_.empty() && run_.rows() == 0) add(0, "", "", "has no row of data");
-    if (!problems_.empty()) throw ConfigurationError(std::move(problems_));
+    if (run_.columns.empty()) problems_.add(0, "", "", "has no header row");
+    if (problems_.empty() && run_.rows() == 0) problems_.add(0, "", "", "has no row of data");
+    problems_.throw_any();
     return std::move(run_);
   }
 
  private:
-  void add(int line, std::string key, std::string_view value, std::string rule) {
-    if (problems_.size() >= problems_max) return;  // checked here too, for rows of many columns
-    constexpr std::size_t shown_max = 40;
-    std::string shown(value.substr(0, shown_max));
-    if (value.size() > shown_max) shown += " ...";
-    problems_.push_back({run_.name, line, std::move(key), std::move(shown), std::move(rule)});
-  }
-
   /// The next line that is not a comment. A reference before the first row changes nothing.
   bool next_line(std::string_view& line) {
     while (!rest_.empty()) {
@@ -110,184 +68,91 @@ class RunParser {
            run_.columns.size() > 1;
   }
 
+  static std::size_t fields_in(std::string_view line) {
+    return static_cast<std::size_t>(std::ranges::count(line, ',')) + 1;
+  }
+
   void read_header(std::string_view line) {
-    const auto count = static_cast<std::size_t>(std::count(line.begin(), line.end(), ',')) + 1;
-    if (count > columns_max) {
-      add(line_number_, "", std::to_string(count) + " columns",
-          "must be at most " + std::to_string(columns_max));
+    if (const std::size_t count = fields_in(line); count > columns_max) {
+      problems_.add(line_number_, "", std::to_string(count) + " columns",
+                    "must be at most " + std::to_string(columns_max));
       return;
     }
     std::set<std::string> seen;
-    std::string_view rest = line;
     std::string_view field;
-    int position = 0;
-    while (take(rest, ',', field)) {
-      ++position;
-      const std::string name(trimmed(field));
-      const std::string where = "column " + std::to_string(position);
-      if (name.find('"') != std::string::npos) {
-        add(line_number_, where, name, "must not be quoted");
-      } else if (!is_column_name(name)) {
-        add(line_number_, where, name.empty() ? "(empty)" : name, std::string(column_name_rule));
-      } else if (!seen.insert(name).second) {
-        add(line_number_, where, name, "is listed twice");
-      }
-      run_.columns.push_back(name);
+    while (take(line, ',', field)) {
+      const std::string& name = run_.columns.emplace_back(trimmed(field));
+      const auto refuse = [&](std::string_view rule) {
+        problems_.add(line_number_, unnamed(run_.columns.size() - 1),
+                      name.empty() ? "(empty)" : name, std::string(rule));
+      };
+      if (name.find('"') != std::string::npos)
+        refuse("must not be quoted");
+      else if (!is_column_name(name))
+        refuse(column_name_rule);
+      else if (!seen.insert(name).second)
+        refuse("is listed twice");
     }
     time_ = run_.find("time_s");
-    if (!time_) add(line_number_, "time_s", "(missing)", "must be one of the columns");
+    if (!time_) problems_.add(line_number_, "time_s", "(missing)", "must be one of the columns");
     run_.values.resize(run_.columns.size());
-    std::size_t rows = 1;
-    for (auto at = rest_.find('\n'); at != std::string_view::npos; at = rest_.find('\n', at + 1))
-      ++rows;
+    const auto rows = static_cast<std::size_t>(std::ranges::count(rest_, '\n')) + 1;
     for (auto& column : run_.values) column.reserve(rows);
-    row_.resize(run_.columns.size());
-  }
-
-  /// Fast path for a row of plain decimal numbers.
-  /// @return false if it is not, with the state unchanged
-  bool take_plain_row(std::string_view line) {
-    for (double& value : row_) {
-      const std::size_t length = plain_number(line, value);
-      if (length == 0) return false;
-      const bool last = &value == &row_.back();
-      if (last ? length < line.size() : length == line.size() || line[length] != ',') return false;
-      line.remove_prefix(last ? length : length + 1);
-    }
-    for (std::size_t i = 0; i < row_.size(); ++i) run_.values[i].push_back(row_[i]);
-    return true;
   }
 
   void read_row(std::string_view line) {
-    const auto fields = static_cast<std::size_t>(std::count(line.begin(), line.end(), ',')) + 1;
-    if (fields != run_.columns.size()) {
-      add(line_number_, "", std::to_string(fields) + " fields",
-          "must have " + std::to_string(run_.columns.size()) + ", as the header");
+    if (const std::size_t count = fields_in(line); count != run_.columns.size()) {
+      problems_.add(line_number_, "", std::to_string(count) + " fields",
+                    "must have " + std::to_string(run_.columns.size()) + ", as the header");
       return;
     }
-    std::string_view rest = line;
-    std::string_view field;
+    bool has_time = false;
     for (std::size_t i = 0; i < run_.columns.size(); ++i) {
-      static_cast<void>(take(rest, ',', field));
-      run_.values[i].push_back(value_of(trimmed(field), run_.columns[i]));
+      std::string_view field;
+      static_cast<void>(take(line, ',', field));
+      field = trimmed(field);
+      run_.values[i].push_back(value_of(field, run_.columns[i]));
+      if (i == time_) has_time = !is_missing(field);
     }
-    check_time();
+    if (!has_time) problems_.add(line_number_, "time_s", "(missing)", "must not be missing");
+    const double time_s = run_.values[*time_].back();
+    if (time_s <= last_time_s_)
+      problems_.add(line_number_, "time_s", number_text(time_s),
+                    "must be greater than in the row before (" + number_text(last_time_s_) + ")");
+    if (std::isfinite(time_s)) last_time_s_ = time_s;
   }
 
+  /// NaN for a missing value, and after a problem.
   double value_of(std::string_view field, const std::string& column) {
-    if (is_missing(field)) return std::numeric_limits<double>::quiet_NaN();
+    if (is_missing(field)) return std::nan("");
     if (const auto number = finite_number(field)) return *number;
     const bool has_quote = field.find('"') != std::string_view::npos;
-    add(line_number_, column, field,
-        has_quote ? "must not be quoted" : "must be a finite number, empty or nan");
-    bad_time_ = bad_time_ || column == "time_s";
-    return std::numeric_limits<double>::quiet_NaN();
-  }
-
-  void check_time() {
-    const double time_s = run_.values[*time_].back();
-    if (std::isnan(time_s)) {
-      if (!bad_time_) add(line_number_, "time_s", "(missing)", "must not be missing");
-      bad_time_ = false;
-      return;
-    }
-    if (last_time_s_ && !(time_s > *last_time_s_)) {
-      add(line_number_, "time_s", number_text(time_s),
-          "must be greater than in the row before (" + number_text(*last_time_s_) + ")");
-    }
-    last_time_s_ = time_s;
+    problems_.add(line_number_, column, field,
+                  has_quote ? "must not be quoted" : "must be a finite number, empty or nan");
+    return std::nan("");
   }
 
   std::string_view rest_;
   int line_number_{0};
   RunFile run_;
-  std::vector<double> row_;
   std::optional<std::size_t> time_;
-  std::optional<double> last_time_s_;
-  bool bad_time_{false};  ///< reported already
-  std::vector<Problem> problems_;
+  double last_time_s_{-std::numeric_limits<double>::infinity()};
+  ProblemList problems_;
 };
 
 void select(RunFile& run, const RunSelection& selection) {
   const std::vector<double>& time_s = run.time_s();
   const auto row = [&](double time) {
-    return static_cast<std::size_t>(std::lower_bound(time_s.begin(), time_s.end(), time) -
-                                    time_s.begin());
+    return static_cast<std::size_t>(std::ranges::lower_bound(time_s, time) - time_s.begin());
   };
   run.selected_begin = row(selection.from_s);
   run.selected_end = row(selection.to_s);
-  if (run.selected_begin >= run.selected_end) {
-    throw ConfigurationError(
-        {{run.name, 0, "selection",
-          number_text(selection.from_s) + ":" + number_text(selection.to_s),
-          "selects no row; the file has time_s from " + number_text(time_s.front()) + " to " +
-              number_text(time_s.back())}});
-  }
+  if (run.selected_begin < run.selected_end) return;
+  throw ConfigurationError(
+      {{run.name, 0, "selection", number_text(selection.from_s) + ":" + number_text(selection.to_s),
+        "selects no row; the file has time_s from " + number_text(time_s.front()) + " to " +
+            number_text(time_s.back())}});
 }
-
-}  // namespace
-
-RunSelection parse_selection(std::string_view argument) {
-  RunSelection selection;
-  const auto at = argument.rfind('@');
-  const auto colon = argument.rfind(':');
-  if (at == std::string_view::npos || colon == std::string_view::npos || colon < at) {
-    selection.file = argument;
-    if (argument.empty()) throw ConfigurationError({{"", 0, "file", "(empty)", "must be named"}});
-    return selection;
-  }
-  selection.file = argument.substr(0, at);
-  const auto refuse = [&](const std::string& rule) {
-    throw ConfigurationError({{"", 0, "selection", std::string(argument), rule}});
-  };
-  if (selection.file.empty()) refuse("must be FILE@T0:T1, and the file is not named");
-  const auto bound = [&](std::string_view text, double& value) {
-    if (text.empty()) return;
-    const auto number = finite_number(text);
-    if (!number) refuse("must be FILE@T0:T1 with T0 and T1 numbers [s] or left out");
-    value = number.value_or(value);
-  };
-  bound(argument.substr(at + 1, colon - at - 1), selection.from_s);
-  bound(argument.substr(colon + 1), selection.to_s);
-  if (!(selection.from_s < selection.to_s)) refuse("T0 must be below T1");
-  return selection;
-}
-
-std::optional<std::size_t> RunFile::find(std::string_view column_name) const {
-  const auto found = std::find(columns.begin(), columns.end(), column_name);
-  if (found == columns.end()) return std::nullopt;
-  return static_cast<std::size_t>(found - columns.begin());
-}
-
-namespace {
-
-/// Whether there is a displacement other than offsets and applied offsets.
-bool has_displacement(const std::vector<std::string>& columns) {
-  return std::any_of(columns.begin(), columns.end(), [](const std::string& column) {
-    return is_output(column) && !column.ends_with("_offset_um") && !column.ends_with("_applied_um");
-  });
-}
-
-}  // namespace
-
-const std::vector<double>& RunFile::column(std::string_view column_name) const {
-  const auto index = find(column_name);
-  if (!index) {
-    std::string rule = "must be one of the columns";
-    const auto stem = column_name.rfind('_');
-    const std::string position = std::string(column_name.substr(0, stem)) + "_mm";
-    if (is_output(column_name) && find(position))
-      rule += "; there is " + position + ", a position, which --columns can make a displacement";
-    else if (is_output(column_name) && !has_displacement(columns))
-      rule =
-          "this file has no measured displacement: report indicator readings with `thermocomp "
-          "measured AXIS UM`, or add a column *_um";
-    throw ConfigurationError({{this->name, 0, std::string(column_name), "(missing)", rule}});
-  }
-  return values[*index];
-}
-
-namespace {
 
 /// The first line that is not a comment or empty.
 std::string_view header_of(std::string_view text) {
@@ -348,6 +213,32 @@ std::string sheet_of(const std::filesystem::path& path) {
 }
 
 }  // namespace
+
+RunSelection parse_selection(std::string_view argument) {
+  RunSelection selection;
+  const auto at = argument.rfind('@');
+  const auto colon = argument.rfind(':');
+  if (at == std::string_view::npos || colon == std::string_view::npos || colon < at) {
+    selection.file = argument;
+    if (argument.empty()) throw ConfigurationError({{"", 0, "file", "(empty)", "must be named"}});
+    return selection;
+  }
+  selection.file = argument.substr(0, at);
+  const auto refuse = [&](const std::string& rule) {
+    throw ConfigurationError({{"", 0, "selection", std::string(argument), rule}});
+  };
+  if (selection.file.empty()) refuse("must be FILE@T0:T1, and the file is not named");
+  const auto bound = [&](std::string_view text, double& value) {
+    if (text.empty()) return;
+    const auto number = finite_number(text);
+    if (!number) refuse("must be FILE@T0:T1 with T0 and T1 numbers [s] or left out");
+    value = number.value_or(value);
+  };
+  bound(argument.substr(at + 1, colon - at - 1), selection.from_s);
+  bound(argument.substr(colon + 1), selection.to_s);
+  if (!(selection.from_s < selection.to_s)) refuse("T0 must be below T1");
+  return selection;
+}
 
 std::filesystem::path file_of(const RunFile& run) {
   return run.is_part ? parse_selection(run.name).file : std::filesystem::path(run.name);
@@ -416,10 +307,7 @@ RunFile load_run(const RunSelection& selection, const ColumnMap* map) {
 
 std::string write_run(const RunFile& run) {
   std::string text;
-  for (std::size_t i = 0; i < run.columns.size(); ++i) {
-    if (i > 0) text += ',';
-    text += run.columns[i];
-  }
+  for (const std::string& column : run.columns) text.append(text.empty() ? "" : ",").append(column);
   text += '\n';
   for (std::size_t row = 0; row < run.rows(); ++row) {
     if (std::binary_search(run.references.begin(), run.references.end(), row))

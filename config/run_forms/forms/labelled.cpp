@@ -16,10 +16,6 @@ struct Labelled {
   std::string time;
   std::vector<std::pair<std::string, std::string>> values;  ///< name and its number or word
   std::string words;  ///< in front of the first name, without levels such as INFO
-  [[nodiscard]] bool has_number() const {
-    return std::ranges::any_of(values,
-                               [](const auto& value) { return looks_like_number(value.second); });
-  }
 };
 
 /// Takes the leading time off a line: in brackets, or the longest prefix that is a time.
@@ -165,7 +161,8 @@ bool is_labelled(std::string_view text) {
     if (trimmed(line).empty()) continue;
     ++lines;
     const Labelled found = labelled_of(line);
-    if (!found.time.empty() && found.has_number()) ++labelled;
+    const auto is_number = [](const auto& value) { return looks_like_number(value.second); };
+    if (!found.time.empty() && std::ranges::any_of(found.values, is_number)) ++labelled;
   }
   return labelled > 0 && 2 * labelled >= lines;
 }

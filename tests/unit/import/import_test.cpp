@@ -37,27 +37,18 @@ std::string log_file(const std::string& name) {
   return std::string(THERMOCOMP_LOGS) + "/" + name;
 }
 
-struct LogOptions {
-  std::vector<std::string> names;
-  std::optional<double> period_s;
-};
-
-RunFile import_text(const std::string& text, const LogOptions& options = {}) {
+ColumnMap named(const std::vector<std::string>& names, std::optional<double> period_s = {}) {
   ColumnMap map;
-  map.names = options.names;
-  map.period_s = options.period_s;
+  map.names = names;
+  map.period_s = period_s;
+  return map;
+}
+
+RunFile import_text(const std::string& text, const ColumnMap& map = {}) {
   return parse_run(text, "log", {}, &map);
 }
 
-RunFile imported(const std::string& name, const LogOptions& options = {}) {
-  ColumnMap map;
-  map.names = options.names;
-  map.period_s = options.period_s;
-  return load_run({log_file(name)}, &map);
-}
-
-RunFile imported_with(const std::string& name, const std::string& map_text) {
-  const ColumnMap map = parse_column_map(map_text, "map.toml");
+RunFile imported(const std::string& name, const ColumnMap& map = {}) {
   return load_run({log_file(name)}, &map);
 }
 
@@ -72,7 +63,7 @@ using Columns = std::vector<std::string>;
 
 TEST_CASE("halsampler's numbered samples become rows at their times", "[import]") {
   const RunFile run =
-      imported("halsampler_numbered.txt", {{"t1_degC", "z_mm", "coolant_on"}, 0.001});
+      imported("halsampler_numbered.txt", named({"t1_degC", "z_mm", "coolant_on"}, 0.001));
   CHECK(run.columns == Columns{"time_s", "t1_degC", "z_mm", "coolant_on"});
   REQUIRE(run.rows() == 12);
   CHECK(run.time_s().back() == Approx(0.011));
@@ -84,7 +75,8 @@ TEST_CASE("halsampler's numbered samples become rows at their times", "[import]"
 
 TEST_CASE("halsampler without numbers: an overrun before the first row loses nothing of the file",
           "[import]") {
-  const RunFile run = imported("halsampler_plain.txt", {{"t1_degC", "z_mm", "coolant_on"}, 0.001});
+  const RunFile run =
+      imported("halsampler_plain.txt", named({"t1_degC", "z_mm", "coolant_on"}, 0.001));
   REQUIRE(run.rows() == 6);
   CHECK(run.column("t1_degC").front() == 20.813186);
   CHECK(has_note(run, "not numbered"));
@@ -93,14 +85,14 @@ TEST_CASE("halsampler without numbers: an overrun before the first row loses not
 TEST_CASE("halsampler without names and period: the error shows the lines to add", "[import]") {
   CHECK_THROWS_WITH(imported("halsampler_numbered.txt"),
                     Contains("--names t1_degC,t2_degC,t3_degC --period-s S"));
-  CHECK_THROWS_WITH(imported("halsampler_numbered.txt", {{"a", "b", "c"}, {}}),
+  CHECK_THROWS_WITH(imported("halsampler_numbered.txt", named({"a", "b", "c"})),
                     Contains("write --period-s S"));
-  CHECK_THROWS_WITH(imported("halsampler_numbered.txt", {{"a", "b"}, 0.001}),
+  CHECK_THROWS_WITH(imported("halsampler_numbered.txt", named({"a", "b"}, 0.001)),
                     Contains("must be one for each of the 4 numbers"));
 }
 
 TEST_CASE("lost samples are a gap if samples are numbered, else an error", "[import]") {
-  const LogOptions one{{"z_mm"}, 0.5};
+  const ColumnMap one = named({"z_mm"}, 0.5);
   const RunFile run = import_text("7 1.5 \n8 1.6 \noverrun\n20 1.9 \n", one);
   CHECK(run.time_s() == std::vector<double>{0.0, 0.5, 6.5});
   CHECK(has_note(run, "lost: 1 times"));
@@ -166,10 +158,11 @@ TEST_CASE("KW Watcher: seven lines above the rows", "[import]") {
 
 TEST_CASE("a log without units needs the column map and is read with it", "[import]") {
   CHECK_THROWS_WITH(imported("rtu_log.csv"), Contains("write \"plc.plc1.bed\" = "));
-  const RunFile run = imported_with("rtu_log.csv",
-                                    "[columns]\n\"plc.plc1.bed\" = \"bed_degC\"\n"
-                                    "\"plc.plc1.head\" = \"head_degC\"\n"
-                                    "\"plc.plc1.speed\" = \"spindle_rpm\"\n");
+  const RunFile run =
+      imported("rtu_log.csv", parse_column_map("[columns]\n\"plc.plc1.bed\" = \"bed_degC\"\n"
+                                               "\"plc.plc1.head\" = \"head_degC\"\n"
+                                               "\"plc.plc1.speed\" = \"spindle_rpm\"\n",
+                                               "map.toml"));
   CHECK(run.columns == Columns{"time_s", "bed_degC", "head_degC", "spindle_rpm"});
   CHECK(run.column("head_degC").back() == 22.6);
 }
@@ -257,8 +250,8 @@ TEST_CASE("files without dates are joined by a common event, or not at all", "[i
 }
 
 TEST_CASE("the comment of an export gives its clock", "[import]") {
-  const RunFile log = import_text(
-      "# 0.000 s: wall time 2026-03-02T07:00:00.000Z\ntime_s,t1_degC\n0,20\n60,21\n", {});
+  const RunFile log =
+      import_text("# 0.000 s: wall time 2026-03-02T07:00:00.000Z\ntime_s,t1_degC\n0,20\n60,21\n");
   REQUIRE(log.wall_zero);
   CHECK(log.wall_zero->is_utc);
   CHECK_THROWS_WITH(joined_runs(log, imported("probings.csv"), {}), Contains("time zone"));
@@ -305,8 +298,8 @@ TEST_CASE("a workbook is read by xlsx2csv, or the error gives the remedy", "[imp
 }
 
 TEST_CASE("options that a log does not need are refused", "[import]") {
-  CHECK_THROWS_WITH(imported("kw_watcher.csv", {{"a"}, {}}), Contains("names"));
-  CHECK_THROWS_WITH(imported("kw_watcher.csv", {{}, 2.0}), Contains("period_s"));
+  CHECK_THROWS_WITH(imported("kw_watcher.csv", named({"a"})), Contains("names"));
+  CHECK_THROWS_WITH(imported("kw_watcher.csv", named({}, 2.0)), Contains("period_s"));
 }
 
 TEST_CASE("operators' corrections are displacements of opposite sign", "[import]") {
