@@ -96,6 +96,13 @@ class Axis:
                 self.first_reads.setdefault(writer, (now, collections.deque(maxlen=64)))[1].append(shown_um)
             return shown_um
 
+    def shown_arrived(self, writer=1):
+        """The frames of the newest reading are sent. What was written before is in transit if that reading is the
+        first: on a busy machine, time passes between them."""
+        with self.lock:
+            if len(self.first_reads.get(writer, (0.0, ()))[1]) == 1:
+                self.first_reads[writer] = (time.monotonic(), self.first_reads[writer][1])
+
     def reports_position(self, position_um):
         """The controller has moved by itself, or the previous writer is gone: the next value is
         compared with the position at its next read. A writer of this value continues."""

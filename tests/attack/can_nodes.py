@@ -2,6 +2,7 @@
 
 import contextlib
 import math
+import select
 import socket
 import struct
 import threading
@@ -74,8 +75,8 @@ class CanThermocouples:
 
 
 class CanController:
-    """Applies offset frames with the valid bit set; reports the applied offset after each and at
-    least once per PERIOD_S."""
+    """Applies offset frames with the valid bit set; reports the applied offset each PERIOD_S, after all frames received
+    by then: on a busy machine, others would count as written after what this report shows."""
 
     def __init__(self, axis, interface, shown_as, shown_scale):
         self.axis = axis
@@ -106,7 +107,10 @@ class CanController:
             if not self.silent and time.monotonic() - shown_at >= PERIOD_S:
                 shown_at = time.monotonic()
                 with contextlib.suppress(OSError):
+                    while select.select([self.bus], [], [], 0)[0]:
+                        self.take(*receive(self.bus))
                     self.show()
+                    self.axis.shown_arrived()
 
     def show(self):
         self.bus.send(frame(APPLIED, self.applied()))
