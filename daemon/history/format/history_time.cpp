@@ -98,7 +98,7 @@ HistoryTime parse_history_time(const std::string& text, std::chrono::nanoseconds
 }
 
 std::string utc_text(std::int64_t wall_ns) {
-  const std::chrono::sys_time wall{std::chrono::nanoseconds(wall_ns)};
+  const std::chrono::sys_time<std::chrono::nanoseconds> wall{std::chrono::nanoseconds(wall_ns)};
   const auto seconds = std::chrono::floor<std::chrono::seconds>(wall);
   const auto part = std::chrono::floor<std::chrono::milliseconds>(wall - seconds);
   return fmt::format("{:%Y-%m-%dT%H:%M:%S}.{:03}Z", fmt::gmtime(seconds.time_since_epoch().count()),
