@@ -1,6 +1,6 @@
 #!/bin/bash
-# Checks that each fuzz target and the readers of foreign tables and of histories compile with clang: syntax only, about
-# a minute. scripts/fuzz.sh runs them.
+# Checks that each fuzz target and the readers of foreign tables and of histories compile with clang: syntax
+# only, about a minute. scripts/fuzz.sh runs them.
 set -euo pipefail
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
 source scripts/common.sh

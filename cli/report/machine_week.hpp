@@ -43,11 +43,13 @@ struct ModeSpell {
   std::string mode;  ///< "compensating", "holding", ..., or one of the above
 };
 
+/// How often and how long a fault was there within the period.
 struct OutageTimes {
   std::size_t count{0};
   double lasted_s{0.0};
   bool lasts{false};  ///< at the end of the period
 };
+
 /// Faults of one subject.
 struct Outages : OutageTimes {
   Subject subject;

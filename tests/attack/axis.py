@@ -97,8 +97,8 @@ class Axis:
             return shown_um
 
     def shown_arrived(self, writer=1):
-        """The frames of the newest reading are sent. What was written before is in transit if that reading is the
-        first: on a busy machine, time passes between them."""
+        """The frames of the newest reading are sent. A write that came before is in transit if that reading is the
+        first: on a busy machine, time passes between reading and sending."""
         with self.lock:
             if len(self.first_reads.get(writer, (0.0, ()))[1]) == 1:
                 self.first_reads[writer] = (time.monotonic(), self.first_reads[writer][1])
