@@ -155,14 +155,16 @@ test_processes_while_building() {
   left_out=(--label-exclude "${labels%)\$}|${left_out_labels})\$")
 }
 
-targets=(all) left_out_labels='long|nightly|planted|service' together=ON
+targets=(all) left_out_labels='long|nightly|planted|service' together=ON needed=test
 case $extent in
   quick) targets=(quick_tests) ;;
-  packages) left_out_labels='nightly|planted' ;;
-  all) targets=(all planted_tests) left_out_labels=none together=OFF ;;  # planted bugs replace single files
+  packages) left_out_labels='nightly|planted' needed=checks ;;
+  # Planted bugs replace single files.
+  all) targets=(all planted_tests) left_out_labels=none together=OFF needed=checks ;;
 esac
+if [[ $preset != release ]]; then needed=checks; fi
 left_out=(--label-exclude "^($left_out_labels)\$")
-stage "packages" scripts/setup.sh test
+stage "packages" scripts/setup.sh "$needed"
 stage "configure $preset" cmake --preset "$preset" -D THERMOCOMP_TOGETHER="$together"
 if [[ $extent == build-only ]]; then
   stage "build $preset" build "${targets[@]}"

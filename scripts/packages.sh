@@ -32,28 +32,33 @@ packages_demo=("${packages_machine[@]}" gnuplot-nox)
 # ./demo.sh fleet: the store, its server, and the simulated machines of bench/series.
 packages_demo_fleet=("${packages_demo[@]}" libpqxx-dev postgresql postgresql-client openssl python3-numpy)
 
-# Other projects' software used by the tests, and the tools of the checks.
+# Other projects' software used by the tests.
 packages_test=(
   "${packages_demo[@]}" "${packages_modelling[@]}" catch2
   # Reference for the finite elements; reference for test plans.
   calculix-ccx python3-allpairspy
   mbpoll can-utils python3-pymodbus python3-serial-asyncio python3-can python3-canmatrix
   python3-numpy python3-pytest python3-meshio
-  # Clients of the gateway's page, metrics and messages.
-  chromium chromium-driver python3-selenium prometheus mosquitto mosquitto-clients openssl
-  # The store of a series.
-  postgresql postgresql-client
-  sqlite3 socat rt-tests user-mode-linux kmod iproute2 procps valgrind
+  # Clients of the gateway's metrics and messages.
+  prometheus mosquitto mosquitto-clients openssl
+  sqlite3 socat user-mode-linux kmod iproute2 procps man-db groff-base
+  # The real controller of tests/linuxcnc, and headers for its bridge.
+  linuxcnc-uspace linuxcnc-uspace-dev
+)
+
+# Additionally for what runs before a merge: ./test.sh --packages, other builds than the release, static checks.
+packages_checks=(
+  "${packages_test[@]}"
+  # Clients of the pages, the store of a series.
+  chromium chromium-driver python3-selenium postgresql postgresql-client
   clang-tidy clang-tools clang-format gcovr
   # The fuzz targets: the compiler, libFuzzer and the sanitizers' runtime.
   clang libclang-rt-14-dev
   # Sanitizer builds on real CAN, with the kernel from guest-kernel.sh.
   qemu-system-x86 busybox-static
-  # The real controller of tests/linuxcnc, and headers for its bridge.
-  linuxcnc-uspace linuxcnc-uspace-dev
   # The Debian packages, and the booted systemd for their tests.
-  debhelper lintian mmdebstrap systemd-container man-db groff-base
+  debhelper lintian mmdebstrap systemd-container
 )
 
-# Peers of bench/run.sh measured, and the cluster of fleet_slurm; too large for the tests.
-packages_bench=("${packages_test[@]}" python3-sklearn python3-scipy slurm-wlm munge)
+# Peers and counters of bench/run.sh, and the cluster of fleet_slurm; too large for the tests.
+packages_bench=("${packages_checks[@]}" valgrind rt-tests python3-sklearn python3-scipy slurm-wlm munge)

@@ -1,6 +1,6 @@
 #!/bin/bash
 # Lists and installs the missing Debian packages.
-#   scripts/setup.sh build|modelling|petsc|demo|demo_fleet|test|bench
+#   scripts/setup.sh build|modelling|petsc|demo|demo_fleet|test|checks|bench
 # Needs root or sudo only if packages are missing. Exit status 0: all are installed.
 set -euo pipefail
 here=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)
@@ -57,9 +57,10 @@ main() {
     demo) wanted=("${packages_demo[@]}") ;;
     demo_fleet) wanted=("${packages_demo_fleet[@]}") ;;
     test) wanted=("${packages_test[@]}") ;;
+    checks) wanted=("${packages_checks[@]}") ;;
     bench) wanted=("${packages_bench[@]}") ;;
     *)
-      echo "usage: setup.sh build|modelling|petsc|demo|demo_fleet|test|bench" >&2
+      echo "usage: setup.sh build|modelling|petsc|demo|demo_fleet|test|checks|bench" >&2
       exit 2
       ;;
   esac

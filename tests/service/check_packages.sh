@@ -7,7 +7,7 @@ here=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)
 source_tree=${1:?the source tree} folder=${2:?a folder}
 for tool in dpkg-buildpackage dh lintian mmdebstrap; do
   if ! command -v "$tool" >/dev/null; then
-    echo "check_packages.sh: skipped: $tool is missing (scripts/setup.sh test)"
+    echo "check_packages.sh: skipped: $tool is missing (scripts/setup.sh checks)"
     exit 77
   fi
 done

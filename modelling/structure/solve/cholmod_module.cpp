@@ -2,6 +2,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <dlfcn.h>
+#include <malloc.h>
 #include <string>
 #include <suitesparse/cholmod.h>
 #include <unistd.h>
@@ -26,6 +27,13 @@ void leave_processors_to_others() {
   if (::getloadavg(&load, 1) == 1 && load > processors) set("openblas_set_num_threads", 1);
 }
 
+/// A factor's blocks of tens of MB are used again by the next one. As the C library does it, each would be mapped and
+/// cleared anew: half of the time of small models.
+void keep_freed_memory() {
+  ::mallopt(M_MMAP_THRESHOLD, 1 << 30);
+  ::mallopt(M_TRIM_THRESHOLD, 1 << 30);
+}
+
 [[noreturn]] void refuse(int status) {
   if (status == CHOLMOD_OUT_OF_MEMORY || status == CHOLMOD_TOO_LARGE) {
     throw FactorisationError(
@@ -40,8 +48,8 @@ void leave_processors_to_others() {
 class CholmodFactor : public CholeskyFactor {
  public:
   explicit CholmodFactor(Index size) : size_(size) {
-    static const bool left = (leave_processors_to_others(), true);
-    static_cast<void>(left);
+    static const bool prepared = (leave_processors_to_others(), keep_freed_memory(), true);
+    static_cast<void>(prepared);
     cholmod_start(&common_);
     common_.nmethods = 1;
     common_.method[0].ordering = CHOLMOD_METIS;

@@ -70,4 +70,4 @@ def test_without_a_network_one_line_has_the_advice(system):
 def test_a_usage_error_is_status_2(system):
     answer = set_up(system, "nosuch")
     assert answer.returncode == 2
-    assert answer.stderr == "usage: setup.sh build|modelling|petsc|demo|demo_fleet|test|bench\n"
+    assert answer.stderr == "usage: setup.sh build|modelling|petsc|demo|demo_fleet|test|checks|bench\n"
