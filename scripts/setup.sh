@@ -14,11 +14,9 @@ fail() {
 
 # Packages that dpkg does not list as installed, one per line.
 missing_packages() {
-  local package status
-  for package in "$@"; do
-    status=$(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null || true)
-    [[ $status == installed ]] || echo "$package"
-  done
+  # An unknown name is an error of dpkg-query, and missing.
+  comm -13 <(dpkg-query -W -f '${db:Status-Status} ${Package}\n' "$@" 2>/dev/null | sed -n 's/^installed //p' | sort -u) \
+    <(printf '%s\n' "$@" | sort -u)
 }
 
 # Runs a command as root: directly, or through sudo.

@@ -6,8 +6,9 @@ import pytest
 from conftest import SOURCE
 
 DPKG_QUERY = """#!/bin/sh
-for last; do :; done
-[ -e "$FAKE/installed/$last" ] && printf installed
+shift 3
+for name; do if [ -e "$FAKE/installed/$name" ]; then echo "installed $name"; else failed=1; fi; done
+exit ${failed:-0}
 """
 APT_GET = """#!/bin/sh
 echo "$@" >> "$FAKE/calls"
