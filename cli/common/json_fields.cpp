@@ -1,9 +1,10 @@
 #include "cli/common/json_fields.hpp"
 
 #include <algorithm>
-#include <limits>
 
 #include <nlohmann/json.hpp>
+
+#include "estimator/types.hpp"
 
 namespace thermocomp::cli {
 
@@ -22,7 +23,7 @@ const json& field(const json& object, const char* key) {
 
 double number_of(const json& object, const char* key) {
   const json& value = field(object, key);
-  return value.is_number() ? value.get<double>() : std::numeric_limits<double>::quiet_NaN();
+  return value.is_number() ? value.get<double>() : not_a_number;
 }
 
 std::uint64_t count_of(const json& object, const char* key) {

@@ -15,6 +15,7 @@
 #include "config/text/printable_text.hpp"
 #include "config/text/problems.hpp"
 #include "config/text/units.hpp"
+#include "estimator/types.hpp"
 
 namespace thermocomp::cli {
 namespace {
@@ -208,7 +209,7 @@ double value_between(const RunFile& run, std::size_t column, std::size_t after, 
   const std::string& name = run.columns[column];
   if (after == 0 || after == time_s.size() || is_output(name) ||
       time_s[after] - time_s[after - 1] > gap_s)
-    return std::nan("");
+    return not_a_number;
   const bool is_steady = is_temperature(name) || kind_of(name) == QuantityKind::position;
   if (!is_steady) return values[after - 1];
   const double share = (at_s - time_s[after - 1]) / (time_s[after] - time_s[after - 1]);
@@ -284,7 +285,7 @@ class Join {
       run_.values[column++].push_back(takes_a ? first_.values[of][i]
                                               : value_between(first_, of, i, at_s, gap_s_));
     for (const std::size_t of : from_second_)
-      run_.values[column++].push_back(takes_b ? second_.values[of][j] : std::nan(""));
+      run_.values[column++].push_back(takes_b ? second_.values[of][j] : not_a_number);
     const auto& a = first_.time_s();
     if (takes_b && at_s >= a.front() && at_s <= a.back()) ++inside_;
   }

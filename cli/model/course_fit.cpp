@@ -10,6 +10,7 @@
 #include "estimator/learning/probings.hpp"
 #include "estimator/learning/recorded_course.hpp"
 #include "estimator/model/displacement_model.hpp"
+#include "estimator/types.hpp"
 
 namespace thermocomp::cli {
 namespace {
@@ -47,7 +48,7 @@ class CorrectionRun {
   std::vector<LearnedPoint> take(double every_s) {
     std::vector<LearnedPoint> learned_points;
     if (measured_um_ == nullptr) return learned_points;
-    double first_um = std::numeric_limits<double>::quiet_NaN();
+    double first_um = not_a_number;
     double model_first_um = 0.0;
     double probed_at_s = -std::numeric_limits<double>::infinity();
     for (const std::size_t row : inputs_.rows) {

@@ -5,12 +5,12 @@
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
-#include <limits>
 #include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "estimator/types.hpp"
 #include "report/terminal.hpp"
 #include "status/codes.hpp"
 #include "status/figures.hpp"
@@ -105,14 +105,14 @@ std::vector<std::string> fields_of(const std::string& line) {
 double number_in(const std::string& field) {
   double value = 0.0;
   const auto result = std::from_chars(field.data(), field.data() + field.size(), value);
-  return result.ec == std::errc() ? value : std::numeric_limits<double>::quiet_NaN();
+  return result.ec == std::errc() ? value : not_a_number;
 }
 
 double value_of(const std::vector<std::string>& columns, const std::vector<double>& values,
                 const std::string& column) {
   const auto found = std::find(columns.begin(), columns.end(), column);
   const auto index = static_cast<std::size_t>(found - columns.begin());
-  return index < values.size() ? values[index] : std::numeric_limits<double>::quiet_NaN();
+  return index < values.size() ? values[index] : not_a_number;
 }
 
 }  // namespace

@@ -2,8 +2,9 @@
 #pragma once
 
 #include <filesystem>
-#include <limits>
 #include <string>
+
+#include "estimator/types.hpp"
 
 namespace thermocomp::cli {
 
@@ -12,9 +13,9 @@ namespace thermocomp::cli {
 void start_candidate(const std::filesystem::path& socket, const std::filesystem::path& file);
 
 struct Promotion {
-  std::string model;   ///< file of the model in use
-  std::string before;  ///< previous model, used by promote --back
-  double better_probability{std::numeric_limits<double>::quiet_NaN()};  ///< by the probings so far
+  std::string model;                        ///< file of the model in use
+  std::string before;                       ///< previous model, used by promote --back
+  double better_probability{not_a_number};  ///< by the probings so far
 };
 /// Makes the candidate the model in use and keeps the previous one. If the reload is refused, the
 /// model's file is restored.

@@ -4,6 +4,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "estimator/types.hpp"
+
 namespace thermocomp {
 
 std::string_view trimmed(std::string_view text) {
@@ -14,7 +16,7 @@ std::string_view trimmed(std::string_view text) {
 }
 
 bool is_missing(std::string_view field) {
-  return field.empty() || field == "nan" || field == "NaN" || field == "NAN";
+  return field.empty() || field == "nan" || field == "NaN" || field == "not_a_number";
 }
 
 std::optional<double> finite_number(std::string_view field) {

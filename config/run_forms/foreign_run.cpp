@@ -18,6 +18,7 @@
 #include "config/run_forms/time_stamp.hpp"
 #include "config/text/printable_text.hpp"
 #include "config/text/units.hpp"
+#include "estimator/types.hpp"
 
 namespace thermocomp {
 namespace {
@@ -121,10 +122,10 @@ class ValueReader {
         number = in_unit_of_column(*meaning.source, *number, *parts.unit);
       if (!number && suffix == "_on") number = switch_word(field);
       if (!number && !missing) ask_for_word(row, *meaning.source);
-      double value = number.value_or(NAN);
+      double value = number.value_or(not_a_number);
       if (!meaning.conversion.is_identity())
         value = meaning.conversion.factor * value + meaning.conversion.offset;
-      if (std::isinf(value)) value = NAN;
+      if (std::isinf(value)) value = not_a_number;
       if (suffix == "_degC" && (value < degC_min || value > degC_max)) {
         is_impossible_ = is_impossible_ || words_.empty();
         ask_for_word(row, *meaning.source);

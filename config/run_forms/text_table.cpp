@@ -11,6 +11,7 @@
 #include "config/run_forms/spelled_unit.hpp"
 #include "config/run_forms/text_lines.hpp"
 #include "config/run_forms/time_stamp.hpp"
+#include "estimator/types.hpp"
 
 namespace thermocomp {
 namespace {
@@ -103,7 +104,7 @@ bool is_known_row_of_numbers(const HeadLine& line) {
   std::vector<double> numbers;
   for (std::size_t i = 0; i < line.kinds.size(); ++i)
     if (line.kinds[i] == FieldKind::number)
-      numbers.push_back(finite_number(line.fields[i]).value_or(NAN));
+      numbers.push_back(finite_number(line.fields[i]).value_or(not_a_number));
   return numbers.size() > 1 && (numbers[0] == 0 || numbers[0] == 1) &&
          std::ranges::adjacent_find(numbers, [](double a, double b) { return !(b == a + 1); }) ==
              numbers.end();

@@ -13,6 +13,7 @@
 #include "config/run_forms/spelled_unit.hpp"
 #include "config/run_forms/time_stamp.hpp"
 #include "config/text/printable_text.hpp"
+#include "estimator/types.hpp"
 
 namespace thermocomp {
 namespace {
@@ -296,7 +297,7 @@ class TimeReader {
       if (!number)
         refuse(row,
                "must be a number, as in the rows before; delete the line if it is no measurement");
-      run_.time_s.push_back(number.value_or(NAN));
+      run_.time_s.push_back(number.value_or(not_a_number));
     }
     if (problems_.empty() && !run_.time_s.empty()) scale_numbers(numbers);
   }
@@ -415,7 +416,7 @@ class TimeReader {
     });
     std::vector<double> seconds;
     for (const TimeStamp& stamp : stamps) {
-      seconds.push_back(seconds_of(stamp, order, minutes_first).value_or(NAN));
+      seconds.push_back(seconds_of(stamp, order, minutes_first).value_or(not_a_number));
       const std::size_t row = seconds.size() - 1;
       if (!wraps || row == 0) continue;
       const double last = seconds[row - 1];
@@ -429,8 +430,9 @@ class TimeReader {
 
   void add_fractions() {
     for (std::size_t row = 0; row < table_.rows() && time_.fraction; ++row)
-      run_.time_s[row] += time_.fraction_factor *
-                          table_.number(table_.columns[*time_.fraction].fields[row]).value_or(NAN);
+      run_.time_s[row] +=
+          time_.fraction_factor *
+          table_.number(table_.columns[*time_.fraction].fields[row]).value_or(not_a_number);
   }
 
   [[nodiscard]] std::optional<TimeStamp> joined(std::size_t row, const TimeStamp& date) const {

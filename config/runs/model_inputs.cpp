@@ -16,6 +16,7 @@
 #include "config/text/printable_text.hpp"
 #include "config/text/problems.hpp"
 #include "config/text/units.hpp"
+#include "estimator/types.hpp"
 
 namespace thermocomp {
 namespace {
@@ -257,7 +258,7 @@ std::vector<Outliers> leave_out_outliers(RunFile& run, const std::vector<std::st
     std::vector<double>& values = run.values[*run.find(each.column)];
     for (std::size_t row = 0; row < values.size(); ++row)
       if (std::binary_search(each.times_s.begin(), each.times_s.end(), run.time_s()[row]))
-        values[row] = std::nan("");
+        values[row] = not_a_number;
   }
   return all;
 }

@@ -4,11 +4,13 @@
 #include <cmath>
 #include <limits>
 
+#include "estimator/types.hpp"
+
 namespace thermocomp {
 
 double median(std::vector<double> values) {
   std::erase_if(values, [](double value) { return !std::isfinite(value); });
-  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
+  if (values.empty()) return not_a_number;
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
@@ -32,8 +34,7 @@ double median_around(const std::vector<double>& values, std::size_t row, std::si
 double line_beside(const std::vector<double>& values, std::size_t row, std::size_t side,
                    bool after) {
   const std::size_t count = 2 * side;
-  if ((after ? values.size() - 1 - row : row) < count)
-    return std::numeric_limits<double>::quiet_NaN();
+  if ((after ? values.size() - 1 - row : row) < count) return not_a_number;
   const auto at = [&](std::size_t i) { return after ? values[row + i] : values[row - i]; };
   std::vector<double> slopes;
   for (std::size_t i = 1; i <= side; ++i)

@@ -17,6 +17,7 @@
 #include "config/text/printable_text.hpp"
 #include "config/text/units.hpp"
 #include "config/toml/toml_reader.hpp"
+#include "estimator/types.hpp"
 
 namespace thermocomp {
 namespace {
@@ -124,12 +125,12 @@ class RunParser {
 
   /// NaN for a missing value, and after a problem.
   double value_of(std::string_view field, const std::string& column) {
-    if (is_missing(field)) return std::nan("");
+    if (is_missing(field)) return not_a_number;
     if (const auto number = finite_number(field)) return *number;
     const bool has_quote = field.find('"') != std::string_view::npos;
     problems_.add(line_number_, column, field,
                   has_quote ? "must not be quoted" : "must be a finite number, empty or nan");
-    return std::nan("");
+    return not_a_number;
   }
 
   std::string_view rest_;

@@ -6,7 +6,6 @@
 #include <cstring>
 #include <fcntl.h>
 #include <fstream>
-#include <limits>
 #include <stdexcept>
 #include <unistd.h>
 
@@ -14,6 +13,8 @@
 #include <sys/mman.h>
 #include <sys/stat.h>
 #include <sys/vfs.h>
+
+#include "estimator/types.hpp"
 
 namespace thermocomp {
 namespace {
@@ -92,7 +93,7 @@ LastSent::LastSent(const std::filesystem::path& file, const std::string& control
     if (place.number > now_.number && place.checksum == checksum_of(place)) now_ = place;
   for (std::size_t i = 0; i < axes_; ++i)
     if ((now_.forgotten >> i & 1u) != 0)
-      before_[axes[i].name] = std::numeric_limits<double>::quiet_NaN();
+      before_[axes[i].name] = not_a_number;
     else if ((now_.known >> i & 1u) != 0)
       before_[axes[i].name] = now_.offset_um[i];
 }

@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
+
+#include "estimator/types.hpp"
 
 namespace thermocomp {
 namespace {
@@ -57,15 +58,13 @@ bool EventJournal::fault(Event fault) {
 
 double EventJournal::recovery(const Subject& subject, std::chrono::nanoseconds hold, double value) {
   const auto found = outages_.find(subject);
-  if (found == outages_.end() || found->second.away_since)
-    return std::numeric_limits<double>::quiet_NaN();
+  if (found == outages_.end() || found->second.away_since) return not_a_number;
   Outage& outage = found->second;
   outage.away_since = now_().monotonic;
   if (!std::isnan(value)) outage.newest.value = value;
   outage.hold = hold;
   if (outage.comes_and_goes) outage.hold = std::max<std::chrono::nanoseconds>(hold, returns_within);
-  return outage.hold > std::chrono::nanoseconds{} ? std::numeric_limits<double>::quiet_NaN()
-                                                  : end_of(outage).duration_s;
+  return outage.hold > std::chrono::nanoseconds{} ? not_a_number : end_of(outage).duration_s;
 }
 
 Event EventJournal::end_of(Outage& outage) {

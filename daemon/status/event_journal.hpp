@@ -6,12 +6,12 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
-#include <limits>
 #include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "estimator/types.hpp"
 #include "status/event.hpp"
 
 namespace thermocomp {
@@ -44,7 +44,7 @@ class EventJournal {
   /// @param value  of the end's event; NaN: that of the fault
   /// @return duration of the outage [s] if its end became an event, else NaN
   double recovery(const Subject& subject, std::chrono::nanoseconds hold = {},
-                  double value = std::numeric_limits<double>::quiet_NaN());
+                  double value = not_a_number);
   /// Ends outages whose faults have stayed away long enough; call often.
   /// @return the events
   std::vector<Event> settle();

@@ -10,7 +10,9 @@
 #include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
+#include <netdb.h>
 #include <nlohmann/json.hpp>
 #include <spdlog/spdlog.h>
 
@@ -46,6 +48,27 @@ const char* or_null(const std::string& text) {
 std::string first_line(const std::filesystem::path& file) {
   const std::string text = read_text_file(file);
   return text.substr(0, text.find_first_of("\r\n"));
+}
+
+/// @return the address families of `host`, the preferred one last; AF_UNSPEC: no address was found
+std::vector<int> families_of(const std::string& host) {
+  addrinfo wanted{};
+  wanted.ai_socktype = SOCK_STREAM;
+  addrinfo* found = nullptr;
+  if (::getaddrinfo(host.c_str(), nullptr, &wanted, &found) != 0) return {AF_UNSPEC};
+  std::vector<int> families;
+  for (const addrinfo* at = found; at != nullptr; at = at->ai_next)
+    if (std::ranges::find(families, at->ai_family) == families.end())
+      families.insert(families.begin(), at->ai_family);
+  ::freeaddrinfo(found);
+  return families;
+}
+
+/// Of a name's addresses libmosquitto tries only the first; bound to a family, the first of that
+/// family.
+const char* any_address(int family) {
+  if (family == AF_UNSPEC) return nullptr;
+  return family == AF_INET6 ? "::" : "0.0.0.0";
 }
 
 }  // namespace
@@ -146,10 +169,15 @@ void MqttPublisher::Parts::sleep(milliseconds time) const {
 
 void MqttPublisher::Parts::run() {
   constexpr int wait_ms = 100;
-  // Connecting waits in mosquitto_loop(), with its timeout; this call waits only for the name
+  std::vector<int> untried;
+  // Connecting waits in mosquitto_loop(), with its timeout; these calls wait only for the name
   // server.
-  int code =
-      mosquitto_connect_async(client, settings.mqtt.host.c_str(), settings.mqtt.port, keepalive_s);
+  const auto connect = [&] {
+    if (untried.empty()) untried = families_of(settings.mqtt.host);
+    return mosquitto_connect_bind_async(client, settings.mqtt.host.c_str(), settings.mqtt.port,
+                                        keepalive_s, any_address(untried.back()));
+  };
+  int code = connect();
   while (!stops) {
     if (code == MOSQ_ERR_SUCCESS) code = mosquitto_loop(client, wait_ms, 1);
     if (code == MOSQ_ERR_SUCCESS) {
@@ -159,12 +187,17 @@ void MqttPublisher::Parts::run() {
     const std::string problem =
         last_problem.empty() ? text_of(code) : std::exchange(last_problem, "");
     const bool was_connected = is_connected.exchange(false);
+    if (!was_connected) untried.pop_back();
+    if (!was_connected && !untried.empty()) {
+      code = connect();
+      continue;
+    }
     if (was_connected || again_after == again_after_min)
       spdlog::warn("mqtt: {} port {}: {}", settings.mqtt.host, settings.mqtt.port, problem);
     if (was_connected) note_short_connection();
     sleep(again_after);
     again_after = std::min(2 * again_after, again_after_max);
-    if (!stops) code = mosquitto_reconnect_async(client);
+    if (!stops) code = connect();
   }
   if (is_connected) publish_offline();
 }

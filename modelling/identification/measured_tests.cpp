@@ -11,6 +11,7 @@
 #include "config/runs/robust.hpp"
 #include "config/text/printable_text.hpp"
 #include "config/text/units.hpp"
+#include "estimator/types.hpp"
 #include "modelling/identification/printed.hpp"
 
 namespace thermocomp::identification {
@@ -66,7 +67,7 @@ double spike_limit_K(const std::vector<double>& values) {
   for (std::size_t row = 1; row < values.size(); ++row)
     if (std::isfinite(values[row] - values[row - 1]))
       steps_K.push_back(std::abs(values[row] - values[row - 1]));
-  if (steps_K.empty()) return std::numeric_limits<double>::quiet_NaN();
+  if (steps_K.empty()) return not_a_number;
   const auto middle = steps_K.begin() + static_cast<std::ptrdiff_t>(steps_K.size() / 2);
   std::nth_element(steps_K.begin(), middle, steps_K.end());
   return std::max(spike_K_min, usual_steps * *middle);
@@ -86,7 +87,7 @@ void leave_out_spikes(RunFile& run, std::vector<std::string>& notes) {
       const bool at_end = row < 2 || row + 2 >= read.size();
       if (!(read[row] < least || read[row] > most || (!at_end && is_spike(read, row, limit_K))))
         continue;
-      run.values[i][row] = std::numeric_limits<double>::quiet_NaN();
+      run.values[i][row] = not_a_number;
       ++spikes;
     }
     if (spikes > 0)
@@ -102,8 +103,7 @@ void leave_out_stray_values(RunFile& run, std::vector<std::string>& notes) {
   for (std::size_t i = 0; i < run.columns.size(); ++i) {
     if (!is_operating(run.columns[i]) || run.columns[i] == "time_s") continue;
     const std::vector<std::size_t> rows = stray_rows(run.values[i]);
-    for (const std::size_t row : rows)
-      run.values[i][row] = std::numeric_limits<double>::quiet_NaN();
+    for (const std::size_t row : rows) run.values[i][row] = not_a_number;
     if (!rows.empty())
       notes.push_back(run.name + ": " + run.columns[i] + ": " + std::to_string(rows.size()) +
                       (rows.size() == 1 ? " row is" : " rows are") +
@@ -263,8 +263,7 @@ void gather_probings(RunFile& run, const std::vector<std::string>& outputs,
     for (std::size_t i = 0; i < columns.size(); ++i) {
       const std::size_t from = *std::exchange(set[i], std::nullopt);
       if (from == row) continue;
-      (*columns[i])[row] =
-          std::exchange((*columns[i])[from], std::numeric_limits<double>::quiet_NaN());
+      (*columns[i])[row] = std::exchange((*columns[i])[from], not_a_number);
       is_moved = true;
     }
     if (is_moved) ++moved;

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <string_view>
 
 #include "config/runs/model_inputs.hpp"
 #include "config/runs/robust.hpp"
 #include "config/text/units.hpp"
+#include "estimator/types.hpp"
 #include "modelling/inspection/checks.hpp"
 
 namespace thermocomp::inspection {
@@ -178,7 +178,7 @@ std::size_t row_of(const RunFile& run, double time_s) {
 /// Replaces the values at the given times by the median of the others around them.
 void smooth_out(RunFile& run, std::vector<double>& values, const std::vector<double>& times_s) {
   constexpr std::size_t half_window = 3;
-  for (const double time_s : times_s) values[row_of(run, time_s)] = std::nan("");
+  for (const double time_s : times_s) values[row_of(run, time_s)] = not_a_number;
   const std::vector<double> left = values;
   for (const double time_s : times_s) {
     const std::size_t row = row_of(run, time_s);
@@ -211,12 +211,11 @@ std::string clean(RunFile& run, const Finding& finding) {
     return "the drift was subtracted as a straight line";
   }
   if (finding.kind == "stuck" || finding.kind == "sensor_loose") {
-    for (std::size_t row = begin; row < end; ++row)
-      values[row] = std::numeric_limits<double>::quiet_NaN();
+    for (std::size_t row = begin; row < end; ++row) values[row] = not_a_number;
     return "these values were left out";
   }
   if (finding.kind == "copy") {
-    std::fill(values.begin(), values.end(), std::numeric_limits<double>::quiet_NaN());
+    std::fill(values.begin(), values.end(), not_a_number);
     return "it was left out";
   }
   if (finding.kind == "sensor_swap") {

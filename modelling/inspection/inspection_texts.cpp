@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "config/text/units.hpp"
+#include "estimator/types.hpp"
 #include "modelling/inspection/checks.hpp"
 #include "modelling/inspection/inspection.hpp"
 #include "report/html_page.hpp"
@@ -229,7 +230,7 @@ std::string picture(const RunFile& run, const std::string& column, double from_s
   const std::span times = std::span(time_s).subspan(begin, count);
   std::vector<double> since_start_s(times.begin(), times.end());
   for (double& at_s : since_start_s) at_s -= time_s.front();
-  std::vector<double> marks(count, std::nan(""));
+  std::vector<double> marks(count, not_a_number);
   for (const double at_s : finding.times_s) {
     const std::size_t row = row_at(at_s) - begin;  // wraps to a large number before `begin`
     if (row < count) marks[row] = values[row];

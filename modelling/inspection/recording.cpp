@@ -7,6 +7,7 @@
 
 #include "config/runs/robust.hpp"
 #include "config/text/units.hpp"
+#include "estimator/types.hpp"
 
 namespace thermocomp::inspection {
 namespace {
@@ -55,12 +56,12 @@ double mean_of(const std::vector<double>& column, std::size_t begin, std::size_t
     sum += column[row];
     count += 1.0;
   }
-  return count > 0 ? sum / count : std::numeric_limits<double>::quiet_NaN();
+  return count > 0 ? sum / count : not_a_number;
 }
 
 /// Replaces missing values by the previous one, at the start by the first.
 void hold(Eigen::Ref<Eigen::VectorXd> column) {
-  double held = std::numeric_limits<double>::quiet_NaN();
+  double held = not_a_number;
   for (Index row = 0; row < column.size() && !std::isfinite(held); ++row) held = column[row];
   if (!std::isfinite(held)) held = 0.0;
   for (double& value : column) value = held = std::isfinite(value) ? value : held;

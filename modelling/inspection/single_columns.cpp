@@ -6,6 +6,7 @@
 
 #include "config/runs/robust.hpp"
 #include "config/text/units.hpp"
+#include "estimator/types.hpp"
 #include "modelling/inspection/checks.hpp"
 
 namespace thermocomp::inspection {
@@ -110,7 +111,7 @@ void leave_out_impossible(std::vector<double>& values,
   for (std::size_t row = 0; row < values.size(); ++row) {
     if (!is_impossible(values[row])) continue;
     note(row, values[row] - usual);
-    values[row] = std::numeric_limits<double>::quiet_NaN();
+    values[row] = not_a_number;
   }
 }
 
@@ -137,7 +138,7 @@ void leave_out_codes(std::vector<double>& values,
                          out / in < 2.0;
     for (std::size_t row = begin; is_code && row < end; ++row) {
       note(row, in);
-      values[row] = std::numeric_limits<double>::quiet_NaN();
+      values[row] = not_a_number;
     }
     begin = end - 1;
   }
@@ -205,7 +206,7 @@ void check_stray(RunFile& run, std::size_t index, std::size_t column, Suspicions
   for (const std::size_t row : rows) {
     made.finding.times_s.push_back(run.time_s()[row]);
     if (std::abs(values[row]) > std::abs(made.finding.size)) made.finding.size = values[row];
-    values[row] = std::numeric_limits<double>::quiet_NaN();
+    values[row] = not_a_number;
   }
   found.push_back(made);
 }

@@ -12,6 +12,7 @@
 
 #include "config/runs/robust.hpp"
 #include "config/text/units.hpp"
+#include "estimator/types.hpp"
 #include "modelling/inspection/checks.hpp"
 
 namespace thermocomp::inspection {
@@ -43,7 +44,7 @@ Suspicion over_run(const std::string& kind, const std::string& column, std::size
 double first_finite(const std::vector<double>& values) {
   const auto found =
       std::find_if(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
-  return found == values.end() ? std::numeric_limits<double>::quiet_NaN() : *found;
+  return found == values.end() ? not_a_number : *found;
 }
 
 double range_of(const std::vector<double>& values) {
@@ -124,7 +125,7 @@ void check_unit(const RunFile& run, std::size_t index, std::size_t column, Suspi
 
 /// Deviation of the noise in each window, from second differences.
 std::vector<double> noise_by_window(const std::vector<double>& values, std::size_t rows) {
-  std::vector<double> bends(values.size(), std::numeric_limits<double>::quiet_NaN());
+  std::vector<double> bends(values.size(), not_a_number);
   for (std::size_t i = 1; i + 1 < values.size(); ++i)
     bends[i] = (values[i - 1] - 2.0 * values[i] + values[i + 1]) / std::sqrt(6.0);
   std::vector<double> noise;

@@ -46,7 +46,7 @@ inline constexpr int random_draws = 100;
 /// Text with every method and the course of the patterns.
 [[nodiscard]] std::string comparison_text(const PlacementProblem& problem,
                                           const Comparison& comparison);
-/// JSON as described in docs/placement.md.
+/// JSON of the same figures.
 [[nodiscard]] std::string comparison_json(const PlacementProblem& problem,
                                           const Comparison& comparison);
 

@@ -8,6 +8,7 @@
 #include <Eigen/Cholesky>
 
 #include "config/text/units.hpp"
+#include "estimator/types.hpp"
 #include "modelling/identification/families/bank_fit.hpp"
 #include "modelling/identification/measured_tests.hpp"
 
@@ -45,7 +46,7 @@ std::vector<Subject> subjects_of(const std::vector<RunFile>& runs) {
     subject.rise_low = subject.low;
     for (const RunFile& run : runs) {
       if (!run.find(column)) continue;
-      double reference = std::nan("");
+      double reference = not_a_number;
       const std::vector<double>& values = run.column(column);
       for (std::size_t i = 0; i < run.selected_end; ++i) {
         if (!std::isfinite(values[i])) continue;

@@ -10,6 +10,7 @@
 #include <Eigen/Dense>
 
 #include "config/runs/robust.hpp"
+#include "estimator/types.hpp"
 
 namespace thermocomp::thermal_test {
 namespace {
@@ -251,7 +252,7 @@ Stretch stretch_between(const std::vector<double>& time_s, double from_s, double
 }
 
 double range_of(const std::vector<double>& values, Stretch stretch) {
-  if (!stretch.has_range()) return std::nan("");
+  if (!stretch.has_range()) return not_a_number;
   const auto from = values.begin() + static_cast<std::ptrdiff_t>(stretch.begin);
   const auto to = values.begin() + static_cast<std::ptrdiff_t>(stretch.end);
   const auto [low, high] = std::minmax_element(from, to);
@@ -311,7 +312,7 @@ std::vector<Stretch> stretches_of(Part part, const std::vector<double>& time_s,
 }
 
 double largest_range(const std::vector<double>& values, const std::vector<Stretch>& stretches) {
-  double largest = std::nan("");
+  double largest = not_a_number;
   for (const Stretch stretch : stretches) largest = std::fmax(largest, range_of(values, stretch));
   return largest;
 }
@@ -446,7 +447,7 @@ TestFigures figures_with_end(const TestData& data, double running_to_s) {
   courses.reserve(data.axes.size());
   for (const TestAxis& axis : data.axes) {
     courses.emplace_back(axis.measured, data.breaks_s,
-                         axis.noise >= 0.0 ? axis.noise : std::nan(""));
+                         axis.noise >= 0.0 ? axis.noise : not_a_number);
     figures.axes.push_back(axis_figures(axis, courses.back(), data, running_to_s));
   }
   std::vector<const SmoothCourse*> linear;

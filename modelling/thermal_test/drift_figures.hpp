@@ -1,20 +1,20 @@
 /// Figures of a thermal test to ISO 230-3, with intervals.
 #pragma once
 
-#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "estimator/types.hpp"
 #include "modelling/thermal_test/test_data.hpp"
 
 namespace thermocomp::thermal_test {
 
 /// A range with its 99 % interval, which is wider downwards, since noise increases a range.
 struct Figure {
-  double value{std::numeric_limits<double>::quiet_NaN()};
-  double low{std::numeric_limits<double>::quiet_NaN()};
-  double high{std::numeric_limits<double>::quiet_NaN()};
+  double value{not_a_number};
+  double low{not_a_number};
+  double high{not_a_number};
   [[nodiscard]] bool is_there() const noexcept { return value == value; }
 };
 

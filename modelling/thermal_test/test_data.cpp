@@ -14,6 +14,7 @@
 #include "config/text/printable_text.hpp"
 #include "config/text/problems.hpp"
 #include "config/text/units.hpp"
+#include "estimator/types.hpp"
 
 namespace thermocomp::thermal_test {
 
@@ -260,7 +261,7 @@ std::vector<bool> active_rows(const RunFile& run, const std::string& column) {
     if (std::isfinite(value)) largest = std::max(largest, std::abs(value));
   std::vector<bool> active;
   bool now = false;
-  double last = std::nan("");
+  double last = not_a_number;
   for (const double value : values) {
     if (std::isfinite(value)) {
       now = moves ? std::abs(value - last) > moved_mm : std::abs(value) > speed_share * largest;

@@ -8,6 +8,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "estimator/types.hpp"
 #include "report/html_page.hpp"
 #include "report/svg_plot.hpp"
 
@@ -25,7 +26,7 @@ double length_s(const TestPhases& phases) {
 }
 
 double room_range_K(const TestFigures& figures) {
-  double range = std::nan("");
+  double range = not_a_number;
   for (const TemperatureFigures& temperature : figures.temperatures)
     if (temperature.is_room) range = std::fmax(range, temperature.range_K);
   return range;
@@ -40,7 +41,7 @@ double mean_speed(const TestData& data) {
     sum += std::abs(data.speed[i]);
     count += 1.0;
   }
-  return count > 0.0 ? sum / count : std::nan("");
+  return count > 0.0 ? sum / count : not_a_number;
 }
 
 /// How much warmer the machine was at the start than the room, the room's difference left out where
@@ -244,7 +245,7 @@ std::vector<double> resampled(const std::vector<double>& at_s, const std::vector
   for (const double at : at_s) {
     const auto after = std::lower_bound(time_s.begin(), time_s.end(), at);
     if (time_s.empty() || at < time_s.front() - 1.0 || after == time_s.end()) {
-      result.push_back(std::nan(""));
+      result.push_back(not_a_number);
       continue;
     }
     const auto i = static_cast<std::size_t>(after - time_s.begin());

@@ -11,6 +11,8 @@
 #include <Eigen/QR>
 #include <Eigen/SVD>
 
+#include "estimator/types.hpp"
+
 namespace thermocomp::identification {
 namespace {
 
@@ -81,8 +83,7 @@ double rms(const Eigen::VectorXd& values) {
 /// estimator, clustered by fold); t with folds - 1 degrees of freedom.
 Eigen::VectorXd confidence(const Stacked& data, const Eigen::VectorXd& residual) {
   const std::size_t folds = data.begin.size() - 1;
-  Eigen::VectorXd half_width =
-      Eigen::VectorXd::Constant(data.x.cols(), std::numeric_limits<double>::quiet_NaN());
+  Eigen::VectorXd half_width = Eigen::VectorXd::Constant(data.x.cols(), not_a_number);
   if (folds < 2) return half_width;
   const Eigen::MatrixXd inverse = (data.x.transpose() * data.x).inverse();
   Eigen::MatrixXd slices = Eigen::MatrixXd::Zero(data.x.cols(), data.x.cols());
@@ -98,8 +99,7 @@ Eigen::VectorXd confidence(const Stacked& data, const Eigen::VectorXd& residual)
 }
 
 void judge_hot_half(const MeasuredTests& tests, const Stacked& data, double penalty, Fit& fit) {
-  for (OutputFit& output : fit.outputs)
-    output.hot_rms_um = std::numeric_limits<double>::quiet_NaN();
+  for (OutputFit& output : fit.outputs) output.hot_rms_um = not_a_number;
   if (tests.hot.rows.empty()) return;
   std::vector<bool> is_hot(static_cast<std::size_t>(data.x.rows()), false);
   for (const Eigen::Index row : tests.hot.rows)

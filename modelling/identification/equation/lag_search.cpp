@@ -8,6 +8,7 @@
 #include <Eigen/Cholesky>
 
 #include "estimator/model/terms/low_pass.hpp"
+#include "estimator/types.hpp"
 
 namespace thermocomp::identification {
 namespace {
@@ -183,8 +184,7 @@ Eigen::MatrixXd ColumnPool::left_out(const std::vector<std::size_t>& columns) co
       const Eigen::MatrixXd scaled = scale.asDiagonal() * a * scale.asDiagonal();
       const Eigen::LDLT<Eigen::MatrixXd> solver(scaled);
       if (!(solver.vectorD().minCoeff() > singular_share))
-        return Eigen::MatrixXd::Constant(sums.rows(), sums.cols(),
-                                         std::numeric_limits<double>::quiet_NaN());
+        return Eigen::MatrixXd::Constant(sums.rows(), sums.cols(), not_a_number);
       b = scale.asDiagonal() * solver.solve(scale.asDiagonal() * train(x, y));
     }
     const Eigen::MatrixXd& own = equations_.folds[f];

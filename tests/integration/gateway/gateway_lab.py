@@ -26,8 +26,9 @@ def change(state, changes):
 class Gateway:
     """A running thermocomp-gateway."""
 
-    def __init__(self, lab, daemon, http="", more=""):
+    def __init__(self, lab, daemon, http="", more="", wrapper=()):
         self.folder = lab.folder
+        self.wrapper = wrapper  # a command that runs the gateway
         self.config = lab.folder / "gateway.toml"
         self.log = lab.folder / "gateway.log"
         self.context = None  # TLS
@@ -37,7 +38,7 @@ class Gateway:
 
     def start(self):
         with self.log.open("a") as log:
-            self.process = subprocess.Popen([str(BIN / "thermocomp-gateway"), str(self.config)],
+            self.process = subprocess.Popen([*self.wrapper, str(BIN / "thermocomp-gateway"), str(self.config)],
                                             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                                             stderr=log, text=True, cwd=self.folder)
         line = self.process.stdout.readline()

@@ -1,6 +1,7 @@
 """MQTT with a real mosquitto: all messages arrive, and any end of the gateway is published."""
 
 import contextlib
+import os
 import socket
 import subprocess
 import time
@@ -18,10 +19,10 @@ def broker(lab):
     return made.start()
 
 
-def publisher(lab, machine, broker, more=""):
+def publisher(lab, machine, broker, more="", wrapper=()):
     return lab.also_end(Gateway(lab, machine.daemon, "", f'[mqtt]\nhost = "localhost"\n'
                                 f'port = {broker.port}\nperiod_s = 0.5\n{more}\n[alarm]\n'
-                                'raise_after_s = 0.5\nclear_after_s = 0.5')).start()
+                                'raise_after_s = 0.5\nclear_after_s = 0.5', wrapper)).start()
 
 
 def topic(rest):
@@ -50,6 +51,17 @@ def test_values_arrive_retained_and_the_last_will_ends_them(lab, machine, broker
     gateway.process.wait()
     listener.wait_for(lambda t, _, p: t == topic("status") and p == {"state": "offline"},
                       "the last will")
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give the gateway its own /etc/hosts")
+@pytest.mark.parametrize("addresses", [("::1", "127.0.0.1"), ("127.0.0.1", "::1")])
+def test_a_broker_at_one_address_of_its_name_is_found(lab, machine, broker, addresses):
+    hosts = lab.folder / "hosts"
+    hosts.write_text("".join(f"{address} localhost\n" for address in addresses))
+    publisher(lab, machine, broker, wrapper=(
+        "unshare", "--mount", "sh", "-c", f'mount --bind {hosts} /etc/hosts && exec "$0" "$@"'))
+    listener = lab.also_end(Subscriber(broker))
+    listener.wait_for(lambda t, _, p: t == topic("status") and p.get("compensating"), "online")
 
 
 def test_an_orderly_end_publishes_offline_and_alarms_are_raised_and_cleared(lab, machine, broker):
