@@ -40,10 +40,11 @@ if(CMAKE_BUILD_TYPE STREQUAL "Release")
   target_compile_options(thermocomp_flags INTERFACE
     -fstack-protector-strong -D_FORTIFY_SOURCE=2 -ffile-prefix-map=${CMAKE_SOURCE_DIR}=.)
   target_link_options(thermocomp_flags INTERFACE -Wl,-z,relro -Wl,-z,now)
-  # Libraries carry type information beside the machine code, for scripts/check-odr.sh alone: no program is linked
-  # with it, and tests, which would take a tenth longer to compile, have none.
+  # Type information beside the machine code, for scripts/check-odr.sh alone: no program is linked with it. Tests have
+  # it too: the index of such a library names functions that it does not define, and an object without types
+  # (Debian's libCatch2WithMain.a) that needs one of these includes its members twice.
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
-    set(THERMOCOMP_TYPES_FOR_ODR -flto -ffat-lto-objects)
+    target_compile_options(thermocomp_flags INTERFACE -flto -ffat-lto-objects)
     target_link_options(thermocomp_flags INTERFACE -fno-lto)
   endif()
 endif()
@@ -160,7 +161,6 @@ endfunction()
 function(thermocomp_library name)
   cmake_parse_arguments(arg "RUNS_ONCE;MODELLING" "" "INCLUDE_FOLDERS;SOURCES;LINKS;PRIVATE_LINKS" ${ARGN})
   add_library(${name} STATIC ${arg_SOURCES})
-  target_compile_options(${name} PRIVATE ${THERMOCOMP_TYPES_FOR_ODR})
   target_link_libraries(${name} PUBLIC ${arg_LINKS} PRIVATE thermocomp_flags ${arg_PRIVATE_LINKS})
   thermocomp_include_folders(${name} PUBLIC ${arg_INCLUDE_FOLDERS})
   if(arg_RUNS_ONCE)
@@ -201,7 +201,7 @@ endif()
 function(thermocomp_test name)
   cmake_parse_arguments(arg "SLOW;WAITS" "TIMEOUT" "SOURCES;LINKS;LABELS;ARGUMENTS" ${ARGN})
   add_executable(${name} ${arg_SOURCES})
-  target_link_libraries(${name} PRIVATE thermocomp_flags Catch2::Catch2WithMain ${arg_LINKS})
+  target_link_libraries(${name} PRIVATE thermocomp_flags thermocomp_catch_main ${arg_LINKS})
   target_compile_options(${name} PRIVATE ${THERMOCOMP_TEST_OPTIONS})
   thermocomp_use_precompiled(${name} thermocomp_precompiled_catch)
   add_test(NAME ${name} COMMAND ${name} ${arg_ARGUMENTS})
