@@ -6,12 +6,13 @@
 #include <cerrno>
 #include <cstring>
 #include <memory>
-#include <optional>
 #include <poll.h>
 #include <pthread.h>
 #include <signal.h>
 #include <string>
 #include <unistd.h>
+#include <utility>
+#include <vector>
 
 #include <modbus/modbus.h>
 #include <netdb.h>
@@ -45,8 +46,8 @@ class NameLookup {
   [[nodiscard]] int done_fd() const noexcept;
   [[nodiscard]] bool done() const noexcept;
   /// @pre done()
-  /// @return the address, or nullopt with `error` set
-  [[nodiscard]] std::optional<SocketAddress> result(std::string& error) const;
+  /// @return the addresses, the preferred one first; none: `error` is set
+  [[nodiscard]] std::vector<SocketAddress> result(std::string& error) const;
 
  private:
   struct State;
@@ -59,7 +60,7 @@ struct NameLookup::State {
   int done_fd{-1};
   std::atomic<bool> done{false};
   int error{EAI_AGAIN};
-  SocketAddress address;
+  std::vector<SocketAddress> addresses;
 
   State(std::string host_given, int port_given)
       : host(std::move(host_given)),
@@ -78,11 +79,13 @@ struct NameLookup::State {
     hints.ai_flags = flags;
     addrinfo* found = nullptr;
     error = ::getaddrinfo(host.c_str(), port.c_str(), &hints, &found);
-    if (error == 0 && found != nullptr) {
-      std::memcpy(&address.storage, found->ai_addr, found->ai_addrlen);
-      address.length = found->ai_addrlen;
+    if (error != 0) return;
+    for (const addrinfo* at = found; at != nullptr; at = at->ai_next) {
+      SocketAddress& address = addresses.emplace_back();
+      std::memcpy(&address.storage, at->ai_addr, at->ai_addrlen);
+      address.length = at->ai_addrlen;
     }
-    if (found != nullptr) ::freeaddrinfo(found);
+    ::freeaddrinfo(found);
   }
 
   void finish() noexcept {
@@ -141,11 +144,10 @@ bool NameLookup::done() const noexcept {
   return state_->done.load(std::memory_order_acquire);
 }
 
-std::optional<SocketAddress> NameLookup::result(std::string& error) const {
+std::vector<SocketAddress> NameLookup::result(std::string& error) const {
   THERMOCOMP_ENSURE(done());  // also synchronises with the other thread's result
-  if (state_->error == 0) return state_->address;
-  error = state_->host + ": " + ::gai_strerror(state_->error);
-  return std::nullopt;
+  if (state_->error != 0) error = state_->host + ": " + ::gai_strerror(state_->error);
+  return state_->addresses;
 }
 
 /// Waits for the first of a descriptor, a time and cancel().
@@ -234,6 +236,8 @@ class TcpPort final : public ModbusPort {
   nanoseconds connect_max_;
   InterruptibleWait wait_;
   std::unique_ptr<NameLookup> lookup_;
+  std::size_t address_{0};  ///< the host's address to connect to, counted on beyond the last one
+  bool has_answered_{true};
   int fd_{-1};
 };
 
@@ -252,9 +256,11 @@ bool TcpPort::open(std::string& why) {
       return false;
     }
   }
-  const auto address = lookup_->result(why);
+  const std::vector<SocketAddress> addresses = lookup_->result(why);
   lookup_.reset();  // resolved for every connection, since addresses may change
-  return address && open_socket(*address, why);
+  if (addresses.empty()) return false;
+  if (!std::exchange(has_answered_, false)) ++address_;  // a device may listen at one of them
+  return open_socket(addresses[address_ % addresses.size()], why);
 }
 
 bool TcpPort::open_socket(const SocketAddress& address, std::string& why) {
@@ -306,7 +312,10 @@ PortWait TcpPort::wait_for_input(nanoseconds deadline) noexcept {
 PortBytes TcpPort::receive(std::span<std::uint8_t> into) noexcept {
   while (true) {
     const ssize_t count = ::recv(fd_, into.data(), into.size(), MSG_DONTWAIT);
-    if (count > 0) return {PortBytes::Kind::bytes, static_cast<std::size_t>(count)};
+    if (count > 0) {
+      has_answered_ = true;
+      return {PortBytes::Kind::bytes, static_cast<std::size_t>(count)};
+    }
     if (count < 0 && errno == EINTR) continue;
     if (count < 0 && errno == EAGAIN) return {PortBytes::Kind::nothing};
     return {PortBytes::Kind::lost};

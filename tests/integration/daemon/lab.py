@@ -71,6 +71,13 @@ def call(path, method, timeout_s=PATIENCE_S, **params):
     return answer["result"]
 
 
+def with_addresses_of_localhost(folder, *addresses):
+    """A command that runs a program for which `localhost` has these addresses. Needs root."""
+    hosts = folder / "hosts"
+    hosts.write_text("".join(f"{address} localhost\n" for address in addresses))
+    return ("unshare", "--mount", "sh", "-c", f'mount --bind {hosts} /etc/hosts && exec "$0" "$@"')
+
+
 class Daemon:
     def __init__(self, folder, sockets, config, name="thermocompd"):
         self.folder = folder
@@ -81,6 +88,7 @@ class Daemon:
         self.log = folder / (name + ".log")
         self.process = None
         self.environment = {}  # in addition to the test's own
+        self.wrapper = ()      # a command that runs the daemon
         self.write_config(config)
 
     def write_config(self, text):
@@ -92,7 +100,7 @@ class Daemon:
     def start(self, wait=True):
         self.log_start = self.log.stat().st_size if self.log.exists() else 0
         with self.log.open("a") as log:
-            self.process = subprocess.Popen([str(BIN / "thermocompd"), str(self.config)],
+            self.process = subprocess.Popen([*self.wrapper, str(BIN / "thermocompd"), str(self.config)],
                                             stdin=subprocess.DEVNULL, stdout=log, stderr=log,
                                             cwd=self.folder,
                                             env={**os.environ, **self.environment})

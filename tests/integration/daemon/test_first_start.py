@@ -2,12 +2,13 @@
 refused. The real daemon with the simulated machine."""
 
 import json
+import os
 import subprocess
 import time
 
 import pytest
 
-from lab import BIN, Refused, eventually, run_tool
+from lab import BIN, Refused, eventually, run_tool, with_addresses_of_localhost
 from plain_devices import CONFIG, MODEL, SIMULATED
 
 # The column cools by 4 K, which requires 12 um.
@@ -206,3 +207,12 @@ def test_a_sensor_that_jumps_counts_only_once_an_operator_accepts_it(day):
     assert column(daemon)["temp_degC"] == pytest.approx(68.0, abs=0.02)
     assert "sensor_unconfirmed" not in daemon.status()["reasons"]
     assert any("accept" in line for line in daemon.log_text().splitlines())
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give a process its own /etc/hosts")
+def test_devices_at_one_address_of_their_name_are_found(lab, machine):
+    machine.daemon.write_config(machine.config.replace('host = "127.0.0.1"', 'host = "localhost"'))
+    machine.daemon.wrapper = with_addresses_of_localhost(lab.folder, "::1", "127.0.0.1")
+    machine.start()
+    machine.warm_by(9.0)
+    machine.daemon.wait_for_offset(9.0, 0.1)

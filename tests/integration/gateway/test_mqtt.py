@@ -9,7 +9,7 @@ import time
 import pytest
 
 from gateway_lab import Broker, Gateway, Subscriber, make_certificate
-from lab import eventually
+from lab import eventually, with_addresses_of_localhost
 
 
 @pytest.fixture
@@ -53,13 +53,10 @@ def test_values_arrive_retained_and_the_last_will_ends_them(lab, machine, broker
                       "the last will")
 
 
-@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give the gateway its own /etc/hosts")
-@pytest.mark.parametrize("addresses", [("::1", "127.0.0.1"), ("127.0.0.1", "::1")])
-def test_a_broker_at_one_address_of_its_name_is_found(lab, machine, broker, addresses):
-    hosts = lab.folder / "hosts"
-    hosts.write_text("".join(f"{address} localhost\n" for address in addresses))
-    publisher(lab, machine, broker, wrapper=(
-        "unshare", "--mount", "sh", "-c", f'mount --bind {hosts} /etc/hosts && exec "$0" "$@"'))
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give a process its own /etc/hosts")
+def test_a_broker_at_one_address_of_its_name_is_found(lab, machine, broker):
+    publisher(lab, machine, broker,
+              wrapper=with_addresses_of_localhost(lab.folder, "::1", "127.0.0.1"))
     listener = lab.also_end(Subscriber(broker))
     listener.wait_for(lambda t, _, p: t == topic("status") and p.get("compensating"), "online")
 
