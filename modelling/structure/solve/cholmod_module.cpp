@@ -27,8 +27,8 @@ void leave_processors_to_others() {
   if (::getloadavg(&load, 1) == 1 && load > processors) set("openblas_set_num_threads", 1);
 }
 
-/// A factor's blocks of tens of MB are used again by the next one. As the C library does it, each would be mapped and
-/// cleared anew: half of the time of small models.
+/// A factor's blocks of tens of MB are used again by the next one. As the C library does it, each
+/// would be mapped and cleared anew: half of the time of small models.
 void keep_freed_memory() {
   ::mallopt(M_MMAP_THRESHOLD, 1 << 30);
   ::mallopt(M_TRIM_THRESHOLD, 1 << 30);
