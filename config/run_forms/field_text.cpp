@@ -16,7 +16,7 @@ std::string_view trimmed(std::string_view text) {
 }
 
 bool is_missing(std::string_view field) {
-  return field.empty() || field == "nan" || field == "NaN" || field == "not_a_number";
+  return field.empty() || field == "nan" || field == "NaN" || field == "NAN";
 }
 
 std::optional<double> finite_number(std::string_view field) {
