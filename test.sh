@@ -3,7 +3,7 @@
 # static checks.
 #   ./test.sh [--quick | --packages | --all | --build-only] [--preset PRESET] [-- CTEST_OPTION...]
 #   --quick: for daily work: only test programs, without processes, guests or campaigns
-#   --packages: also the tests that take minutes each, and the Debian packages in booted systems, as .ci/run does
+#   --packages: also tests that take minutes or need a browser or PostgreSQL, and the Debian packages in booted systems
 #   --all: also the tests of the night, and those that plant bugs in copies of the sources
 #   --build-only: no tests
 #   --preset: debug, release (default), asan-ubsan, asan-ubsan-all (with the modelling), tsan, coverage
@@ -150,7 +150,7 @@ test_processes_while_building() {
   behind=$!
   trap 'kill "$behind" 2>/dev/null || true' EXIT
   test_part processes --label-regex "$labels" "${left_out[@]}"
-  wait "$behind" || true  # what failed is built again, where it is seen
+  stage "build $preset, the rest" wait "$behind" || true  # what failed is built again, where it is seen
   trap - EXIT
   left_out=(--label-exclude "${labels%)\$}|${left_out_labels})\$")
 }

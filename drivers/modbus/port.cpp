@@ -259,7 +259,7 @@ bool TcpPort::open(std::string& why) {
   const std::vector<SocketAddress> addresses = lookup_->result(why);
   lookup_.reset();  // resolved for every connection, since addresses may change
   if (addresses.empty()) return false;
-  if (!std::exchange(has_answered_, false)) ++address_;  // a device may listen at one of them
+  if (!std::exchange(has_answered_, false)) ++address_;  // a device may listen at only one
   return open_socket(addresses[address_ % addresses.size()], why);
 }
 
